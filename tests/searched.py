@@ -18,7 +18,7 @@ def searched(problem: Problem, seconds: float | None = None) -> Result:
     assert result.certificate.lower_bound == 0.0
     assert result.certificate.method.startswith("local programs")
     assert result.objective is not None
-    assert result.final.excess(result.problem.limits) <= KEPT
-    if result.initial.excess(result.problem.limits) <= KEPT:
+    assert result.final.violation(result.problem.limits) <= KEPT
+    if result.initial.violation(result.problem.limits) <= KEPT:
         assert result.objective.value <= result.objective.initial
     return result

@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from laufruhe.load_models.uneven_model import Symbols, UnevenModel
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
 from laufruhe.problem.measure import Measure
 
 
@@ -52,7 +52,7 @@ class WithVariables:
         self.held.append(ca.reshape(expression, -1, 1))
 
 
-def smooth_value(model: UnevenModel, measure: Measure, at: Symbols, share: float) -> Any:
+def smooth_value(model: UnevenModel, measure: Measure, at: UnevenSymbols, share: float) -> Any:
     """What a program would minimise of a measure, softened by this much of one."""
     rows, grid = model.rows(measure, at)
     program = AtItsValues()

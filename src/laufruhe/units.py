@@ -246,7 +246,7 @@ def readable(unit: str) -> tuple[str, float]:
     return name.replace("^2", "²").replace("^3", "³"), factor
 
 
-def shown(value: float, unit: str, digits: int = 4) -> str:
+def quantity_text(value: float, unit: str, digits: int = 4) -> str:
     """Return value and unit for messages, as they may be typed: degrees, mm, rpm, N/mm^2."""
     name, factor = _SHOWN.get(unit, (unit, 1.0))
     return f"{value * factor:.{digits}g} {name}".rstrip()

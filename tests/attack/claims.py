@@ -193,11 +193,11 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     given = openings.scene(*openings.read(result.initial.engine, {d.name: d.initial for d in result.decisions}))
     if given.worst <= 0.0 and value > given.objective * (1.0 + reading) + floor:
         verdict.wrong.append(f"value {value:.9g} is worse than {given.objective:.9g} as given")
-    if rival is None or rival.excess > 1e-6:
+    if rival is None or rival.violation > 1e-6:
         return
     # what a rival passes a limit by is worth the limit's price
     prices = (abs(float(np.nan_to_num(limit.shadow_price)) * limit.limit) for limit in result.limits)
-    passed = (max(rival.excess, 0.0) + _read_low(result, scene)) * sum(prices)
+    passed = (max(rival.violation, 0.0) + _read_low(result, scene)) * sum(prices)
     if bound > rival.value * (1.0 + reading) + floor + passed:
         verdict.wrong.append(f"bound {bound:.9g}, a rival has {rival.value:.9g} {rival.told or ''}")
     over = (value - rival.value) / max(rival.value, floor)

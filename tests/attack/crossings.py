@@ -265,8 +265,8 @@ def best_of_choices(
             found.append(local_rival(openings, rng, [start, *near], calls // len(every) + 60, told))
         else:
             found.append(convex_rival(openings, start, told, enough))
-    kept = [rival for rival in found if rival.excess <= KEPT]
-    return min(kept, key=lambda rival: rival.value) if kept else min(found, key=lambda rival: rival.excess)
+    kept = [rival for rival in found if rival.violation <= KEPT]
+    return min(kept, key=lambda rival: rival.value) if kept else min(found, key=lambda rival: rival.violation)
 
 
 # --- judges of their own
@@ -324,7 +324,7 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
             verdict.wrong.append(f"a limit is passed by {own.worst:.2e} of itself")
         rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5))
         verdict.rivals += rival.looked_at
-        if rival.excess <= 1e-6:
+        if rival.violation <= 1e-6:
             if rank.lower_bound > rival.value * (1.0 + reading) + floor:
                 verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {rival.value:.9g}")
             if str(rank.proof) == "global" and rank.minimum > rival.value * (1.0 + 1e-4 + reading) + floor:

@@ -123,7 +123,7 @@ class Found:
 
     vector: np.ndarray
     value: float
-    excess: float
+    violation: float
     bound: float
     prices: tuple[float, ...]
 
@@ -160,7 +160,7 @@ class Program:
         value = sum(f * max(p[0] for p in t.planes(start)) for f, t in zip(self.factors, self.terms, strict=True))
         return _Search(self, value or 1.0, charge).run(start, accuracy, maximum, enough / (value or 1.0))
 
-    def least_excess(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Found:
+    def minimum_violation(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Found:
         """Least largest excess of the limits, as shares of them; its bound above zero proves that no design exists."""
         return _Search(self, 1.0, 1.0, only_limits=True).run(start, accuracy, maximum, 1e-6)
 
@@ -215,10 +215,10 @@ class _Search:
                 row = np.zeros(self.columns)
                 row[: self.q], row[self.q + k] = slope / self.unit, -1.0
                 self._row(-1, row, float(slope @ x - height) / self.unit)
-        excess = -1.0
+        violation = -1.0
         for j, (limit, maximum) in enumerate(zip(self.p.limits, self.p.maximum, strict=True)):
             for height, slope in limit.planes(x):
-                excess = max(excess, height / maximum - 1.0)
+                violation = max(violation, height / maximum - 1.0)
                 row = np.zeros(self.columns)
                 row[: self.q], row[-2] = slope / maximum, -1.0
                 self._row(j, row, 1.0 + float(slope @ x - height) / maximum)
@@ -228,8 +228,8 @@ class _Search:
             if size > 1.0 - 1e-3:
                 self._row(-1, {at: part[0] / size, at + 1: part[1] / size}, 1.0)
             at += w.entries
-        charged = excess if self.only_limits else value + self.charge * max(excess, 0.0)
-        return charged, value * self.unit, excess
+        charged = violation if self.only_limits else value + self.charge * max(violation, 0.0)
+        return charged, value * self.unit, violation
 
     @property
     def cost(self) -> np.ndarray:
@@ -247,7 +247,7 @@ class _Search:
 
     def run(self, start: np.ndarray, accuracy: float, maximum: int, enough: float) -> Found:
         x = best = self.p.openings.nearest(start.copy())
-        charged, value, excess = self.look(x)
+        charged, value, violation = self.look(x)
         bound, prices = -math.inf, tuple(0.0 for _ in self.p.limits)
         for _ in range(maximum):
             under = self._solve(self.cost)
@@ -263,9 +263,9 @@ class _Search:
             x = self.p.openings.nearest(ahead if ahead is not None else under.x[: self.q])
             now = self.look(x)
             if now[0] < charged:
-                best, (charged, value, excess) = x, now
+                best, (charged, value, violation) = x, now
         scale = 1.0 if self.only_limits else self.unit
-        return Found(best, value, excess, bound * scale, prices)
+        return Found(best, value, violation, bound * scale, prices)
 
     def _forget(self, solved: Any) -> None:
         """Leave out planes that lay far under the others, where there are many."""

@@ -98,14 +98,14 @@ class Search:
     def best(self, starts: list[np.ndarray], unit: float) -> tuple[float, float, np.ndarray, float]:
         """Value (infinite if none keeps the limits), excess and shares of the best design, and the least excess."""
         limits = "constraints" in self.table
-        goals = [self._charged(unit), *([self._excess] if limits else [])]
+        goals = [self._charged(unit), *([self._violation] if limits else [])]
         ends = list(starts)
         for goal, slope in zip(goals, (self._minimum, self._least_excess), strict=False):
             for start in [*starts, *self._evolved(goal)]:
                 found = slope(start, unit)
                 ends += [start, found, self._simplex(found, goal)]
         if limits:
-            kept = min(ends, key=lambda z: float(self._excess(z)[0]))
+            kept = min(ends, key=lambda z: float(self._violation(z)[0]))
             ends.append(self._minimum(kept, unit))
         told = [(*self.evaluate_design(z), z) for z in ends]
         minimum = min(over for _, over, _ in told)
@@ -121,7 +121,7 @@ class Search:
 
         return value
 
-    def _excess(self, shares: np.ndarray) -> np.ndarray:
+    def _violation(self, shares: np.ndarray) -> np.ndarray:
         return self.both(shares, self.quick)[1].max(axis=1)
 
     def _evolved(self, goal: Callable[[np.ndarray], np.ndarray]) -> list[np.ndarray]:

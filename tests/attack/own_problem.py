@@ -437,7 +437,7 @@ class Designs:
         weights = [float(t.get("weight", 1.0)) if "terms" in told else 1.0 for t in terms]
         return sum(w * self.measure(t) for w, t in zip(weights, terms, strict=True))  # type: ignore[return-value]
 
-    def excess(self, limit: Table) -> np.ndarray:
+    def violation(self, limit: Table) -> np.ndarray:
         """Share of itself by which a limit is broken; not over nought where it is kept."""
         found = []
         if limit["limit"] == "natural frequencies":
@@ -458,4 +458,6 @@ class Designs:
     def excesses(self) -> np.ndarray:
         """(count, limits)."""
         limits = self.table.get("constraints", [])
-        return np.stack([self.excess(limit) for limit in limits], axis=1) if limits else np.full((self.count, 1), -1.0)
+        return (
+            np.stack([self.violation(limit) for limit in limits], axis=1) if limits else np.full((self.count, 1), -1.0)
+        )

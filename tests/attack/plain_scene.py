@@ -252,7 +252,7 @@ class Scene:
     def objective(self) -> float:
         return sum(term.get("weight", 1.0) * self.measure(term) for term in terms_of(self.table))
 
-    def excess(self, limit: Table) -> float:
+    def violation(self, limit: Table) -> float:
         """By how much of itself a limit is broken; negative where it is kept."""
         asked = {**limit, "quantity": limit["limit"]}
         if limit["limit"] == "natural frequencies":
@@ -272,7 +272,7 @@ class Scene:
     @cached_property
     def worst(self) -> float:
         """Largest excess over all limits."""
-        return max((self.excess(limit) for limit in self.table.get("constraints", [])), default=-1.0)
+        return max((self.violation(limit) for limit in self.table.get("constraints", [])), default=-1.0)
 
 
 def terms_of(table: Table) -> list[Table]:

@@ -25,17 +25,17 @@ class Rival:
     ----------
     bound
         No design of ours is less, by planes; zero where there is none.
-    least_excess
+    minimum_violation
         No design breaks the limits less, by planes.
     """
 
     value: float
-    excess: float
+    violation: float
     vector: np.ndarray
     told: Table
     looked_at: int = 1
     bound: float = 0.0
-    least_excess: float = -1.0
+    minimum_violation: float = -1.0
 
 
 def designs_told(openings: Openings) -> Iterator[Table]:
@@ -51,13 +51,13 @@ def convex_rival(openings: Openings, start: np.ndarray, told: Table, enough: flo
     """Where unbalances alone are open; looked for until none under `enough` can be left."""
     program = Program(openings, told)
     found = program.minimum(start, enough=enough)
-    if found.excess > KEPT:
-        minimum = program.least_excess(found.vector)
-        if minimum.excess <= KEPT:
+    if found.violation > KEPT:
+        minimum = program.minimum_violation(found.vector)
+        if minimum.violation <= KEPT:
             found = program.minimum(minimum.vector, charge=1e6)
         else:
             scene = openings.scene(minimum.vector, told)
-            return Rival(scene.objective, minimum.excess, minimum.vector, told, least_excess=minimum.bound)
+            return Rival(scene.objective, minimum.violation, minimum.vector, told, minimum_violation=minimum.bound)
     scene = openings.scene(found.vector, told)
     return Rival(scene.objective, scene.worst, found.vector, told, bound=found.bound)
 
@@ -68,9 +68,9 @@ def best_star(openings: Openings, maximum: int, enough: float = np.inf) -> Rival
     if not told or len(told) > maximum:
         return None
     rivals = [convex_rival(openings, openings.nearest(np.zeros(openings.size)), star, enough) for star in told]
-    kept = [r for r in rivals if r.excess <= KEPT]
-    best = min(kept, key=lambda r: r.value) if kept else min(rivals, key=lambda r: r.excess)
-    return Rival(best.value, best.excess, best.vector, best.told, len(told), min(r.bound for r in rivals))
+    kept = [r for r in rivals if r.violation <= KEPT]
+    best = min(kept, key=lambda r: r.value) if kept else min(rivals, key=lambda r: r.violation)
+    return Rival(best.value, best.violation, best.vector, best.told, len(told), min(r.bound for r in rivals))
 
 
 def least_broken(openings: Openings, maximum: int) -> Rival | None:
@@ -80,9 +80,9 @@ def least_broken(openings: Openings, maximum: int) -> Rival | None:
         return None
     best: Rival | None = None
     for star in told:
-        found = Program(openings, star).least_excess(openings.nearest(np.zeros(openings.size)))
-        if best is None or found.excess < best.excess:
-            best = Rival(0.0, found.excess, found.vector, star, len(told), least_excess=found.bound)
+        found = Program(openings, star).minimum_violation(openings.nearest(np.zeros(openings.size)))
+        if best is None or found.violation < best.violation:
+            best = Rival(0.0, found.violation, found.vector, star, len(told), minimum_violation=found.bound)
     return best
 
 

@@ -175,7 +175,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
         at = evaluate(problem, problem.design([*unbalances, *x[:count].tolist()]), SAMPLES)
-        rooms = [-at.standing(limit).excess for limit in problem.mount_limits]
+        rooms = [-at.standing(limit).violation for limit in problem.mount_limits]
         rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.load_limits]
         rooms += [1.0 - abs(u) / d.upper for d, u in zip(rotors, unbalances, strict=True)]
         return objective_value(problem, at), np.array(rooms)

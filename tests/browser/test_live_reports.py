@@ -48,7 +48,7 @@ def printed(problem: Problem, found: Evaluation, names: Collection[str]) -> dict
     """What a report shows of these limits of a design."""
     stands = {limit: found.standing(limit) for limit in problem.limits if limit.name in names}
     return {
-        limit.name: [figure(stand.value, limit.measure.unit), str(stand.excess <= 1e-5).lower()]
+        limit.name: [figure(stand.value, limit.measure.unit), str(stand.violation <= 1e-5).lower()]
         for limit, stand in stands.items()
     }
 

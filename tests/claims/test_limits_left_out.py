@@ -27,7 +27,7 @@ def _minimum(problem: Problem, count: int = 400) -> float:
     values = []
     for value in np.linspace(decision.lower, decision.upper, count):
         found = evaluate(problem, problem.design([float(value)]))
-        if found.excess(problem.limits) <= 0.0:
+        if found.violation(problem.limits) <= 0.0:
             values.append(objective_value(problem, found))
     return min(values)
 
@@ -61,7 +61,7 @@ def test_a_limit_that_holds_leaves_at_least_the_bound_without_it(problem: Proble
     assert free.objective is not None
     # boxes of the weight may show more than that
     assert free.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _minimum(tight)
-    assert found.final.excess(tight.limits) <= 1e-5
+    assert found.final.violation(tight.limits) <= 1e-5
 
 
 @pytest.mark.slow

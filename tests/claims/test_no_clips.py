@@ -13,7 +13,7 @@ import laufruhe
 SOURCE = Path(laufruhe.__file__).parent
 ROOMS = ("prove", "solvers")
 LEAST, MOST = {"min", "minimum", "fmin", "clip"}, {"max", "maximum", "fmax"}
-VALUES = {"value", "enough", "known", "best", "level", "maximum"}
+VALUES = {"value", "cutoff", "known", "best", "level", "maximum"}
 """Names of what is known of designs."""
 BOUNDS = ("bound", "divide", "floor", "found", "minimum", "looked", "total")
 """What names of bounds have in them."""
@@ -32,8 +32,8 @@ ALLOWED = {
     "min(maximum, line.largest)",
     "min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)",
     "min(maximum, bounds[name].work(value / term.weight))",
-    "min(first, enough)",
-    "min(second, enough)",
+    "min(first, cutoff)",
+    "min(second, cutoff)",
 }
 """Calls that look alike and bring no bound down."""
 
@@ -94,7 +94,7 @@ def test_no_bound_is_brought_to_a_value(room: str) -> None:
         "return min(total, self.value), pull",
         "found = ThrowBound(min(bound, search.cut(found.value)), found.design)",
         "shown = ProofData(bound=min(bound, design.value))",
-        "return min(self.divide(root, 10), self._enough.value)",
+        "return min(self.divide(root, 10), self._cutoff.value)",
         "return WorstCase(errors, value, max(value, -bound), seen)",
         "minimum = np.minimum(bounds, value)",
     ],

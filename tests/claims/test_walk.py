@@ -64,7 +64,7 @@ def is_withheld(result: Result, best: float) -> bool:
     problem, own, told = result.problem, result.final, result.objective
     assert told is not None
     assert result.certificate is not None
-    assert own.excess(problem.limits) <= 0.0
+    assert own.violation(problem.limits) <= 0.0
     assert objective_value(problem, own) == pytest.approx(told.value, rel=1e-12)
     assert told.value >= best * (1.0 - 1e-4)
     assert repr(told.value) in result.message
@@ -169,7 +169,7 @@ def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> Non
 def resultant(loads: PointLoads) -> Spectrum:
     if loads.mount_forces is None:
         raise ModelError("this mounting has no transmitted force")
-    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+    return loads.mount_forces.mapped(lambda values: values.sum(axis=1, keepdims=True))
 
 
 @pytest.fixture
@@ -208,7 +208,7 @@ class WorstTwentieth(Maximum):
 def at(problem: Problem, values: dict[str, float]) -> float:
     """The objective of a design of this file, which keeps its limits."""
     design = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
-    assert design.excess(problem.limits) <= 0.0
+    assert design.violation(problem.limits) <= 0.0
     return objective_value(problem, design)
 
 

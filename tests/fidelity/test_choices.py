@@ -230,4 +230,4 @@ def test_rods_of_any_mechanism_count() -> None:
     swinging = replace(engine, slider_cranks=tuple(Swinging(**numbers) for numbers in own))
     for one, is_there in ((engine, False), (swinging, True)):
         choice = choose(tractor.problem(one, []), 1e-6)
-        assert ("inertia of the rods beyond that of two masses" in choice.kept) is is_there
+        assert ("inertia of the rods beyond that of two masses" in choice.description) is is_there

@@ -47,7 +47,7 @@ def _fidelity(rng: random.Random) -> Fidelity:
     )  # fmt: skip
 
 
-def _excess(seed: int) -> tuple[float, float]:
+def _violation(seed: int) -> tuple[float, float]:
     """True error less the stated one, and their ratio."""
     rng = random.Random(300_000 + seed)
     problem = random_elastic_problem(rng, gas=False)
@@ -64,8 +64,8 @@ def _excess(seed: int) -> tuple[float, float]:
 
 
 def test_estimate_is_not_below_the_error() -> None:
-    found = [_excess(seed) for seed in range(QUICK)]
-    assert max(excess for excess, _ in found) <= 0.0
+    found = [_violation(seed) for seed in range(QUICK)]
+    assert max(violation for violation, _ in found) <= 0.0
     # a bound far above the truth would pass and help nobody
     assert np.median([ratio for _, ratio in found if ratio != 1.0]) < 6.0
 
@@ -73,7 +73,7 @@ def test_estimate_is_not_below_the_error() -> None:
 @pytest.mark.validation
 @pytest.mark.parametrize("share", first_fast(range(SHARES), 0, 1))
 def test_estimate_on_many_engines(share: int) -> None:
-    assert [seed for seed in range(share * SHARE, (share + 1) * SHARE) if _excess(seed)[0] > 0.0] == []
+    assert [seed for seed in range(share * SHARE, (share + 1) * SHARE) if _violation(seed)[0] > 0.0] == []
 
 
 def _held(path: Path) -> Problem:
@@ -279,7 +279,7 @@ def test_a_question_about_modes_needs_no_loads() -> None:
     left = " ".join(part.what for part in choice.left_out)
     assert "loads at every speed" in left
     assert "loss and damping" in left
-    assert "stiffness and places" in " ".join(choice.kept)
+    assert "stiffness and places" in " ".join(choice.description)
     parts = tuple(replace(p, reciprocating_mass=3.0 * p.reciprocating_mass) for p in problem.engine.slider_cranks)
     mounts = tuple(replace(m, loss_factor=0.4) for m in problem.engine.mounts)
     other = replace(
@@ -298,7 +298,7 @@ def test_a_transmissibility_needs_its_loads(damped: dict[str, Any]) -> None:
     asked = (*problem.load_terms, Term(Measure(channels.TRANSMISSIBILITY)))
     engine = replace(problem.engine, mounts=tuple(replace(mount, **damped) for mount in problem.engine.mounts))
     choice = needs(replace(problem, engine=engine, objective=asked, limits=problem.load_limits))
-    kept = " ".join(choice.kept)
+    kept = " ".join(choice.description)
     assert "gas" in kept
     assert "crank speed" in kept
     assert "loss and damping" in kept

@@ -56,12 +56,12 @@ def test_estimate_is_not_idle() -> None:
 @pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 0, 1))
 def test_estimate_on_ten_thousand_engines(first: int, count: int) -> None:
     """Nothing is below without gas; with it one in a thousand: where its bends fall between steps is chance."""
-    found = {seed: _excess(seed) for seed in range(first, first + count)}
-    assert [seed for seed, (excess, has_gas) in found.items() if excess > 0.0 and not has_gas] == []
-    assert sum(excess > 0.0 for excess, _ in found.values()) <= 1
+    found = {seed: _violation(seed) for seed in range(first, first + count)}
+    assert [seed for seed, (violation, has_gas) in found.items() if violation > 0.0 and not has_gas] == []
+    assert sum(violation > 0.0 for violation, _ in found.values()) <= 1
 
 
-def _excess(seed: int) -> tuple[float, bool]:
+def _violation(seed: int) -> tuple[float, bool]:
     """By how much the error is above the estimate, of a reference of fewer steps: ten thousand take a minute."""
     rng = random.Random(100_000 + seed)
     problem = random_problem(rng)

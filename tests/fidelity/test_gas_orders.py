@@ -18,7 +18,7 @@ from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import Scale, error_bound, reference
 from laufruhe.files.reader import load
-from laufruhe.load_models.uneven_model import Symbols, UnevenModel
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -89,7 +89,7 @@ def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
     star = problem.phasing.realise(Candidate(throws, (1, 2, 4, 5, 3)))
     model = UnevenModel(star, problem.phasing.layout(None, None), {}, 0.0)
-    lines = model.wrench(star.points[0], Symbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1)))
+    lines = model.wrench(star.points[0], UnevenSymbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1)))
     real, imaginary = (np.array(ca.DM(part))[3] for part in (lines.real, lines.imaginary))
     return dict(zip(lines.orders.tolist(), (real + 1j * imaginary).tolist(), strict=True))
 

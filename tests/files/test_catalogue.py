@@ -106,4 +106,4 @@ def test_a_draft_is_a_problem_with_something_open(key: str, tmp_path: Path) -> N
     problem = load(path)
     assert problem.decisions
     assert problem.assumptions
-    assert units.shown(problem.points[0].speed, "rad/s") == "3000 rpm"
+    assert units.quantity_text(problem.points[0].speed, "rad/s") == "3000 rpm"

@@ -139,14 +139,14 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
     given = evaluate(problem, samples=result.final.samples)
     worth = objective_value(problem, given)
     fires = problem.phasing is None or problem.phasing.intervals.holds(problem.engine.firing_intervals)
-    if fires and given.excess(problem.limits) <= ALLOWED and value > worth + room_of(value, SAME, nothing):
+    if fires and given.violation(problem.limits) <= ALLOWED and value > worth + room_of(value, SAME, nothing):
         yield f"worse than the design as given: {value:.9g} against {worth:.9g}"
     again = _loaded(document, _values(result), _order(result), folder)
     found = evaluate(again, samples=result.final.samples)
     if abs(objective_value(again, found) - value) > room_of(value, 1e-5, nothing):
         yield f"its design is worth {objective_value(again, found):.9g}, and {value:.9g} is told"
-    if found.excess(again.limits) > 2.0 * ALLOWED:
-        yield f"its design breaks a limit by {found.excess(again.limits):.3g}"
+    if found.violation(again.limits) > 2.0 * ALLOWED:
+        yield f"its design breaks a limit by {found.violation(again.limits):.3g}"
 
 
 def _values(result: Result) -> dict[str, float]:
@@ -216,7 +216,7 @@ def _other_designs(
     generator, samples = random.Random(problem.title), _fine(result)
     found = evaluate(problem, samples=samples)
     if problem.phasing is None or problem.phasing.throws is not None:
-        yield objective_value(problem, found), found.excess(problem.limits) <= STRICTLY
+        yield objective_value(problem, found), found.violation(problem.limits) <= STRICTLY
     held = _values(result)
     for k in range(TRIES):
         values = _drawn(document, generator)
@@ -260,7 +260,7 @@ def _evaluated(problem: Problem, engine: Engine, samples: int) -> tuple[float, b
     """Objective of one design, infinite where it has no loads, and whether limits allow it."""
     try:
         found = evaluate(problem, engine, samples)
-        return objective_value(problem, found), found.excess(problem.limits) <= STRICTLY
+        return objective_value(problem, found), found.violation(problem.limits) <= STRICTLY
     except ModelError:
         return math.inf, False
 

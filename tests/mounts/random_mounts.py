@@ -243,7 +243,7 @@ class AttainableLimit:
     """What a search over the exact model reached: the least objective within all limits, and the least excess."""
 
     value: float
-    excess: float
+    violation: float
 
 
 def values_at(problem: Problem, y: np.ndarray) -> list[Value]:
@@ -271,11 +271,11 @@ def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> 
             at = evaluate(problem, problem.design(values_at(problem, y)))
         except Exception:
             return 1e12
-        value, excess = objective_value(problem, at), at.excess(problem.limits)
-        best[1] = min(best[1], excess)
-        if excess <= 0.0:
+        value, violation = objective_value(problem, at), at.violation(problem.limits)
+        best[1] = min(best[1], violation)
+        if violation <= 0.0:
             best[0] = min(best[0], value)
-        return value / scale + 100.0 * max(excess, 0.0)
+        return value / scale + 100.0 * max(violation, 0.0)
 
     scale = result.objective.value if result.objective is not None and result.objective.value > 0.0 else 1.0
     steps = max(budget // (8 * width), 2)
@@ -301,17 +301,17 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
     result = solve(problem)
     given = _given(problem)
     out = []
-    met = given is not None and given.excess(problem.limits) <= 0.0
+    met = given is not None and given.violation(problem.limits) <= 0.0
     if met and result.status in (Status.INFEASIBLE, Status.FAILED):
         out.append(f"{result.status}, and the design as given keeps all limits")
     found = searched(problem, result, seed, budget)
-    if result.status is Status.FAILED and found.excess <= 0.0:
-        out.append(f"{result.message}, and a design keeps all limits with {found.excess:.2e}")
+    if result.status is Status.FAILED and found.violation <= 0.0:
+        out.append(f"{result.message}, and a design keeps all limits with {found.violation:.2e}")
     if result.status is Status.INFEASIBLE:
         if not result.conflict:
             out.append("infeasible, and no limit is named")
-        if found.excess <= -CLEAR:
-            out.append(f"infeasible, and a design keeps all limits with {found.excess:.2e}")
+        if found.violation <= -CLEAR:
+            out.append(f"infeasible, and a design keeps all limits with {found.violation:.2e}")
         return out
     if result.objective is None or result.certificate is None:
         return out
@@ -322,8 +322,8 @@ def complaints(problem: Problem, seed: int, budget: int = 250) -> list[str]:
         out.append(f"false bound: {bound}, {found.value} is reached")
     if result.status is Status.OPTIMAL and found.value < value * (1.0 - 1.5e-4):
         out.append(f"false optimum: {value}, {found.value} is reached")
-    if result.final.excess(problem.limits) > 1.1e-5 and result.status is not Status.FAILED:
-        out.append(f"breaks a limit by {result.final.excess(problem.limits):.2e}")
+    if result.final.violation(problem.limits) > 1.1e-5 and result.status is not Status.FAILED:
+        out.append(f"breaks a limit by {result.final.violation(problem.limits):.2e}")
     return out
 
 

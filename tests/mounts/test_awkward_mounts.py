@@ -119,11 +119,11 @@ def test_a_cone_solver_that_gives_up_is_asked_how_near_the_limits_can_be_met(tmp
     given = evaluate(problem)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
 
-    def excess(share):
+    def violation(share):
         x = low + np.clip(share, 0.0, 1.0) * (high - low)
-        return remounted(given, problem.design(x.tolist())).excess(problem.limits)
+        return remounted(given, problem.design(x.tolist())).violation(problem.limits)
 
-    found = minimize(excess, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
+    found = minimize(violation, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
     assert found.fun > 1e-4
 
 
@@ -192,7 +192,7 @@ def test_one_number_on_a_limit_is_proven_by_a_few_boxes(tmp_path: Path) -> None:
     assert int(boxes[1]) < 200
     given, (stiffness,) = evaluate(problem), problem.mount_decisions
     designs = [remounted(given, problem.design([float(k)])) for k in np.linspace(stiffness.lower, stiffness.upper, 100)]
-    allowed = [objective_value(problem, each) for each in designs if each.excess(problem.limits) <= 0.0]
+    allowed = [objective_value(problem, each) for each in designs if each.violation(problem.limits) <= 0.0]
     assert result.certificate.lower_bound <= result.objective.value <= min(allowed)
 
 

@@ -241,7 +241,7 @@ def _by_evolution(problem) -> float:
 
     def worth(x):
         design = remounted(given, problem.design(np.exp(x).tolist()))
-        return objective_value(problem, design) * (1.0 + 100.0 * max(design.standing(limit).excess, 0.0))
+        return objective_value(problem, design) * (1.0 + 100.0 * max(design.standing(limit).violation, 0.0))
 
     bounds = [(np.log(d.lower), np.log(d.upper)) for d in problem.decisions]
     return float(differential_evolution(worth, bounds, seed=1, maxiter=60, popsize=8, tol=1e-9).fun)

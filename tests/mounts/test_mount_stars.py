@@ -116,8 +116,8 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     """The first with what is worth proving of all, the others no further than it; none where one was left out."""
     asked = []
 
-    def bounded(result, value, enough=math.inf, of_many=False):
-        asked.append((value, enough, of_many))
+    def bounded(result, value, cutoff=math.inf, of_many=False):
+        asked.append((value, cutoff, of_many))
         bound = 0.9 * result.objective.value
         return replace(result, certificate=Certificate(Proof.GLOBAL, bound, 0.1, 0.0, "a bound"))
 
@@ -264,7 +264,7 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
         near = evaluate(own, own.design([fraction, *mounts]), 96)
         if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
             continue
-        if max(near.standing(limit).excess for limit in own.mount_limits) > 0.0:
+        if max(near.standing(limit).violation for limit in own.mount_limits) > 0.0:
             continue
         tried += 1
         assert objective_value(own, near) > uneven.objective.value * (1 - 1e-5)

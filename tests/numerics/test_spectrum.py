@@ -124,7 +124,7 @@ class TestOrders:
     @pytest.mark.parametrize("highest", [0.0, 0.4, 0.5, 2.0, 2.49, 100.0])
     def test_kept(self, highest: float) -> None:
         s = Spectrum(Fraction(1, 2), np.arange(1, 12, dtype=complex)[:, None])
-        kept = s.kept(highest)
+        kept = s.truncated(highest)
         assert kept.orders.tolist() == [order for order in s.orders if order <= highest]
         assert kept.coefficients[:, 0].tolist() == list(range(1, len(kept.orders) + 1))
 
@@ -202,7 +202,7 @@ def test_orders_are_told_apart_to_a_thousandth() -> None:
     assert signal.only((0.5, 2.0004)).coefficients.real.tolist() == [0.0, 2.0, 0.0, 0.0, 5.0]
     assert signal.at(1.5).real == 4.0
     assert signal.at(0.7) == 0.0
-    assert len(signal.kept(1.4999999).coefficients) == len(signal.kept(1.5).coefficients) == 4
+    assert len(signal.truncated(1.4999999).coefficients) == len(signal.truncated(1.5).coefficients) == 4
 
 
 @pytest.mark.parametrize("steps", [96, 144, 1440])

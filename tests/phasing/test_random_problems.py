@@ -30,14 +30,14 @@ def judge(problem):
         # no bound rules uneven throws out: that no search found one is all that is known
         assert phasing is not None, result.message
         assert phasing.continuous, result.message
-        assert given.excess(problem.limits) > 0.0, result.message
+        assert given.violation(problem.limits) > 0.0, result.message
         return
     if result.status is Status.INFEASIBLE:
         assert result.message or result.conflict
         return
-    assert result.final.excess(result.problem.limits) <= KEPT
+    assert result.final.violation(result.problem.limits) <= KEPT
     assert phasing is None or phasing.intervals.holds(result.final.engine.firing_intervals, 1e-6)
-    if given.excess(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
+    if given.violation(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
         assert result.objective.value <= result.objective.initial * (1.0 + 1e-6) + 1e-9
     assert result.certificate.lower_bound <= result.objective.value
 

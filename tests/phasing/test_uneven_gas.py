@@ -10,7 +10,7 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import LEFT_OUT, Symbols, UnevenModel, rides_of
+from laufruhe.load_models.uneven_model import LEFT_OUT, UnevenModel, UnevenSymbols, rides_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
@@ -58,7 +58,9 @@ def model_of(phasing, start, left_out=0.0):
 
 def moved(moves, x):
     """Symbols at deviations x, and the exact problem there."""
-    return Symbols(*moves.angles(x), ca.DM(0, 1)), replace(moves.phasing.realise(moves.candidate(x)), phasing=None)
+    return UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), replace(
+        moves.phasing.realise(moves.candidate(x)), phasing=None
+    )
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -86,7 +88,7 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name):
     phasing, start, moves = scene(tmp_path, name, rms)
     model, x = model_of(phasing, start), ca.SX.sym("x", moves.size)
     quantity = model.problem.objective[0].measure
-    norm = smooth_value(model, quantity, Symbols(*moves.angles(x), ca.DM(0, 1)), 1e-9)
+    norm = smooth_value(model, quantity, UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), 1e-9)
     smooth = ca.Function("norm", [x], [norm, ca.gradient(norm, x)])
     point = np.random.default_rng(4).uniform(-0.2, 0.2, moves.size)
 

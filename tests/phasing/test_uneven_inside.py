@@ -277,7 +277,7 @@ def test_firing_orders_beside_a_spring_that_is_open() -> None:
         decision = fixed.mount_decisions[0]
         for stiffness in np.linspace(decision.lower, decision.upper, 11):
             own = evaluate(fixed, fixed.design([float(stiffness)], [decision]))
-            if own.excess(fixed.limits) <= 0.0:
+            if own.violation(fixed.limits) <= 0.0:
                 values.append(objective_value(fixed, own))
     assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-9)
     assert result.objective.value <= min(values) * (1.0 + 1e-6)
@@ -299,7 +299,7 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
         decision = own.mount_decisions[0]
         for stiffness in np.linspace(decision.lower, decision.upper, 9):
             found = evaluate(own, own.design([float(stiffness)], [decision]))
-            if found.excess(own.limits) <= 0.0:
+            if found.violation(own.limits) <= 0.0:
                 values.append(objective_value(own, found))
     assert result.objective.value <= min(values) * (1.0 + 1e-4)
     assert result.certificate.lower_bound <= min(values)

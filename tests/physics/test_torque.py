@@ -37,7 +37,7 @@ def test_the_block_feels_the_torque_of_plain_cylinders(name: str) -> None:
     """T is the roll moment (C7), by energy here and by momentum there."""
     engine, point = case(name)
     torque, wrench = crank_torque(engine, point), shaking_loads(engine, point)
-    roll = wrench.each(lambda values: values[:, 3])
+    roll = wrench.mapped(lambda values: values[:, 3])
     size = np.abs(torque.sample(720)).max()
     assert size > 100.0
     assert np.abs(torque.sample(720) - roll.rebased(torque.base).sample(720)).max() < 1e-12 * size

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cli import scenes
 from laufruhe.plots import trade
-from laufruhe.studies.trade import Row, Trade
+from laufruhe.studies.trade import Trade, TradeRow
 from picture_faults import faults_of
 
 ROWS = 16
@@ -20,7 +20,7 @@ ROWS = 16
 
 def _trade(errors: list[float]) -> Trade:
     rows = tuple(
-        Row(f"fidelity {k}, 720 steps", error, error, 1e-5 * (k + 1.0), 2e-5, 0.01, 1e-3, 100_000, 0.5, 0.0,
+        TradeRow(f"fidelity {k}, 720 steps", error, error, 1e-5 * (k + 1.0), 2e-5, 0.01, 1e-3, 100_000, 0.5, 0.0,
             1e-3 if k % 3 else math.nan)
         for k, error in enumerate(errors)
     )  # fmt: skip

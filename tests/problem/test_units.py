@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import laufruhe.units
-from laufruhe.units import COMMON, UnitError, _by_registry, dimension_name, example, parse, shown
+from laufruhe.units import COMMON, UnitError, _by_registry, dimension_name, example, parse, quantity_text
 
 GRAVITY = 9.80665
 DIMENSIONS = ["m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "rad", "rad/s", "m/s", ""]
@@ -179,8 +179,8 @@ class TestShown:
         ],
     )
     def test_as_a_report_prints_it(self, value: float, unit: str, text: str) -> None:
-        assert shown(value, unit) == text
+        assert quantity_text(value, unit) == text
 
     @given(st.floats(-1e6, 1e6, allow_subnormal=False), st.sampled_from(["m", "rad", "rad/s", "kg", "N m", ""]))
     def test_what_is_shown_can_be_read(self, value: float, unit: str) -> None:
-        assert parse(shown(value, unit, 17), unit) == pytest.approx(value, rel=1e-14, abs=0.0)
+        assert parse(quantity_text(value, unit, 17), unit) == pytest.approx(value, rel=1e-14, abs=0.0)

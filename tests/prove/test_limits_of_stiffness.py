@@ -29,7 +29,7 @@ def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
             [*np.zeros(n), 1.0], A_ub=np.column_stack([by, -np.ones(count)]), b_ub=-overs,
             bounds=[(-1.0, 1.0)] * n + [(None, None)],
         ).fun  # fmt: skip
-        found = float(lines.excess[0])
+        found = float(lines.violation[0])
         assert found <= exact + 1e-9
         if count <= 2:
             assert found == pytest.approx(exact, abs=1e-9)
@@ -41,12 +41,12 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
     """Every two leave a side along which both are kept; (n1 + n2) / 2 is mixed with n3 until no side is left."""
     over, n = 0.1, np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]])
 
-    def excess(which: list[int]) -> float:
+    def violation(which: list[int]) -> float:
         limits = [(np.array([over]), n[k : k + 1]) for k in which]
-        return float(LinearRelaxation(np.zeros(1), np.zeros((1, 2)), limits).excess[0])
+        return float(LinearRelaxation(np.zeros(1), np.zeros((1, 2)), limits).violation[0])
 
-    assert excess([0, 1, 2]) == pytest.approx(over)
-    assert all(excess(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))
+    assert violation([0, 1, 2]) == pytest.approx(over)
+    assert all(violation(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))
 
 
 def test_limits_that_are_kept_are_no_conflict_of_those_that_are_not(tmp_path: Path) -> None:

@@ -180,7 +180,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     for below, above, bound in zip(low, high, bounds, strict=True):
         engine = problem.design(generator.uniform(below, above).tolist())
         design = remounted(given, engine)
-        broken = any(design.standing(limit).excess > 0.0 for limit in problem.mount_limits)
+        broken = any(design.standing(limit).violation > 0.0 for limit in problem.mount_limits)
         broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.load_limits)
         allowed_ones += not broken
         assert np.isfinite(bound) or broken
@@ -210,7 +210,7 @@ def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path)
     values = []
     for x in itertools.product(*axes):
         design = remounted(given, problem.design(list(x)))
-        if all(design.standing(each).excess <= 0.0 for each in problem.mount_limits):
+        if all(design.standing(each).violation <= 0.0 for each in problem.mount_limits):
             values.append(objective_value(problem, design))
     assert len(values) > 100
     assert min(values) >= result.certificate.lower_bound

@@ -85,7 +85,7 @@ def grid_of(problem: Problem) -> Iterator[Evaluation]:
 
 
 def keeps(found: Evaluation, limits: tuple[Limit, ...]) -> bool:
-    return found.excess(limits) <= 1e-5
+    return found.violation(limits) <= 1e-5
 
 
 SCENES = {
@@ -213,11 +213,11 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     assert near.name == "maximum mount travel"
     design = evaluate(problem, problem.design([decision.value for decision in near.decisions]))
     assert design.value(problem.limits[0].measure) == pytest.approx(near.value, rel=1e-9)
-    assert design.excess(problem.limits) == pytest.approx(near.excess, rel=1e-9)
+    assert design.violation(problem.limits) == pytest.approx(near.violation, rel=1e-9)
     assert near.broken == ("maximum mount travel",)
     sides = [np.linspace(d.lower, d.upper, 5) for d in problem.decisions]
     grid = [evaluate(problem, problem.design(list(point))) for point in itertools.product(*sides)]
-    assert near.excess <= evaluate(problem).excess(problem.limits)
+    assert near.violation <= evaluate(problem).violation(problem.limits)
     (told,) = result.reached
     assert told.proof is Proof.LOCAL
     kept = [found.value(problem.limits[0].measure) for found in grid if keeps(found, problem.limits[1:])]
@@ -245,7 +245,7 @@ def test_a_design_that_was_overlooked_is_the_result() -> None:
     for status in (Status.FAILED, Status.INFEASIBLE):
         found = told_of(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
         assert found.status is Status.FEASIBLE
-        assert found.final.excess(found.problem.limits) <= 1e-5
+        assert found.final.violation(found.problem.limits) <= 1e-5
         assert found.objective.name == "mean mount force"
         assert found.objective.value == pytest.approx(found.final.value(found.problem.objective[0].measure))
         assert found.certificate.lower_bound == 0.0

@@ -83,7 +83,7 @@ def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
         masses = best + rng.normal(0.0, 0.1, 3) if k % 2 else rng.uniform(0.0, 3.0, 3)
         masses = np.clip(masses, 0.0, 3.0)
         other = evaluate(problem, problem.design(masses.tolist()), 2880)
-        if other.excess(problem.limits) <= 0.0:
+        if other.violation(problem.limits) <= 0.0:
             met += 1
             assert objective_value(problem, other) >= result.certificate.lower_bound * (1.0 - 1e-3)
     assert met > 2

@@ -36,7 +36,7 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
         "objective": {"minimise": "mean rocking couple"},
     }  # fmt: skip
     problem = load_tables(table, Path("twin.toml"))
-    model, nothing = AffineModel(problem), numerical_zero(problem)
+    model, zero_level = AffineModel(problem), numerical_zero(problem)
     domains = model.domains
 
     def peak(x: np.ndarray) -> float:
@@ -44,7 +44,7 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
         return design.value(problem.limits[0].measure)
 
     plain = solve_cones(model.at(48)).x
-    found = allowed_optimum(problem, model, 48, nothing)
+    found = allowed_optimum(problem, model, 48, zero_level)
     assert plain is not None
     assert found is not None
     assert peak(plain) > 9000.0 * (1.0 + 1e-4)

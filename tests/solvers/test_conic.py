@@ -147,7 +147,7 @@ def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: py
     whole = solve_cones(limited_so)
     assert max(rows[:-1]) < 0.9 * rows[-1]
     assert few.x is not None
-    assert limited_so.excess(few.x) <= FEASIBLE
+    assert limited_so.violation(few.x) <= FEASIBLE
     assert limited_so.objective(few.x) == pytest.approx(limited_so.objective(whole.x), rel=1e-7)
     bounds = [lower_bound(limited_so, found.multipliers).value for found in (few, whole)]
     assert bounds[0] == pytest.approx(bounds[1], rel=1e-6)

@@ -106,7 +106,7 @@ def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
     }  # fmt: skip
     result = solve(load_tables(told, Path("single.toml")))
     assert result.status.has_design
-    assert 0.0 < with_fine_sampling(result.final).excess(result.problem.limits) <= KEPT
+    assert 0.0 < with_fine_sampling(result.final).violation(result.problem.limits) <= KEPT
 
 
 def out_of_reach() -> Problem:
@@ -141,7 +141,7 @@ def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, maximum:
         }  # fmt: skip
         result = solve(load_tables(told, Path("single.toml")))
         assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-        assert not met or with_fine_sampling(result.final).excess(result.problem.limits) <= KEPT
+        assert not met or with_fine_sampling(result.final).violation(result.problem.limits) <= KEPT
 
 
 def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -> None:
@@ -245,7 +245,7 @@ def test_stiffness_is_excluded_by_what_the_cycle_has(throw: float, samples: int,
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).excess(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= KEPT
 
 
 @pytest.mark.parametrize("samples", [48, 60])

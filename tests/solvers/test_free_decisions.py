@@ -140,7 +140,7 @@ def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
         held = holding(problem, k, size)
         again = solve(held)
         assert again.objective.value <= best * (1.0 + 2.0 * problem.tolerance)
-        assert again.final.excess(problem.limits) <= 1e-5
+        assert again.final.violation(problem.limits) <= 1e-5
 
 
 def holding(problem: Problem, k: int, size: float) -> Problem:

@@ -91,8 +91,8 @@ def _searched(problem: Problem, seed: int, samples: int | None, starts: int = 6,
         values = [next(at) * s.directions[0] if s.width == 1 else next(at) * np.exp(1j * next(at)) for s in sets]
         values = [v.real if d.place_drives else v for d, v in zip(problem.decisions, values, strict=True)]
         found = evaluate(problem, problem.design(values), samples)
-        excess = found.excess(problem.limits)
-        return objective_value(problem, found) * (1.0 + penalty * max(excess, 0.0)) + (excess > 1e-9) * penalty
+        violation = found.violation(problem.limits)
+        return objective_value(problem, found) * (1.0 + penalty * max(violation, 0.0)) + (violation > 1e-9) * penalty
 
     best = np.inf
     for _ in range(starts):
@@ -276,7 +276,7 @@ def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> N
     assert free.objective is not None
     assert bound.objective is not None
     assert bound.certificate is not None
-    assert bound.final.excess(problem.limits) <= 1e-6
+    assert bound.final.violation(problem.limits) <= 1e-6
     assert bound.certificate.lower_bound >= free.certificate.lower_bound * (1.0 - 1e-6) if free.certificate else False
     assert bound.certificate.kind is Proof.GLOBAL
     # the bound of a mean is that of the whole cycle (P7), which fewer angles may miss by more than is asked here

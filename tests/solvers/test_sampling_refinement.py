@@ -48,14 +48,14 @@ def test_leads_keep_limits_over_the_cycle(maximum: float, met: bool) -> None:
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).excess(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= KEPT
 
 
 def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> None:
     """The cycle has 964.63 N of second order, 48 angles have 959.1 N."""
     limit = {"name": "second", "limit": "mean shaking force", "orders": [2], "max": "962 N"}
     told = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])
-    assert evaluate(told).excess(told.limits) <= 0.0
+    assert evaluate(told).violation(told.limits) <= 0.0
     assert broken_limits(told.limits, with_fine_sampling(evaluate(told))) == ("second",)
 
 

@@ -78,7 +78,7 @@ def test_designs_are_those_of_the_exact_model(tmp_path: Path) -> None:
         values = [float(data[name][k]) * np.exp(1j * angle_of(data, name, k)) for name in names]
         exact = evaluate(problem, problem.design(values))
         assert float(data["objective"][k]) == pytest.approx(objective_value(problem, exact), rel=1e-9)
-        assert bool(data["within_limits"][k]) == (exact.excess(problem.limits) <= 1e-6)
+        assert bool(data["within_limits"][k]) == (exact.violation(problem.limits) <= 1e-6)
     for decision in problem.decisions:
         drawn = data[decision.name].values
         assert decision.lower <= drawn.min() < drawn.max() <= decision.upper

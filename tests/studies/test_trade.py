@@ -22,7 +22,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
 from laufruhe.solvers.conclusion import decision_values, state
 from laufruhe.solvers.warm_start import NEAR_BOXES, _begun, _is_like, first_of, next_to
-from laufruhe.studies.trade import Row, Trade, trade
+from laufruhe.studies.trade import Trade, TradeRow, trade
 from problem_files import PROBLEMS
 
 
@@ -31,11 +31,11 @@ def _worth(problem: Problem, engine: Engine | None) -> float:
     return objective_value(problem, reference(problem, engine))
 
 
-def _row(name: str, solve: float, regret: float, excess: float) -> Row:
-    return Row(name, 1e-6, 1e-5, 1e-5, 2e-5, solve, 1e-3, 100_000, 1.0 + regret, excess, regret)
+def _row(name: str, solve: float, regret: float, violation: float) -> TradeRow:
+    return TradeRow(name, 1e-6, 1e-5, 1e-5, 2e-5, solve, 1e-3, 100_000, 1.0 + regret, violation, regret)
 
 
-def _trade(*rows: Row) -> Trade:
+def _trade(*rows: TradeRow) -> Trade:
     problem = scenes.problem_of(scenes.TIGHT)
     return Trade(problem, rows, 2.0, 1.0, None, None)
 

@@ -26,7 +26,7 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
     given = evaluate_start(drawing)
     objective_value(drawing, given)
     if not given.resonance:
-        given.excess(drawing.limits)
+        given.violation(drawing.limits)
     # a problem that no method solves is not ok
     refuse(problem)
 

@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 import typer
 
 from laufruhe.errors import InputError, refused
+from laufruhe.files.catalogue import as_text as written
 from laufruhe.files.catalogue import engines
-from laufruhe.files.catalogue import shown as written
 from laufruhe.files.complaints import nearest
 from laufruhe.files.drafts import engine_of_table
 from laufruhe.machine.layouts import LAYOUTS

@@ -35,7 +35,7 @@ class Choice:
 
     fidelity: Fidelity
     error_estimate: float
-    kept: tuple[str, ...]
+    description: tuple[str, ...]
     left_out: tuple[LeftOut, ...]
     numbers: tuple[int, int]
 
@@ -72,7 +72,7 @@ def chosen_by(scale: Scale, tolerance: float) -> Choice:
         chosen,
         # the bounds are relative to the reference, a reader's error to what was computed
         estimate / max(1.0 - estimate, 0.5),
-        tuple(text for knob in KNOBS for text in knob.kept(scale, chosen)),
+        tuple(text for knob in KNOBS for text in knob.describe(scale, chosen)),
         # what is exactly zero first
         tuple(sorted(left, key=lambda part: part.restored is not None)),
         _numbers(scale.problem, scale, chosen),

@@ -100,7 +100,7 @@ class Scale:
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
-            left_out = [x + y.each(np.negative) for x, y in pairs]
+            left_out = [x + y.mapped(np.negative) for x, y in pairs]
             # the weight of every operating point, zero where it does not count
             shares = term.measure.shares([loads.point for loads in self.best.loads])
             total += term.weight * term.measure.norm.above(left_out, shares)
@@ -263,7 +263,7 @@ def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, floa
 def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
     # many angles: a root mean square would hide a spike
     pairs = zip(ours.loads, theirs.loads, strict=True)
-    found = [measure.load.signal(a) + measure.load.signal(b).each(np.negative) for a, b in pairs]
+    found = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]
     engine, points = ours.engine, [loads.point for loads in ours.loads]
     signals = over(engine.cycle.base_order, found)
     return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value

@@ -40,7 +40,7 @@ class Knob:
 
     Attributes
     ----------
-    key, kind, unit, told
+    key, kind, unit, schema
         In the [fidelity] table: its name, type, SI unit if it has one, and what a schema tells of it.
     is_decided
         Whether the automatic choice decides it, so that a file may not.
@@ -49,7 +49,7 @@ class Knob:
     key: ClassVar[str]
     kind: ClassVar[Any]
     unit: ClassVar[str] = ""
-    told: ClassVar[Mapping[str, Any]] = {}
+    schema: ClassVar[Mapping[str, Any]] = {}
     is_decided: ClassVar[bool] = True
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
@@ -60,7 +60,7 @@ class Knob:
         """Return the fidelity with the cheapest sufficient value; `room` is the error allowed in total (F10)."""
         return fidelity
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         """Describe the kept physics in words."""
         return []
 
@@ -78,14 +78,14 @@ class Knob:
 
 
 def first_sufficient(
-    fidelity: Fidelity, key: str, values: Sequence[int | None], enough: Callable[[Fidelity], bool]
+    fidelity: Fidelity, key: str, values: Sequence[int | None], is_sufficient: Callable[[Fidelity], bool]
 ) -> Fidelity:
     """Return the fidelity with the first sufficient value; with the last one where no value suffices."""
     found = fidelity
     for value in values:
         changed: dict[str, Any] = {key: value}
         found = replace(fidelity, **changed)
-        if enough(found):
+        if is_sufficient(found):
             break
     return found
 

@@ -34,7 +34,7 @@ class _Kinematics(Knob):
     key, kind = "kinematics", Kinematics
     is_decided = False
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return [f"exact kinematics, {_orders(fidelity)} of pistons and rods"]
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -94,13 +94,13 @@ class _Rod(_SwitchedPart):
     def is_there(self, problem: Problem) -> bool:
         return any(rod_effects(part, EXACT) for part in problem.engine.slider_cranks)
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["inertia of the rods beyond that of two masses"] if self.is_active(scale.problem, fidelity) else []
 
 
 class _Gas(_SwitchedPart):
     key, kind = "gas", bool
-    told: ClassVar = {"description": "false leaves the working gas out."}
+    schema: ClassVar = {"description": "false leaves the working gas out."}
     what, rung = "gas", NO_GAS
     less: ClassVar = {"gas": False, "gas_orders": None}
     whole: ClassVar = {"gas": True, "gas_samples": REFERENCE_SAMPLES}
@@ -108,7 +108,7 @@ class _Gas(_SwitchedPart):
     def is_there(self, problem: Problem) -> bool:
         return any(point.gas is not None for point in problem.points)
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         if not self.is_active(scale.problem, fidelity):
             return []
         return [f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {_orders(fidelity)} of it"]
@@ -116,7 +116,7 @@ class _Gas(_SwitchedPart):
 
 class _GasSamples(Knob):
     key, kind = "gas_samples", int
-    told: ClassVar = {"description": "Steps of the gas torque over the working cycle.", "ge": 48, "le": 100_000}
+    schema: ClassVar = {"description": "Steps of the gas torque over the working cycle.", "ge": 48, "le": 100_000}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if not GAS.is_active(scale.problem, fidelity):
@@ -126,7 +126,7 @@ class _GasSamples(Knob):
 
 class _Orders(Knob):
     key, kind = "orders", int
-    told: ClassVar = {"description": "Last order kept of pistons, rods and gas.", "ge": 1}
+    schema: ClassVar = {"description": "Last order kept of pistons, rods and gas.", "ge": 1}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if fidelity.is_uneven:
@@ -163,7 +163,7 @@ class _Orders(Knob):
 class _GasOrders(Knob):
     # a choice by hand: fewer orders of everything have already spared its steps
     key, kind = "gas_orders", int
-    told: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
+    schema: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         return None if GAS.is_there(problem) else ("is a choice of gas", "leave it out, or add [gas]")
@@ -177,7 +177,7 @@ class _Crankshaft(Knob):
     """A choice by hand: neither is the truth, and what a crank of throws does lies nearer to one or the other."""
 
     key, kind, is_decided = "crankshaft", CrankshaftModel, False
-    told: ClassVar = {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."}
+    schema: ClassVar = {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."}
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         return None if problem.engine.bearings else ("is a choice of main bearings", "leave it out, or list them")
@@ -191,16 +191,16 @@ class _Crankshaft(Knob):
 
 class _CrankInertia(Knob):
     key, kind, unit = "crank_inertia", float, "kg m^2"
-    told: ClassVar = {"description": "Inertia of all that turns with the crank; its speed varies within the cycle."}
+    schema: ClassVar = {"description": "Inertia of all that turns with the crank; its speed varies within the cycle."}
     is_decided = False
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["crank speed that varies within the cycle"] if fidelity.is_uneven else []
 
 
 class _Samples(Knob):
     key, kind = "samples", int
-    told: ClassVar = {"description": "Steps over the working cycle.", "ge": 48, "le": 100_000}
+    schema: ClassVar = {"description": "Steps over the working cycle.", "ge": 48, "le": 100_000}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if fidelity.is_uneven:
@@ -208,7 +208,7 @@ class _Samples(Knob):
         lost, steps = scale.loses(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
         return first_sufficient(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= room)
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return [f"{fidelity.samples} steps over the cycle"]
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:

@@ -38,7 +38,7 @@ class _OfElasticMounts(Knob):
 
 class _Mounts(_OfElasticMounts):
     key, kind = "mounts", MountModel
-    told: ClassVar = {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."}
+    schema: ClassVar = {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if not self.is_open(scale):
@@ -50,7 +50,7 @@ class _Mounts(_OfElasticMounts):
             return fidelity
         return rigid if lost <= scale.loses(fidelity) + PART_SHARE * room else fidelity
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["mounts as if they gave no way"] if scale.mounting and fidelity.mounts == "rigid" else []
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
@@ -76,7 +76,7 @@ class _Mounts(_OfElasticMounts):
 
 class _Modes(_OfElasticMounts):
     key, kind = "modes", list[int]
-    told: ClassVar = {"description": "Natural modes that answer, 1 the lowest."}
+    schema: ClassVar = {"description": "Natural modes that answer, 1 the lowest."}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         """Without the modes that hardly answer; what an open rotor drives stays, for its answer is not known yet."""
@@ -92,7 +92,7 @@ class _Modes(_OfElasticMounts):
             chosen = candidate
         return chosen
 
-    def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
+    def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         if scale.mounting is None or fidelity.mounts != "frequency":
             return []
         modes = scale.excited_modes if fidelity.modes is None else fidelity.modes

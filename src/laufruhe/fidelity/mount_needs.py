@@ -74,7 +74,7 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if problem.engine.block is None:
         return
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
-    stiff = tuple(mount.each(_turned_stiffer) for mount in mounts)
+    stiff = tuple(mount.mapped(_turned_stiffer) for mount in mounts)
     inertia: Any = tuple(tuple(MORE * value for value in row) for row in block.inertia)
     parts: list[tuple[str, dict[str, Any]]] = [
         ("stiffness and places of the mounts", {"mounts": stiff}),
@@ -83,7 +83,7 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     ]
     if any(spring.loss_factor or any(spring.damping) or spring.lag for _, spring in every_spring(mounts)):
         undamped = partial(replace, loss_factor=0.0, damping=(0.0, 0.0, 0.0), lag=0.0)
-        firm = tuple(mount.each(undamped) for mount in mounts)
+        firm = tuple(mount.mapped(undamped) for mount in mounts)
         parts.append(("loss and damping of the mounts", {"mounts": firm}))
     for name, changed in parts:
         yield name, replace(problem, engine=replace(problem.engine, **changed))

@@ -73,10 +73,12 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
             reach = 0.5 * ((bearing.width or 0.0) + (other.width or 0.0))
             if bearing.shaft == other.shaft and abs(bearing.x - other.x) <= reach:
                 rule = f"lets its journal overlap that of bearing {other.name}"
-                raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move one of them, or make it narrower")
+                raise Refused(
+                    f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move one of them, or make it narrower"
+                )
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
             rule = "is the place of a crank pin"
-            raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move it beside the throw")
+            raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move it beside the throw")
         bearings.append(bearing)
     for shaft in shafts.values() if bearings else ():
         _check_carried(shaft, [b.x for b in bearings if b.shaft == shaft], [p for p in parts if p.shaft == shaft])
@@ -92,5 +94,5 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
     is_axle = len(bearings) == len(places) == 2 and places[0] < first and last < places[1]
     for part in parts if len(places) > 1 and not is_axle else ():
         if not first < part.x < last:
-            rule = f"leaves the throw of {part.name} at x = {units.shown(part.x, 'm')} beside all bearings"
+            rule = f"leaves the throw of {part.name} at x = {units.quantity_text(part.x, 'm')} beside all bearings"
             raise Refused("main_bearings", None, rule, "put one on its other side")

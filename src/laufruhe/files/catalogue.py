@@ -48,7 +48,7 @@ class CatalogueEngine:
 
     def assumption(self, table: Mapping[str, Any]) -> str:
         """Return the sentence about assumed values that a problem does not give; empty if it gives all."""
-        left = [f"{key.replace('_', ' ')} {shown(self.engine[key])}" for key in self.assumed if key not in table]
+        left = [f"{key.replace('_', ' ')} {as_text(self.engine[key])}" for key in self.assumed if key not in table]
         return f"{self.name}: assumed, not published: {', '.join(left)}." if left else ""
 
     def under(self, table: Mapping[str, Any]) -> dict[str, Any]:
@@ -95,6 +95,6 @@ def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
     return whole
 
 
-def shown(value: Any) -> str:
+def as_text(value: Any) -> str:
     """Return a value as text; a list is joined by hyphens."""
     return "-".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -47,7 +47,7 @@ def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, An
     return put(tables, keys, {**now, "start": value} if _is_open(now) else value)
 
 
-def opened(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
+def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
     """Return tables with a number left open; by default it starts at its present value."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)

@@ -333,7 +333,9 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     rod = length if length is not None else (radius / ratio if ratio else math.inf)
     turning = (radius + abs(table.offset)) / rod
     if turning >= 1.0:
-        key, value = ("rod_length", units.shown(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
+        key, value = (
+            ("rod_length", units.quantity_text(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
+        )
         rule = f"does not let the crank turn, (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
         remedy = "lengthen the rod"
         if ratio is not None and ratio >= 1.0:
@@ -405,7 +407,7 @@ def leads_of(table: EngineTable) -> list[Decision]:
     lead, ports = table.own("crank_lead"), table.own("port_arc")
     # the layout knows the start only
     if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
-        rule = f"goes beyond the ports, which are open for {units.shown(ports, 'rad')}"
+        rule = f"goes beyond the ports, which are open for {units.quantity_text(ports, 'rad')}"
         raise Refused("engine.crank_lead", None, rule, "narrow its bounds")
     leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
     return [

@@ -23,7 +23,7 @@ def _with_knobs(table: type[T]) -> type[T]:
     for knob in KNOBS:
         if knob.key not in table.model_fields:
             kind = Annotated[knob.kind, f.Number(knob.unit, above=0.0)] if knob.unit else knob.kind
-            keys[knob.key] = (kind | None, Field(default=None, **knob.told))
+            keys[knob.key] = (kind | None, Field(default=None, **knob.schema))
     return f.with_keys(table, keys)
 
 

@@ -149,15 +149,17 @@ class Number:
         if 0.0 < abs(value) < SMALLEST:
             raise refusal(f"is below any engine; {units.advice(self.unit)}, or 0")
         if value <= self.above:
-            raise refusal(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
+            raise refusal(f"must be more than {units.quantity_text(self.above, self.unit)}; {units.advice(self.unit)}")
         if value >= self.below:
-            raise refusal(f"must be less than {units.shown(self.below, self.unit)}; give a smaller value")
+            raise refusal(f"must be less than {units.quantity_text(self.below, self.unit)}; give a smaller value")
         if value < self.minimum:
-            raise refusal(f"must be at least {units.shown(self.minimum, self.unit)}; give a larger value")
+            raise refusal(f"must be at least {units.quantity_text(self.minimum, self.unit)}; give a larger value")
         if value > self.maximum:
             meant = not self.unit and value <= 100.0 * self.maximum
             or_share = f', or "{value:g} %" if per cent is meant' if meant else ""
-            raise refusal(f"must be at most {units.shown(self.maximum, self.unit)}; give a smaller value{or_share}")
+            raise refusal(
+                f"must be at most {units.quantity_text(self.maximum, self.unit)}; give a smaller value{or_share}"
+            )
         return value
 
     def _open(self, raw: dict[str, Any]) -> Open:

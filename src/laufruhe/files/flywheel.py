@@ -70,7 +70,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         numbers = [(key, "m", Open.from_value(getattr(table.rim, key))) for key in _SECTION]
         wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
     if crank_inertia is not None:
-        rule, shown = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
+        rule, shown = "is given by [flywheel] too", units.quantity_text(crank_inertia, "kg m^2")
         raise Refused("fidelity.crank_inertia", shown, rule, "keep one: with this one loads feel the uneven speed")
     return wheel, [
         decision
@@ -85,11 +85,13 @@ def _rim(table: RimTable) -> Rim:
     hole = diameter.lower - height.upper
     if hole <= 0.0:
         rule = "leaves no hole in the rim"
-        raise Refused("flywheel.rim.height", units.shown(height.upper, "m"), rule, "make it less than the diameter")
+        raise Refused(
+            "flywheel.rim.height", units.quantity_text(height.upper, "m"), rule, "make it less than the diameter"
+        )
     arms = None
     if table.arms is not None:
         if table.arms.hub_diameter >= hole:
-            shown, rule = units.shown(table.arms.hub_diameter, "m"), "does not fit into the rim"
+            shown, rule = units.quantity_text(table.arms.hub_diameter, "m"), "does not fit into the rim"
             raise Refused("flywheel.rim.arms.hub_diameter", shown, rule, "make it smaller")
         (rim_width, rim_depth), (hub_width, hub_depth) = table.arms.at_rim, table.arms.at_hub
         arms = Arms(table.arms.count, (rim_width, rim_depth), (hub_width, hub_depth), table.arms.hub_diameter)

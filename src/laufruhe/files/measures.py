@@ -114,7 +114,7 @@ class ConstraintTable(QuantityTable):
 
 
 @dataclass(frozen=True)
-class Scene:
+class MeasureContext:
     """Engine and operating points that measures refer to."""
 
     engine: Engine
@@ -229,7 +229,7 @@ def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
 
 
 def objectives_of(
-    tables: Sequence[ObjectiveTable] | None, scene: Scene, single: Sequence[str]
+    tables: Sequence[ObjectiveTable] | None, scene: MeasureContext, single: Sequence[str]
 ) -> tuple[PriorityLevel, ...]:
     """Return the objectives in order of priority; by default the mean mount force.
 
@@ -261,7 +261,7 @@ def objectives_of(
     return tuple(ranks)
 
 
-def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
+def _terms(table: ObjectiveTable, scene: MeasureContext, where: str) -> tuple[Term, ...]:
     # norms of loads come before numbers of the mounts
     one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
@@ -273,7 +273,7 @@ def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
     return tuple(sorted(terms, key=lambda term: term.measure.channel.is_number))
 
 
-def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
+def _minimised(name: str, table: QuantityTable, where: str, scene: MeasureContext) -> Measure:
     measure = scene.measure(name, table, where)
     if not measure.channel.minimised:
         remedy = f"limit it ([[constraints]], limit = '{name}'), and minimise a force, a moment or a mass"
@@ -281,7 +281,7 @@ def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Mea
     return measure
 
 
-def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, ...]:
+def limits_of(tables: Sequence[ConstraintTable], scene: MeasureContext) -> tuple[Limit, ...]:
     """Return the limits, those of loads and masses before those of numbers."""
     limits = [_limit(table, f"constraints[{k}]", scene) for k, table in enumerate(tables, 1)]
     _check_unique(limits)
@@ -290,7 +290,7 @@ def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, .
     for low in numbers:
         for high in numbers:
             if low.measure == high.measure and low.minimum > high.maximum:
-                lower, upper = (units.shown(value, low.measure.unit) for value in (low.minimum, high.maximum))
+                lower, upper = (units.quantity_text(value, low.measure.unit) for value in (low.minimum, high.maximum))
                 both = f"'{low.name}' and '{high.name}' contradict each other"
                 said = both if low is not high else f"'{low.name}' contradicts itself"
                 rule = f"{said}: at least {lower} and at most {upper}"
@@ -298,7 +298,7 @@ def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, .
     return tuple(limits)
 
 
-def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
+def _limit(table: ConstraintTable, where: str, scene: MeasureContext) -> Limit:
     measure = scene.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
     norm, remedy = not channel.is_number, "give " + " or ".join(sides)

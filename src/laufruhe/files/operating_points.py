@@ -105,9 +105,9 @@ class Brake:
         friction = self._friction(speed, where)
         pressures = friction.indicated(brake, self.table.deviations)
         if pressures[0] <= brake:
-            rule = f"is off by as much as {units.shown(friction.deviation, 'Pa')}, more than it is itself"
+            rule = f"is off by as much as {units.quantity_text(friction.deviation, 'Pa')}, more than it is itself"
             raise Refused(
-                "friction", units.shown(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
+                "friction", units.quantity_text(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
             )
         lowest, middle, maximum, loss, off = (
             f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation)
@@ -136,7 +136,8 @@ class Brake:
             if self.table.kind == "motoring":
                 return motoring_friction([row[0] for row in own], [row[1] for row in own], speed)
             if len(own) < FEWEST:
-                rule = f"has {len(own)} points at {units.shown(speed, 'rad/s')} of {where}, and a line takes {FEWEST}"
+                at = units.quantity_text(speed, "rad/s")
+                rule = f"has {len(own)} points at {at} of {where}, and a line takes {FEWEST}"
                 raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")
             return willans_friction([row[1] for row in own], [row[2] for row in own])
 
@@ -151,7 +152,7 @@ def operating_points(
         where = f"operating_points[{k}]"
         speeds = _speeds(table, stroke, where)
         for speed in speeds:
-            shown = units.shown(speed, "rad/s", 6)
+            shown = units.quantity_text(speed, "rad/s", 6)
             name = (f"{table.name} {shown}" if len(speeds) > 1 else table.name) if table.name else shown
             loads = _loads(table, speed, brake, where, name)
             for suffix, imep in loads:
@@ -178,7 +179,7 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
         missing = "up_to" if table.up_to is None else "steps"
         raise Refused(f"{where}.{missing}", None, "is missing", "give up_to and steps for a range, or neither")
     if table.up_to <= first:
-        value = units.shown(table.up_to, "rad/s")
+        value = units.quantity_text(table.up_to, "rad/s")
         raise Refused(f"{where}.up_to", value, "does not lie above the first speed", "give a higher one")
     return tuple(first + (table.up_to - first) * k / (table.steps - 1) for k in range(table.steps))
 

@@ -75,7 +75,7 @@ def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
     return any(_has_open(engine.own(key)) for key in _OPENABLE) or any(shaft.optional for shaft in shafts)
 
 
-def opened(
+def open_phasing(
     engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
 ) -> Problem:
     """Return the problem with the first design that its phasing allows, and with the phasing."""
@@ -177,7 +177,7 @@ def _intervals(table: IntervalsTable | None, engine: EngineTable, cycle: Cycle, 
         raise Refused("phasing.intervals", None, "says nothing", "give min, max or largest_deviation")
     if away is not None:
         if away < 0.0:
-            where, shown = "phasing.intervals.largest_deviation", units.shown(away, "rad")
+            where, shown = "phasing.intervals.largest_deviation", units.quantity_text(away, "rad")
             raise Refused(where, shown, "is negative", "give 0 for even firing")
         low, high = max(low, even - away), min(high, even + away)
     return Intervals(low, high)

@@ -25,11 +25,11 @@ from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts,
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import gas_of, needs_bore
-from laufruhe.files.measures import Scene, limits_of, objectives_of
+from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import inside, plain, put
 from laufruhe.files.operating_points import Brake, operating_points
-from laufruhe.files.phasing import is_open, opened
+from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
@@ -127,7 +127,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
-    return opened(file.engine, file.balancer_shafts, file.phasing, closed)
+    return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
 
 def _edited(origin: Origin, edit: str, *arguments: Any) -> Problem:
@@ -274,7 +274,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     for key in keys:
         if key.always or getattr(file, key.name) is not None:
             problem = key.read(getattr(file, key.name), problem, given)
-    scene = Scene(problem.engine, points)
+    scene = MeasureContext(problem.engine, points)
     ranks = objectives_of(file.objective, scene, file.single)
     problem = replace(
         problem,

@@ -269,7 +269,10 @@ def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)
     if size.lower > 0.0:
-        smallest, rule = units.shown(size.lower, _UNITS[key]), "is a least size above zero while the angle is open"
+        smallest, rule = (
+            units.quantity_text(size.lower, _UNITS[key]),
+            "is a least size above zero while the angle is open",
+        )
         raise Refused(f"{where}.{key}", smallest, rule, "let the size start at zero, or fix the angle")
     low, high = angle.bounds
     if high - low >= math.tau * (1.0 - 1e-9):

@@ -155,7 +155,7 @@ def field_at(where: str) -> f.Number | None:
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweepAxis:
     """Swept quantity: its path, its values as in the problem file, and these as numbers unless they are labels.
 
     The unit is that of the study file; "1" for plain numbers, "" for labels.
@@ -182,7 +182,7 @@ class Axis:
         return dict(zip(self.values, self.numbers, strict=True)) if self.numbers is not None else {}
 
 
-def axis_of(sweep: SweepTable) -> Axis:
+def axis_of(sweep: SweepTable) -> SweepAxis:
     """Return the values of a sweep with their unit; `Refused` if there are fewer than two, or equal ones."""
     spaced = (sweep.first, sweep.last, sweep.points)
     if sweep.values is None:
@@ -198,7 +198,7 @@ def axis_of(sweep: SweepTable) -> Axis:
     # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
     if len(set(numbers if numbers is not None else map(str, values))) < len(values):
         raise Refused(given, list(values), "names a value twice", "name each once")
-    return Axis(sweep.quantity, values, unit, numbers)
+    return SweepAxis(sweep.quantity, values, unit, numbers)
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
-from laufruhe.live.parts import Curve, Design, DisplayedMeasure, LiveModel, Reference, Slider
+from laufruhe.live.parts import Curve, DisplayedMeasure, LiveDesign, LiveModel, Reference, Slider
 from laufruhe.live.saving import saved_file
 from laufruhe.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
@@ -214,10 +214,10 @@ def _between(domains: Sequence[Domain]) -> Array:
 
 def _design(
     name: str, x: Array, moving: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
-) -> Design:
+) -> LiveDesign:
     evaluation = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
     values = (None if measure is None else float(evaluation.value(measure)) for measure in measures)
-    return Design(name, tuple(map(float, x)), tuple(values))
+    return LiveDesign(name, tuple(map(float, x)), tuple(values))
 
 
 def _reference(result: Result) -> Reference | None:

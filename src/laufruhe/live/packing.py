@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from laufruhe.units import readable
 
 
-class Block:
+class PackedBlock:
     """Concatenated arrays, each addressed by offset and shape."""
 
     def __init__(self) -> None:
@@ -42,7 +42,7 @@ def with_unit(unit: str) -> dict[str, Any]:
     return {"unit": unit, "shown": name, "factor": factor}
 
 
-def pack_part(part: Any, block: Block) -> Any:
+def pack_part(part: Any, block: PackedBlock) -> Any:
     """Return a part of a signal field by field; its numbers are in the block."""
     if isinstance(part, np.ndarray):
         return block.add(part)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.live.packing import Block, pack_part, with_unit
+from laufruhe.live.packing import PackedBlock, pack_part, with_unit
 from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
 from laufruhe.present.numbers import share
@@ -95,7 +95,7 @@ class Curve:
 
 
 @dataclass(frozen=True)
-class Design:
+class LiveDesign:
     """A decision vector with every measure by the exact model; None for constants."""
 
     name: str
@@ -150,7 +150,7 @@ class LiveModel:
     signals: tuple[Signal, ...] = ()
     curves: tuple[Curve, ...] = ()
     measures: tuple[DisplayedMeasure, ...] = ()
-    designs: tuple[Design, ...] = ()
+    designs: tuple[LiveDesign, ...] = ()
     objective: str = ""
     unit: str = ""
     reference: Reference | None = None
@@ -175,7 +175,7 @@ class LiveModel:
 
     @cached_property
     def _packed(self) -> tuple[list[dict[str, Any]], str]:
-        block = Block()
+        block = PackedBlock()
         return [{**pack_part(signal, block), **with_unit(signal.unit)} for signal in self.signals], block.text()
 
     def as_json(self) -> str:

@@ -149,7 +149,7 @@ class AffineProblem:
         terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in kept)
         return replace(self, terms=terms, groups=())
 
-    def excess(self, x: Array) -> float:
+    def violation(self, x: Array) -> float:
         """Largest relative excess over a limit, negative where all have room; zero without limits."""
         return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in self.limits), default=0.0)
 

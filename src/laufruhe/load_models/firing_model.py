@@ -109,7 +109,7 @@ class FiringModel(StarModel):
             if load.feels_unbalances:
                 fidelity = replace(at.fidelity, gas=False, gas_orders=None)
                 still = load.signal(replace(at, point=point, moving=alone, fidelity=fidelity))
-                signal = signal + still.each(np.negative)
+                signal = signal + still.mapped(np.negative)
             found.append(signal.over(self.base))
         return found
 

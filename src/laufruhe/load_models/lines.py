@@ -40,7 +40,7 @@ class Lines:
         cosine, sine = waves(self.orders.tolist(), self.base, steps)
         return (self.real @ cosine - self.imaginary @ sine).T
 
-    def kept(self, which: NDArray[np.intp]) -> Lines:
+    def select(self, which: NDArray[np.intp]) -> Lines:
         """Some of the orders."""
         chosen = which.tolist()
         return Lines(self.orders[which], self.real[:, chosen], self.imaginary[:, chosen])
@@ -50,7 +50,7 @@ class Lines:
         m = ca.DM(matrix.copy())
         return Lines(self.orders, m @ self.real, m @ self.imaginary)
 
-    def mapped_each(self, matrices: Sequence[NDArray[np.complex128]]) -> Lines:
+    def map_orders(self, matrices: Sequence[NDArray[np.complex128]]) -> Lines:
         """Multiply the components of each order by its own complex matrix."""
         pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
         columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]

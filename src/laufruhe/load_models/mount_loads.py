@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import Symbols, UnevenModel
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
@@ -70,7 +70,7 @@ class MovedThrows:
     def __init__(self, problem: Problem, moves: ThrowMoves, model: UnevenModel, turns: Any, unbalances: Any) -> None:
         self._problem, self._moves, self._model = problem, moves, model
         self._turns, self._u = turns, unbalances
-        self._at = Symbols(*moves.angles(turns), unbalances)
+        self._at = UnevenSymbols(*moves.angles(turns), unbalances)
 
     def wrenches(self, moved: Array) -> list[Lines]:
         """Orders that matter at any of a few designs."""
@@ -78,7 +78,7 @@ class MovedThrows:
 
     def _wrenches_at(self, point: OperatingPoint, moved: Array) -> Lines:
         found = self._model.wrench(point, self._at).mapped(moved)
-        return found.kept(_felt(self._sizes([found.real, found.imaginary]), found.orders))
+        return found.select(_felt(self._sizes([found.real, found.imaginary]), found.orders))
 
     def _sizes(self, parts: Sequence[Any]) -> Array:
         sized = ca.Function("sizes", [self._turns, self._u], list(parts))

@@ -43,7 +43,7 @@ class ThrowMoves:
         self.phasing, self.layout, self.start = phasing, layout, start
         self.intervals = Intervals(max(intervals.minimum, min(APART, intervals.maximum)), intervals.maximum)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
-        self._open_bank, self._open_split = phasing.opened
+        self._open_bank, self._open_split = phasing.is_geometry_open
         self.size = len(self._throws) + self._open_bank + self._open_split
         self.lower, self.upper = self._bounds()
 

@@ -110,7 +110,7 @@ class ThrowWaves:
         Of its engine.
     rides
         Throw that every rotor turns with; rotors left out stand still.
-    opened
+    is_geometry_open
         Whether the bank angle and split pins are open.
     turns
         What an open angle adds to every throw: side of cylinder 1 where throws are counted from its dead centre.
@@ -122,12 +122,12 @@ class ThrowWaves:
     _followed: tuple[float, float] = 1e-4, 3e-5
 
     def __init__(
-        self, problem: Problem, layout: Layout, rides: dict[str, int], opened: tuple[bool, bool] = (False, False),
-        turns: float = 0.0,
+        self, problem: Problem, layout: Layout, rides: dict[str, int],
+        is_geometry_open: tuple[bool, bool] = (False, False), turns: float = 0.0,
     ) -> None:  # fmt: skip
-        self.problem, self.layout, self._opened, self._turns = problem, layout, opened, turns
+        self.problem, self.layout, self._is_geometry_open, self._turns = problem, layout, is_geometry_open, turns
         self.throws = len(layout.throw_positions)
-        if any(opened) and self.throws == 1:
+        if any(is_geometry_open) and self.throws == 1:
             # one throw is cheap to follow
             self.share_left_out, self._followed = (1e-6, 1e-6), (1e-9, 1e-9)
         engine = problem.engine
@@ -148,12 +148,12 @@ class ThrowWaves:
         engine, layout = self.problem.engine, self.layout
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
             acting, late = working(self.problem, part.name), layout.late[k] if layout.late else 0.0
-            banks = QUARTERS if self._opened[0] else (layout.banks[k],)
+            banks = QUARTERS if self._is_geometry_open[0] else (layout.banks[k],)
             turned = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
             found = tuple(evaluate(acting, isolate(engine, k, inside, each)) for each in turned)
             # what is not open makes the cylinder later, or sooner
-            ahead = 0.0 if self._opened[0] else -layout.banks[k]
-            yield Moving(pin, k, found, ahead + (0.0 if self._opened[1] else layout.pin_offsets[k]), {})
+            ahead = 0.0 if self._is_geometry_open[0] else -layout.banks[k]
+            yield Moving(pin, k, found, ahead + (0.0 if self._is_geometry_open[1] else layout.pin_offsets[k]), {})
 
     def _riding(self, rides: dict[str, int], inside: bool) -> Iterator[Moving]:
         # unbalances that ride on every throw
@@ -172,7 +172,7 @@ class ThrowWaves:
             for h, order in enumerate(self.times):
                 turned = order * Fraction(self._turns)
                 each = (turned - (order + step) * side, turned - order * side)
-                yield (order, *(m for m, is_open in zip(each, self._opened, strict=True) if is_open)), h, j
+                yield (order, *(m for m, is_open in zip(each, self._is_geometry_open, strict=True) if is_open)), h, j
 
     @property
     def followed(self) -> float:
@@ -228,8 +228,8 @@ class ThrowWaves:
             return self.tail(measure, every[0], samples)
         total = 0.0
         for u, a, d in zip(*every, strict=True):
-            still = (u + d).each(lambda values: 0.5 * values)
-            leaning = (u + d.each(np.negative)).each(lambda values: 0.5 * values), a + still.each(np.negative)
+            still = (u + d).mapped(lambda values: 0.5 * values)
+            leaning = (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values), a + still.mapped(np.negative)
             total = max(total, sum(self.tail(measure, [one], samples) for one in (still, *leaning)))
         return total
 

@@ -47,7 +47,7 @@ ROLL = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Symbols:
+class UnevenSymbols:
     """Variables of the program.
 
     Attributes
@@ -87,12 +87,12 @@ class UnevenModel:
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
         self._left_out = left_out
-        self._wrenches: dict[tuple[OperatingPoint, Symbols], Lines] = {}
+        self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], Lines] = {}
 
     def _points(self, quantity: Measure) -> list[OperatingPoint]:
         return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
 
-    def rows(self, measure: Measure, at: Symbols) -> tuple[Any, Grid]:
+    def rows(self, measure: Measure, at: UnevenSymbols) -> tuple[Any, Grid]:
         """Vectors whose norm a measure is, and where they stand (P1).
 
         Of a norm that knows nothing but squares these are the orders' own (Parseval); of
@@ -126,7 +126,7 @@ class UnevenModel:
             weights.append(np.full(len(values) * steps, point.weight / whole / len(values) / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
-    def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
+    def _signal(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> list[Lines]:
         # per mount, for the block, or per place inside the crankcase
         if quantity.is_inside:
             return self._inside(quantity, point, at)
@@ -134,19 +134,19 @@ class UnevenModel:
         if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
             return [counted.mapped(np.eye(6)[quantity.channel.part])]
         by_order = [self._maps(quantity, float(h), point) for h in counted.orders]
-        return [counted.mapped_each([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
+        return [counted.map_orders([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
-    def _inside(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
+    def _inside(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> list[Lines]:
         # S37
         engine = self.problem.engine
 
         def signal(loads: PointLoads) -> Spectrum:
-            return selected(quantity, quantity.load.signal(loads).series, engine).kept(HIGHEST)
+            return selected(quantity, quantity.load.signal(loads).series, engine).truncated(HIGHEST)
 
         return self._turned(point, at, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
 
     def _turned(
-        self, point: OperatingPoint, at: Symbols, signal: Callable[[PointLoads], Spectrum],
+        self, point: OperatingPoint, at: UnevenSymbols, signal: Callable[[PointLoads], Spectrum],
         felt: Sequence[OrderSelection], beside: bool,
     ) -> list[Lines]:  # fmt: skip
         k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
@@ -155,12 +155,12 @@ class UnevenModel:
         stars = [a - b - math.tau * _turns_of(part) for (a, b), part in zip(placed, parts, strict=True)]
         return turned.lines(stars, [bank for _, bank in placed], lambda rotor: self._unbalance(rotor, at))
 
-    def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> Lines:
+    def _counted(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> Lines:
         # a block on soft mounts feels the first orders of its gas alone
         gain = self._gain(quantity, point) if quantity.on_mounts else None
         found = self.wrench(point, at, gain)
         counted = np.flatnonzero(quantity.counted(found.orders))
-        return found.kept(counted) if len(counted) else Lines(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
+        return found.select(counted) if len(counted) else Lines(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
 
     def _maps(self, quantity: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
@@ -183,7 +183,7 @@ class UnevenModel:
             return None
         return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
 
-    def wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None) -> Lines:
+    def wrench(self, point: OperatingPoint, at: UnevenSymbols, gain: Callable[[float], float] | None = None) -> Lines:
         """Wrench by order; the roll moment of gas of the orders that a gain leaves to matter."""
         if gain is not None:
             return self._wrench(point, at, gain)
@@ -191,20 +191,20 @@ class UnevenModel:
             self._wrenches[point, at] = self._wrench(point, at, lambda _: 1.0)
         return self._wrenches[point, at]
 
-    def _wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float]) -> Lines:
+    def _wrench(self, point: OperatingPoint, at: UnevenSymbols, gain: Callable[[float], float]) -> Lines:
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
         others = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
         roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain)
         (found,) = self._turned(point, at, _wrench_of, [*others, roll], False)
         return found
 
-    def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
+    def _place(self, k: int, part: SliderCrank, at: UnevenSymbols) -> tuple[Any, Any]:
         side = self.layout.side(k)
         bank = side * at.bank if at.bank is not None else part.bank
         offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
         return at.throws[self.layout.pins[k]] + offset, bank
 
-    def _unbalance(self, rotor: Rotor, at: Symbols) -> Any:
+    def _unbalance(self, rotor: Rotor, at: UnevenSymbols) -> Any:
         """U of a rotor as (re, im), turned with the throw that it rides on."""
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
@@ -238,7 +238,7 @@ def _turns_of(part: SliderCrank) -> int:
 
 
 def _wrench_of(loads: PointLoads) -> Spectrum:
-    return loads.wrench.each(lambda wrench: wrench[:, None, :])
+    return loads.wrench.mapped(lambda wrench: wrench[:, None, :])
 
 
 def _steps(lines: Lines) -> int:

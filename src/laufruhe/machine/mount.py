@@ -86,7 +86,7 @@ class Mount:
         """True if the stiffness of any spring of the place does."""
         return any(spring.dynamic for spring in self.springs)
 
-    def each(self, change: Callable[[Mount], Mount]) -> Mount:
+    def mapped(self, change: Callable[[Mount], Mount]) -> Mount:
         """Return the mount with a change of every spring."""
         own = change(replace(self, joined=())) if self.joined else change(self)
         return replace(own, joined=tuple(map(change, self.joined))) if self.joined else own

@@ -122,7 +122,7 @@ class SignalKinks:
         steps = period * np.arange(_STEPS) / _STEPS
         return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 
-    def each(self, linear: Callable[[Array], Array]) -> SignalKinks | None:
+    def mapped(self, linear: Callable[[Array], Array]) -> SignalKinks | None:
         """Return the kinks through a real linear map of values (n, ...), or None without any."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))

@@ -98,9 +98,9 @@ class Spectrum:
         """Return the signal with other coefficients."""
         return Spectrum(self.base, coefficients, self.kinks)
 
-    def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
+    def mapped(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
         """Return the signal through a real linear map of values, a function of arrays (n, ...)."""
-        kinks = None if self.kinks is None else self.kinks.each(linear)
+        kinks = None if self.kinks is None else self.kinks.mapped(linear)
         return Spectrum(self.base, linear(self.coefficients), kinks)
 
     def averaged(self, step: float) -> Spectrum:
@@ -226,7 +226,7 @@ class Spectrum:
         kinks = None if fine.kinks is None else fine.kinks.folded(fine.period / step, step)
         return Spectrum(base, fine.coefficients[::step], kinks)
 
-    def kept(self, highest: float) -> Spectrum:
+    def truncated(self, highest: float) -> Spectrum:
         """Return the signal without orders above `highest`; it keeps its kinks only with all orders."""
         count = int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))
         return self if count == len(self.coefficients) else Spectrum(self.base, self.coefficients[:count])
@@ -264,7 +264,7 @@ class Mapped(Spectrum):
 
     @cached_property
     def _whole(self) -> Spectrum:
-        return self.source.each(self.linear)
+        return self.source.mapped(self.linear)
 
     @property
     def coefficients(self) -> NDArray[np.complex128]:

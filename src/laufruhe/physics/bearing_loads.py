@@ -62,7 +62,7 @@ def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
     own = _of_parts(_of_rod, engine, point, fidelity)
     if (carried := _carried(engine.slider_cranks)) is None:
         return own
-    return own + crank_forces(engine, point, fidelity).each(partial(np.einsum, "mk,nkd->nmd", carried))
+    return own + crank_forces(engine, point, fidelity).mapped(partial(np.einsum, "mk,nkd->nmd", carried))
 
 
 def crank_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -89,7 +89,7 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     if (carried := _carried(engine.slider_cranks)) is None:
         return own
     across = np.multiply.outer(carried, np.array([[0.0, 1.0]]))
-    return own + _of_parts(_of_hinge, engine, point, fidelity).each(partial(np.einsum, "mkcd,nkc->nmd", across))
+    return own + _of_parts(_of_hinge, engine, point, fidelity).mapped(partial(np.einsum, "mkcd,nkc->nmd", across))
 
 
 def _carried(parts: Sequence[SliderCrank]) -> Array | None:
@@ -132,7 +132,7 @@ def _of_rods(
 ) -> Spectrum:  # fmt: skip
     pins = _side_by_side(_of_crank, cycle, parts, speed, gas, fidelity)
     shares = shares_of(bearings, tuple((part.shaft, part.x) for part in parts), fidelity.crankshaft)
-    return pins.each(partial(np.einsum, "bp,npd->nbd", shares))
+    return pins.mapped(partial(np.einsum, "bp,npd->nbd", shares))
 
 
 def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
@@ -159,7 +159,7 @@ def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     """
     _check_even(fidelity)
     turning = replace(engine, rotors=(*engine.pins, *engine.rotors))
-    return _of_rotors(turning, point.speed, fidelity).each(lambda forces: forces[..., 2:])
+    return _of_rotors(turning, point.speed, fidelity).mapped(lambda forces: forces[..., 2:])
 
 
 def bearing_factors(engine: Engine, _: OperatingPoint) -> Array:
@@ -181,7 +181,7 @@ def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
 
 
 def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
-    return rotor_loads((rotor,), speed, cycle).each(lambda wrench: wrench[:, :3])
+    return rotor_loads((rotor,), speed, cycle).mapped(lambda wrench: wrench[:, :3])
 
 
 def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
@@ -196,7 +196,7 @@ def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | Non
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
     load = _felt(cycle, part, speed, gas, fidelity, _at_pin)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
-    turned = load.each(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
+    turned = load.mapped(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
     rod = Rotor("rod", part.x, part.crank_pin_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
     found = turned + _of_rotor(rod, speed, cycle)
     found.coefficients.setflags(write=False)
@@ -209,7 +209,7 @@ def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | Non
     if part.master_bank is not None:
         wall = 1j * cis(as_turn(part.master_bank))
         leaning = _of_hinge(cycle, part, speed, gas, fidelity)
-        found = found + leaning.each(lambda own: own * np.array([0.0, wall.imag, wall.real]))
+        found = found + leaning.mapped(lambda own: own * np.array([0.0, wall.imag, wall.real]))
         found.coefficients.setflags(write=False)
     return found
 
@@ -239,9 +239,9 @@ def _felt(
     series = _inertia_orders(part, fidelity, felt) * (ratio * speed) ** 2
     moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
     moved = moved if ratio > 0.0 else moved.conj()
-    load = fidelity.kept(Spectrum(cycle.base_order, spread(moved, order_index(cycle, abs(ratio)))))
+    load = fidelity.truncated(Spectrum(cycle.base_order, spread(moved, order_index(cycle, abs(ratio)))))
     if gas is not None:
-        load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity, felt))
+        load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity, felt))
     load.coefficients.setflags(write=False)
     return load
 
@@ -292,7 +292,7 @@ def _side_by_side(
     width = loads[0].coefficients.shape[-1] if loads else 3
     total = Spectrum(cycle.base_order, np.zeros((1, len(loads), width), dtype=complex))
     for one, load in zip(np.eye(len(loads)), loads, strict=True):
-        total = total + load.each(partial(np.einsum, "k,nd->nkd", one))
+        total = total + load.mapped(partial(np.einsum, "k,nd->nkd", one))
     total.coefficients.setflags(write=False)
     return total
 

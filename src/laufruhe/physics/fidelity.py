@@ -111,11 +111,11 @@ class Fidelity:
 
     def truncated_gas(self, torque: Spectrum) -> Spectrum:
         """Return the gas torque without truncated orders."""
-        return torque if self.gas_orders is None else torque.kept(self.gas_orders)
+        return torque if self.gas_orders is None else torque.truncated(self.gas_orders)
 
-    def kept(self, loads: Spectrum, minimum: float = 1.0) -> Spectrum:
+    def truncated(self, loads: Spectrum, minimum: float = 1.0) -> Spectrum:
         """Return the loads without truncated orders; those up to `minimum` stay."""
-        return loads if self.orders is None else loads.kept(max(self.orders, minimum))
+        return loads if self.orders is None else loads.truncated(max(self.orders, minimum))
 
     def local_orders(self, ratio: float) -> int | None:
         """Return the last order in the angle of a crank of this ratio, or None."""

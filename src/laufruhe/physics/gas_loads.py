@@ -34,7 +34,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
         star = star_sum(np.tile(ROLL, (len(parts), 1)), delays, multiples)
         load = Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
         if torque.kinks is not None:
-            rolling = torque.kinks.each(lambda jumps: jumps[:, None] * ROLL)
+            rolling = torque.kinks.mapped(lambda jumps: jumps[:, None] * ROLL)
             kinks = join_kinks([rolling.moved(part.firing_angle) for part in parts] if rolling else [])
             load = replace(load, kinks=kinks and kinks.folded(load.period, 1))
         total = total + load

@@ -25,4 +25,4 @@ def geared_moment(engine: Engine, torque: Spectrum) -> Spectrum:
     mean = torque.coefficients[:1]
     alternating = torque + Spectrum(torque.base, -mean)
     factor = geared_factor(engine)
-    return alternating.each(lambda values: factor * values[:, None] * ROLL)
+    return alternating.mapped(lambda values: factor * values[:, None] * ROLL)

@@ -57,7 +57,7 @@ def _slider_crank_loads(
     total = star_loads(engine, speed, lambda part: effects_of(part, fidelity))
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    return fidelity.kept(total), _turning(engine.pins, speed, cycle)
+    return fidelity.truncated(total), _turning(engine.pins, speed, cycle)
 
 
 def forget() -> None:

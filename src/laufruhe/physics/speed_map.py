@@ -26,8 +26,10 @@ def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXAC
     gas = fidelity.gas_of(point)
     if gas is None:
         return inertia, None
-    loads = fidelity.kept(gas_loads(engine, gas, fidelity))
-    return inertia, loads + geared_moment(engine, loads.each(lambda wrench: wrench @ ROLL)) if engine.geared else loads
+    loads = fidelity.truncated(gas_loads(engine, gas, fidelity))
+    return inertia, loads + geared_moment(
+        engine, loads.mapped(lambda wrench: wrench @ ROLL)
+    ) if engine.geared else loads
 
 
 @dataclass(frozen=True, eq=False)

@@ -71,7 +71,7 @@ def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def _less(torque: Spectrum) -> Spectrum:
-    return torque.each(lambda values: -values)
+    return torque.mapped(lambda values: -values)
 
 
 def work_stored(torque: Spectrum, samples: int) -> float:
@@ -102,9 +102,9 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     Spectrum of shape (n,) [N m].
     """
     gas = fidelity.gas_of(point)
-    masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
-    total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
-    return total.each(lambda wrench: wrench @ ROLL)
+    masses = fidelity.truncated(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
+    total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity))
+    return total.mapped(lambda wrench: wrench @ ROLL)
 
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
@@ -195,10 +195,10 @@ class Swing:
         """
         if self.irregularity(0.0) <= degree:
             return 0.0
-        enough = float(np.ptp(self.work)) / (degree * self.speed**2) + float(np.ptp(self.inertia)) / degree
-        while self.irregularity(enough) > degree:
-            enough *= 2.0
-        return rising_root(lambda inertia: degree - self.irregularity(inertia), 0.0, enough)
+        inertia = float(np.ptp(self.work)) / (degree * self.speed**2) + float(np.ptp(self.inertia)) / degree
+        while self.irregularity(inertia) > degree:
+            inertia *= 2.0
+        return rising_root(lambda inertia: degree - self.irregularity(inertia), 0.0, inertia)
 
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:

@@ -130,7 +130,7 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
         return total
 
     last_rotor = max((math.ceil(abs(rotor.shaft.ratio)) for rotor in engine.rotors), default=1)
-    return fidelity.kept(_turning(engine, point, fidelity).loads(wrench), last_rotor)
+    return fidelity.truncated(_turning(engine, point, fidelity).loads(wrench), last_rotor)
 
 
 def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -149,7 +149,7 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return gas_loads(engine, gas, fidelity).each(lambda loads: loads[:, 3])
+    return gas_loads(engine, gas, fidelity).mapped(lambda loads: loads[:, 3])
 
 
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:

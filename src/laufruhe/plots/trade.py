@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import Page, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
-from laufruhe.studies.trade import Row, Trade
+from laufruhe.studies.trade import Trade, TradeRow
 
 LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
 PANEL, DOT = (5.4, 4.4), 0.13
@@ -114,15 +114,15 @@ def _colour_bar(drawn: Page, dots: PathCollection) -> None:
     bar.ax.text(-0.02, 0.5, "regret of its optimum", transform=bar.ax.transAxes, ha="right", va="center", fontsize=9)
 
 
-def _front(rows: tuple[Row, ...]) -> list[Row]:
-    front: list[Row] = []
+def _front(rows: tuple[TradeRow, ...]) -> list[TradeRow]:
+    front: list[TradeRow] = []
     for row in sorted(rows, key=lambda r: (r.evaluation, r.error)):
         if not front or row.error < front[-1].error:
             front.append(row)
     return front
 
 
-def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> None:
+def _name(axes: Axes, rows: tuple[TradeRow, ...], times: Array, errors: Array) -> None:
     (left, right), (low, high) = (np.log10(side) for side in (axes.get_xlim(), axes.get_ylim()))
     # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))

@@ -323,7 +323,7 @@ def inside(name: str, unit: str, where: Where, load: Load, factor: Factor | None
             return spectrum
         factors = factor(moving, loads.point)
         columns = factors if factors.ndim > 1 else factors[:, None]
-        return spectrum.each(lambda values: values * columns)
+        return spectrum.mapped(lambda values: values * columns)
 
     keys, needs, places = where
     return LoadChannel(name, unit, keys, needs, signal=of_what_moves(name, signal), places=places, of_sizes=factor)
@@ -471,7 +471,7 @@ OF_MOUNTING = (
 
 def _on_block(name: str, unit: str, part: slice, feels_gas: bool = False) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
-        return loads.wrench.each(lambda wrench: wrench[:, None, part])
+        return loads.wrench.mapped(lambda wrench: wrench[:, None, part])
 
     return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas, of_wrench=True)
 
@@ -487,18 +487,18 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
 
 
 def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
-    return lambda loads: channel.signal(loads).each(lambda values: values.sum(axis=1, keepdims=True))
+    return lambda loads: channel.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True))
 
 
 _ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
 
 
 def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    return crank_torque(moving, point, fidelity).each(lambda values: values[:, None, None])
+    return crank_torque(moving, point, fidelity).mapped(lambda values: values[:, None, None])
 
 
 def _side_forces(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    return bearings.piston_pin_forces(moving, point, fidelity).each(lambda values: values[..., 1:])
+    return bearings.piston_pin_forces(moving, point, fidelity).mapped(lambda values: values[..., 1:])
 
 
 def _of_places(

@@ -39,7 +39,7 @@ STEPS = 720
 
 
 @dataclass(frozen=True)
-class Axis:
+class CurveAxis:
     """Dimension of an array: its name, labels, and their unit."""
 
     name: str
@@ -54,7 +54,7 @@ class Field:
     name: str
     words: str
     unit: str
-    own: tuple[Axis, ...]
+    own: tuple[CurveAxis, ...]
     values: Array
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
@@ -70,8 +70,8 @@ class Fields:
     """Fields on common axes: the designs, and the axes of the rows."""
 
     title: str
-    designs: Axis
-    rows: tuple[Axis, ...]
+    designs: CurveAxis
+    rows: tuple[CurveAxis, ...]
     fields: tuple[Field, ...]
 
     def dataset(self) -> xr.Dataset:
@@ -113,7 +113,7 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     check_integer("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
     turn = first.engine.cycle.angle
-    angles = Axis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")
+    angles = CurveAxis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")
     axes, names = ("x", "y", "z"), [loads.point.name for loads in first.loads]
 
     def sampled(signals: list[list[Spectrum]]) -> Array:
@@ -121,34 +121,34 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
         return np.array([[over(base, [one])[0].sample(steps) for one in of_design] for of_design in signals])
 
     wrenches = sampled([[loads.wrench for loads in design.loads] for design in designs.values()])
-    direction = Axis("direction", axes)
+    direction = CurveAxis("direction", axes)
     fields = [
         Field("shaking_force", "shaking force", "N", (direction,), wrenches[..., :3]),
         Field("shaking_moment", "shaking moment", "N m", (direction,), wrenches[..., 3:]),
     ]
     for name, words, place, channel in _places(first):
         values = sampled([[channel.signal(loads) for loads in design.loads] for design in designs.values()])
-        places = Axis(place, tuple(channel.places(first.engine)))
+        places = CurveAxis(place, tuple(channel.places(first.engine)))
         if values.shape[-1] == len(axes):
             fields.append(Field(name, words, channel.unit, (places, direction), values))
         else:
             fields.append(Field(name, words, channel.unit, (places,), values[..., 0]))
-    rows = (Axis("point", tuple(names)), angles)
-    return Fields("Loads over the crank angle", Axis("design", tuple(designs)), rows, tuple(fields))
+    rows = (CurveAxis("point", tuple(names)), angles)
+    return Fields("Loads over the crank angle", CurveAxis("design", tuple(designs)), rows, tuple(fields))
 
 
 def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return the amplitudes by order of the loads on block, mounts and bearings (C8)."""
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
-    signals: dict[str, tuple[str, str, tuple[Axis, ...], Callable[[PointLoads], Spectrum]]] = {
-        "shaking_force": ("shaking force", "N", (), lambda one: one.wrench.each(lambda c: c[..., :3])),
-        "shaking_moment": ("shaking moment", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 3:])),
-        "roll_moment": ("roll moment", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 3:4])),
-        "rocking_couple": ("rocking couple", "N m", (), lambda one: one.wrench.each(lambda c: c[..., 4:])),
+    signals: dict[str, tuple[str, str, tuple[CurveAxis, ...], Callable[[PointLoads], Spectrum]]] = {
+        "shaking_force": ("shaking force", "N", (), lambda one: one.wrench.mapped(lambda c: c[..., :3])),
+        "shaking_moment": ("shaking moment", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 3:])),
+        "roll_moment": ("roll moment", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 3:4])),
+        "rocking_couple": ("rocking couple", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 4:])),
     }
     for name, words, place, channel in _places(first):
-        own = (Axis(place, tuple(channel.places(first.engine))),)
+        own = (CurveAxis(place, tuple(channel.places(first.engine))),)
         signals[name] = (words, channel.unit, own, channel.signal)
     spectra = {
         name: [[signal(loads).rebased(base) for loads in design.loads] for design in designs.values()]
@@ -167,9 +167,9 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         Field(name, words, unit, own, np.array([[amplitudes(one) for one in row] for row in spectra[name]]))
         for name, (words, unit, own, _) in signals.items()
     ]
-    orders = Axis("order", tuple(float(k * base) for k in range(count)))
-    points = Axis("point", tuple(loads.point.name for loads in first.loads))
-    return Fields("Amplitudes by order", Axis("design", tuple(designs)), (points, orders), tuple(fields))
+    orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))
+    points = CurveAxis("point", tuple(loads.point.name for loads in first.loads))
+    return Fields("Amplitudes by order", CurveAxis("design", tuple(designs)), (points, orders), tuple(fields))
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
@@ -183,13 +183,15 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
     if any(design.engine.block is None or not design.engine.mounts for design in designs.values()):
         raise ModelError("has no natural modes; give [block] and elastic [mounts]", "mounts")
     modes = [mounting_in(design.engine).modes for design in designs.values()]
-    motion = Axis("motion", tuple(MOTIONS))
+    motion = CurveAxis("motion", tuple(MOTIONS))
     fields = (
         Field("frequency", "natural frequency", "Hz", (), np.array([one.frequencies for one in modes])),
         Field("loss_factor", "loss factor", "", (), np.array([one.loss for one in modes])),
         Field("energy", "share of kinetic energy", "", (motion,), np.array([one.energy.T for one in modes])),
     )
-    return Fields("Natural modes", Axis("design", tuple(designs)), (Axis("mode", tuple(range(1, 7))),), fields)
+    return Fields(
+        "Natural modes", CurveAxis("design", tuple(designs)), (CurveAxis("mode", tuple(range(1, 7))),), fields
+    )
 
 
 def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:

@@ -138,7 +138,7 @@ class Numbers:
         mounts = base.mounts
         if self.mounts:
             rows = iter(self.mounts)
-            mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in base.mounts)
+            mounts = tuple(mount.mapped(lambda spring: mount_of(spring, next(rows))) for mount in base.mounts)
         shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in base.geared})
         # a sum of changes may leave a bound by a rounding
         geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in base.geared)

@@ -105,9 +105,9 @@ class Evaluation(EvaluatedDesign):
         value, room, edge, side = min(pairs, key=lambda pair: pair[1])
         return Standing(value, edge, side, -room)
 
-    def excess(self, limits: Sequence[Limit]) -> float:
+    def violation(self, limits: Sequence[Limit]) -> float:
         """Return the largest relative violation of limits, negative if all have slack; zero without limits."""
-        return max((self.standing(limit).excess for limit in limits), default=0.0)
+        return max((self.standing(limit).violation for limit in limits), default=0.0)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ class Standing:
     value: float
     edge: float
     side: str
-    excess: float
+    violation: float
 
 
 def fine_samples(samples: int) -> int:

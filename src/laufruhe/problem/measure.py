@@ -254,11 +254,11 @@ def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
     Signals of places that add up are multiplied by their number: the mean over them is then their sum.
     """
     if measure.at is not None:
-        signal = signal.each(lambda values: values[:, measure.places(measure.load.places(engine)), :])
+        signal = signal.mapped(lambda values: values[:, measure.places(measure.load.places(engine)), :])
     if measure.direction_weights is not None:
-        signal = signal.each(lambda values: values * np.array(measure.direction_weights))
+        signal = signal.mapped(lambda values: values * np.array(measure.direction_weights))
     if measure.load.adds_up:
-        signal = signal.each(lambda values: values * values.shape[1])
+        signal = signal.mapped(lambda values: values * values.shape[1])
     if measure.orders is not None:
         signal = signal.only(measure.orders)
     return signal.without_mean if measure.alternating else signal

@@ -52,7 +52,7 @@ def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
 def _cached_zero(problem: Problem) -> float:
     # mounts that damp all modes: a resonance would make a size of its own
     springs = [
-        mount.each(lambda spring: replace(spring, loss_factor=max(spring.loss_factor, 1.0)))
+        mount.mapped(lambda spring: replace(spring, loss_factor=max(spring.loss_factor, 1.0)))
         for mount in problem.engine.mounts
     ]
     engine = replace(problem.engine, mounts=tuple(springs))

@@ -50,7 +50,7 @@ class Intervals:
         return min(intervals) >= self.minimum - slack and max(intervals) <= self.maximum + slack
 
     @property
-    def shown(self) -> str:
+    def text(self) -> str:
         """Text of the bounds."""
         return f"{math.degrees(self.minimum):g} to {math.degrees(self.maximum):g} deg"
 
@@ -221,7 +221,7 @@ class PhasingOf(Generic[P]):
         return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
 
     @property
-    def opened(self) -> tuple[bool, bool]:
+    def is_geometry_open(self) -> tuple[bool, bool]:
         """True for an open bank angle, and for open split pins."""
         bank, split = (pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split))
         return bank, split
@@ -232,8 +232,8 @@ class PhasingOf(Generic[P]):
         names = (
             ("throws", self.throws is None),
             ("firing order", self.firing_order is None),
-            ("bank angle", self.opened[0]),
-            ("split pin angle", self.opened[1]),
+            ("bank angle", self.is_geometry_open[0]),
+            ("split pin angle", self.is_geometry_open[1]),
             (f"which of {counted(sum(map(len, self.shafts.optional)), 'shaft')} are built", bool(self.shafts.optional)),
         )
         return tuple(name for name, is_open in names if is_open)
@@ -271,7 +271,7 @@ class PhasingOf(Generic[P]):
         if self.bank is None:
             return ((None, None),)
         split = self.split or (0.0, 0.0)
-        bank_open, split_open = self.opened
+        bank_open, split_open = self.is_geometry_open
         if not bank_open and not split_open:
             return ((self.bank[0], split[0]),)
         step = math.tau / (self.cylinders // math.gcd(self.cycle.turns, self.cylinders))

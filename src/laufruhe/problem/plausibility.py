@@ -10,7 +10,7 @@ from laufruhe.errors import Complaint
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, within
-from laufruhe.units import shown
+from laufruhe.units import quantity_text
 
 FASTEST = 30.0
 """Mean piston speed [m/s]; racing engines reach 26."""
@@ -69,17 +69,17 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
         usual = math.pi / 4.0 * bore**2 * stroke
         if not part.reciprocating_mass and part.has_rod:
             rule = "makes no inertia force, so nothing of the pistons shakes the block"
-            yield Complaint("reciprocating mass", shown(0.0, "kg"), rule, "check it")
+            yield Complaint("reciprocating mass", quantity_text(0.0, "kg"), rule, "check it")
         elif usual > 0.0 and part.reciprocating_mass and not LIGHTEST < part.reciprocating_mass / usual < HEAVIEST:
             # 1000 kg a cubic metre is what pistons of usual engines have
             rule = f"is that of no usual piston: one that sweeps {1e6 * usual:.4g} cm^3 has about {1e3 * usual:.2g} kg"
-            yield Complaint("reciprocating mass", shown(part.reciprocating_mass, "kg"), rule, "check its unit")
+            yield Complaint("reciprocating mass", quantity_text(part.reciprocating_mass, "kg"), rule, "check its unit")
         if part.bore and not FLATTEST < stroke / part.bore < LONGEST:
             rule = f"is {stroke / part.bore:.3g} times the bore"
-            yield Complaint("stroke", shown(stroke, "m"), rule, "check stroke and bore")
+            yield Complaint("stroke", quantity_text(stroke, "m"), rule, "check stroke and bore")
         if part.crank_radius / part.rod_length > SHORTEST_ROD:
             rule = f"is {part.rod_length / part.crank_radius:.3g} crank radii, and rods of engines are longer than 2.2"
-            yield Complaint("rod length", shown(part.rod_length, "m"), rule, "check rod ratio or rod length")
+            yield Complaint("rod length", quantity_text(part.rod_length, "m"), rule, "check rod ratio or rod length")
 
 
 def _of_rotors(engine: Engine) -> Iterator[Complaint]:
@@ -87,20 +87,22 @@ def _of_rotors(engine: Engine) -> Iterator[Complaint]:
     for rotor in engine.rotors:
         if abs(rotor.unbalance) > MOST_UNBALANCE * whole > 0.0:
             rule = f"is {abs(rotor.unbalance) / whole:.3g} times that of all pistons and pins at their crank radius"
-            yield Complaint(f"unbalance of {rotor.name}", shown(abs(rotor.unbalance), "kg m"), rule, "check its unit")
+            yield Complaint(
+                f"unbalance of {rotor.name}", quantity_text(abs(rotor.unbalance), "kg m"), rule, "check its unit"
+            )
 
 
 def _of_mounts(engine: Engine) -> Iterator[Complaint]:
     moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
     if engine.block is not None and engine.block.mass <= moving:
-        rule = f"is not more than the {shown(moving, 'kg')} of its pistons and cranks, which it counts in"
-        yield Complaint("mass of the block", shown(engine.block.mass, "kg"), rule, "check its unit")
+        rule = f"is not more than the {quantity_text(moving, 'kg')} of its pistons and cranks, which it counts in"
+        yield Complaint("mass of the block", quantity_text(engine.block.mass, "kg"), rule, "check its unit")
     stiffness = sum(max(spring.at_rest) for _, spring in every_spring(engine.mounts))
     if engine.block is None or not stiffness:
         return
     sag = 9.81 * engine.block.mass / stiffness
     if not LEAST_SAG < sag < MOST_SAG:
-        rule = f"lets {shown(engine.block.mass, 'kg')} sag by about {shown(sag, 'm')}"
+        rule = f"lets {quantity_text(engine.block.mass, 'kg')} sag by about {quantity_text(sag, 'm')}"
         yield Complaint("stiffness of the mounts", "", rule, "check stiffness and mass, N/mm and N/m")
 
 

@@ -64,7 +64,7 @@ class BranchAndBound(Generic[P]):
         Parts that are divided in one round.
     value
         Objective of the best design known; infinite where none is.
-    enough
+    cutoff
         Parts that are not under it are not divided.
     level
         No design that bounds cut off from a part is under it.
@@ -91,7 +91,7 @@ class BranchAndBound(Generic[P]):
     _minimum: float
 
     @property
-    def enough(self) -> float:
+    def cutoff(self) -> float:
         """Bound from which a part is not divided."""
         return self.value
 
@@ -164,7 +164,7 @@ class BranchAndBound(Generic[P]):
                 bound, part = found
                 self._check(bound, part)
                 # the one place where parts are left out by what is known
-                if bound < self.enough:
+                if bound < self.cutoff:
                     heapq.heappush(queue, OpenNode(bound, self.seen, part))
                 else:
                     self._minimum = min(self._minimum, bound)
@@ -223,7 +223,7 @@ class BoxBisection(BranchAndBound[Box]):
         self.value, self.room, self.known = value, room, known
 
     @property
-    def enough(self) -> float:
+    def cutoff(self) -> float:
         """Bound from which no design of a box is better by the room."""
         return self.value - NEARLY * self.room if self.value < math.inf else math.inf
 
@@ -234,7 +234,7 @@ class BoxBisection(BranchAndBound[Box]):
 
     def is_fathomed(self, one: OpenNode[Box]) -> bool:
         """Return True if no design in the box beats the known value by more than the room."""
-        return not one.bound < self.enough
+        return not one.bound < self.cutoff
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
         """Halves of boxes and their own bounds, or what is proven of those of which nothing is left."""
@@ -251,7 +251,7 @@ class BoxBisection(BranchAndBound[Box]):
 
     def found(self, bound: float) -> BoxResult:
         """Return a result with this bound, the boxes seen, and the middles of the least boxes left."""
-        minimum = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
+        minimum = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.cutoff]
         places = tuple(0.5 * (box.lower + box.upper) for box in minimum)
         return BoxResult(bound, self.seen, places)
 
@@ -269,7 +269,7 @@ class BoxBounds(Protocol):
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
 
 
-class BoxSearch(BoxBisection):
+class BoundedBoxes(BoxBisection):
     """Boxes with bounds found by someone else."""
 
     def __init__(self, search: BoxBounds, value: float, room: float, known: Known | None = None) -> None:
@@ -323,7 +323,7 @@ def divide_in_rounds(
     known: Known | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
     """The same up to each of these numbers of boxes, one after the other."""
-    division = BoxSearch(search, value, room, known)
+    division = BoundedBoxes(search, value, room, known)
     for k, count in enumerate(maximum):
         found = (
             division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)

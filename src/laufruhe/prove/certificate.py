@@ -19,14 +19,14 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import check_bound, is_over
 
 
-def gap_of(value: float, bound: float, nothing: float) -> float:
+def gap_of(value: float, bound: float, zero_level: float) -> float:
     """Share of a value by which a bound lies under it, what counts as zero left out.
 
     Gaps are counted here and nowhere else.
     """
     if not 0.0 < value < math.inf:
         return value
-    return (value - bound) / value if value - bound > nothing else 0.0
+    return (value - bound) / value if value - bound > zero_level else 0.0
 
 
 ROUNDING = 1e-12
@@ -34,9 +34,9 @@ ROUNDING = 1e-12
 LEVELLINGS, LEVEL = 2, 1e-6
 
 
-def room_of(value: float, tolerance: float, nothing: float) -> float:
+def room_of(value: float, tolerance: float, zero_level: float) -> float:
     """Return the improvement on `value` that still counts as a gap within the tolerance."""
-    return tolerance * value + nothing
+    return tolerance * value + zero_level
 
 
 class Proof(StrEnum):
@@ -67,7 +67,7 @@ NEAR = 0.05
 
 
 def certified(
-    value: float, bound: float, nothing: float, tolerance: float, reach: ProofStrength, kkt_residual: float,
+    value: float, bound: float, zero_level: float, tolerance: float, reach: ProofStrength, kkt_residual: float,
     method: str, doubt: float = 0.0,
 ) -> Certificate:  # fmt: skip
     """Return the certificate of a design; a bound that contradicts its value is reported, and proves nothing.
@@ -78,16 +78,16 @@ def certified(
         Objective of a design that keeps all limits.
     bound
         What no design goes under, raw: it is never brought to the value.
-    nothing
+    zero_level
         Difference that counts as zero.
     doubt
         By how much the value may be read too low: between samples, and where limits are exceeded by a rounding.
     """
     # no norm lies under zero
     value, bound = float(value), max(float(bound), 0.0)
-    if not check_bound(method, bound, value, nothing + doubt):
+    if not check_bound(method, bound, value, zero_level + doubt):
         return unproven_certificate(value, kkt_residual, method)
-    gap = gap_of(value, bound, nothing)
+    gap = gap_of(value, bound, zero_level)
     if gap <= tolerance:
         kind = Proof.GLOBAL
     elif reach is ProofStrength.WHOLE or (reach is ProofStrength.NEAR and gap <= NEAR):

@@ -265,7 +265,7 @@ def _star(star: RankedStar) -> Record:
 
 
 def _ranks(result: Result) -> Record:
-    names = "name unit initial least lower_bound gap final limit price"
+    names = "name unit initial least=minimum lower_bound gap final limit price"
     entries = [
         {
             **_attributes(rank, names),
@@ -285,7 +285,10 @@ def _reached(result: Result) -> Record:
     reached = [
         {**_attributes(one, f"{names} {more}"), "proof": str(one.proof), **_values(one)} for one in result.reached
     ]
-    return {"reached": reached, "nearest": near and {**_attributes(near, f"{names} excess broken"), **_values(near)}}
+    return {
+        "reached": reached,
+        "nearest": near and {**_attributes(near, f"{names} excess=violation broken"), **_values(near)},
+    }
 
 
 def _values(design: AttainableLimit | Nearest) -> Record:

@@ -16,7 +16,7 @@ from laufruhe.files.complaints import complaints_of
 from laufruhe.prove.certificate import Certificate
 from laufruhe.report.files import RESULT, write
 from laufruhe.report.json_result import as_json
-from laufruhe.solvers.result import Result, Status, Told
+from laufruhe.solvers.result import Result, ResultContent, Status
 from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 
 
@@ -53,7 +53,7 @@ class _File(BaseModel):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SavedResult(Told):
+class SavedResult(ResultContent):
     """A result as read from its `result.json` [SI].
 
     Attributes

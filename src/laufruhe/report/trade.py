@@ -15,7 +15,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.report.document import Block, Bullets, Code, Document, Illustration, Paragraph
 from laufruhe.report.strict_json import strict
 from laufruhe.solvers.warm_start import compares_stars
-from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
+from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Trade, TradeRow, is_local, is_open
 
 TITLE = "Speed against accuracy"
 ALIKE, SMALLEST = 1.3, 1e-4
@@ -111,7 +111,7 @@ def advice(trade: Trade) -> str:
     return text + "."
 
 
-def choices(trade: Trade) -> tuple[Row, Row | None]:
+def choices(trade: Trade) -> tuple[TradeRow, TradeRow | None]:
     """Return the cheapest fidelity with a value, and with a decision, within a thousandth."""
     good = [row for row in trade.rows if row.error <= 1e-3]
     number = _fastest(good, lambda row: row.evaluation) if good else trade.rows[-1]
@@ -119,7 +119,7 @@ def choices(trade: Trade) -> tuple[Row, Row | None]:
     return number, _fastest(deciding, lambda row: row.solve) if deciding else None
 
 
-def _fastest(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
+def _fastest(rows: Sequence[TradeRow], time: Callable[[TradeRow], float]) -> TradeRow:
     fastest = min(map(time, rows))
     return min((row for row in rows if time(row) <= ALIKE * fastest), key=lambda row: row.estimate)
 
@@ -180,7 +180,7 @@ def _why_dashes(trade: Trade) -> str:
     return "; ".join(why for why, holds in reasons.items() if holds)
 
 
-def _named(trade: Trade, name: str) -> Row | None:
+def _named(trade: Trade, name: str) -> TradeRow | None:
     return next((row for row in trade.rows if row.name == name), None)
 
 
@@ -189,7 +189,7 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     rows = [row for trade in trades if trade.problem.load_terms and (row := _named(trade, name)) is not None]
     errors = sorted(row.error for row in rows)
     regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
-    broken = sum(row.excess > KEEPS for row in rows)
+    broken = sum(row.violation > KEEPS for row in rows)
     if not errors:
         return f"{what} nothing that these problems show."
     text = f"{what} {_up_to(errors[-1])} of the number{_median(errors)}"
@@ -215,7 +215,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def _cells(row: Row) -> list[str]:
+def _cells(row: TradeRow) -> list[str]:
     times = map(_time, (row.evaluation, row.gradient, row.solve, row.fresh))
     return [row.name, _share(row.error), _share(row.estimate), *times, f"{row.memory / 1e6:.2f} MB", _regret(row)]
 
@@ -228,7 +228,7 @@ def _time(seconds: float) -> str:
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
 
 
-def _error(row: Row | None) -> str:
+def _error(row: TradeRow | None) -> str:
     return DASH if row is None else _share(row.error)
 
 
@@ -236,9 +236,9 @@ def _share(error: float) -> str:
     return f"{error:.1e}" if error else "0"
 
 
-def _regret(row: Row | None) -> str:
-    if row is not None and row.excess > KEEPS:
-        return f"{_percent(row.excess)} beyond a limit"
+def _regret(row: TradeRow | None) -> str:
+    if row is not None and row.violation > KEEPS:
+        return f"{_percent(row.violation)} beyond a limit"
     if row is None or math.isnan(row.regret):
         return DASH
     # accuracy of the cone solver

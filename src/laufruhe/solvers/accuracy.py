@@ -67,10 +67,10 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
     proof, told, missed = result.certificate, result.objective, missed + between
     if told is None or proof is None or missed <= problem.tolerance * value_of_loads(problem, result.final):
         return result
-    bound, nothing = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
+    bound, zero_level = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=STRENGTH), lower_bound=bound,
-        gap=gap_of(told.value, bound, nothing), method=f"{proof.method}, less what the gas may miss",
+        gap=gap_of(told.value, bound, zero_level), method=f"{proof.method}, less what the gas may miss",
     )  # fmt: skip
     status = Status.FEASIBLE if result.status is Status.OPTIMAL else result.status
     return replace(result, status=status, certificate=weaker)

@@ -93,7 +93,7 @@ def with_attainable_limits(
             found = _narrowed(found, problem, solve)
     designs = [answer.result for answer in answers if answer.result is not None]
     for result in designs:
-        if drawn and result.final.excess(problem.limits) <= KEPT:
+        if drawn and result.final.violation(problem.limits) <= KEPT:
             return _recovered(found, problem, result)
     wanted = _wanted(found, problem)
     found = replace(found, reached=tuple(answer.told for answer in answers if answer.told.name in wanted))
@@ -109,7 +109,7 @@ def _surely(solve: Solve, problem: Problem, asked: Problem) -> Result:
     if not result.status.has_design or result.objective is None:
         return result
     sampled, fine = [limit for limit in problem.limits if limit.measure.is_load], with_fine_sampling(result.final)
-    if (result.final.excess(sampled) <= KEPT) is (fine.excess(sampled) <= KEPT):
+    if (result.final.violation(sampled) <= KEPT) is (fine.violation(sampled) <= KEPT):
         return result
     value = objective_value(result.problem, fine)
     return replace(result, final=fine, objective=replace(result.objective, value=value))
@@ -124,17 +124,17 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
 
 def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
     """Return the value that a limit can reach under the others; of two sides the second if the first is no cause."""
-    measure, nothing = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
+    measure, unsolved = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
-        return _Answer(replace(nothing, why="a band is kept or not; no single value can be reached"))
+        return _Answer(replace(unsolved, why="a band is kept or not; no single value can be reached"))
     others = tuple(other for other in problem.limits if other is not limit)
     sides = [("at most", limit.maximum, replace(limit, minimum=-math.inf), replace(limit, maximum=math.inf))]
     sides += [("at least", limit.minimum, *reversed(sides[0][2:]))]
-    answer = _Answer(nothing)
+    answer = _Answer(unsolved)
     for side, edge, own, rest in sides:
         if math.isinf(edge):
             continue
-        told = replace(nothing, side=side, limit=edge)
+        told = replace(unsolved, side=side, limit=edge)
         if passed():
             return _Answer(replace(told, why=LONG))
         if not depends(measure.channel, kinds, problem):
@@ -239,14 +239,14 @@ def _extreme(result: Result, limit: Limit, high: bool) -> float:
 
 def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     """A design that keeps all limits after all, by what bounds are known of the objective."""
-    bound, nothing = (
+    bound, zero_level = (
         found.certificate.lower_bound if found.certificate else 0.0,
         numerical_zero(problem, result.final.engine),
     )
-    read = read_under(problem, result.final, objective_value(problem, result.final), bound, nothing)
+    read = read_under(problem, result.final, objective_value(problem, result.final), bound, zero_level)
     result, value = replace(result, final=read.evaluation), read.value
     how = f"found while {result.problem.objective_name} was minimised"
-    proof = certified(value, bound, nothing, problem.tolerance, ProofStrength.ASIDE, math.inf, how, read.doubt)
+    proof = certified(value, bound, zero_level, problem.tolerance, ProofStrength.ASIDE, math.inf, how, read.doubt)
     own = result.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
         result,
@@ -279,4 +279,4 @@ def _nearest(found: Result, problem: Problem, designs: Sequence[Result]) -> Near
     # known design with the smallest violation of limits
     known = [found.nearest] if found.nearest is not None else []
     known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, found) if not r.final.resonance]
-    return min(known, key=lambda each: each.excess, default=None)
+    return min(known, key=lambda each: each.violation, default=None)

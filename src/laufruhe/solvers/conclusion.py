@@ -57,7 +57,7 @@ class Design:
         Of its decisions.
     value
         Objective.
-    excess
+    violation
         Largest relative excess over a limit.
     """
 
@@ -65,13 +65,13 @@ class Design:
     values: tuple[Value, ...]
     evaluation: Evaluation
     value: float
-    excess: float
+    violation: float
 
     @property
     def rank(self) -> tuple[bool, float]:
         """Sort key: smallest violation of limits first, then smallest objective."""
-        broken = self.excess > KEPT
-        return broken, self.excess if broken else self.value
+        broken = self.violation > KEPT
+        return broken, self.violation if broken else self.value
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ def evaluate_design(problem: Problem, values: Sequence[Value], samples: int | No
     held = problem.fixed_at(values)
     evaluation = evaluate(held, samples=samples)
     value = objective_value(problem, evaluation)
-    return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
+    return Design(problem, tuple(values), evaluation, value, evaluation.violation(problem.limits))
 
 
 def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
@@ -119,14 +119,14 @@ def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
     if initial.resonance:
         return None
     value = objective_value(problem, initial)
-    return Design(problem, problem.start, initial, value, initial.excess(problem.limits))
+    return Design(problem, problem.start, initial, value, initial.violation(problem.limits))
 
 
 def better(design: Design, other: Design | None) -> Design:
     """Return the design with the smaller violation of limits; at equal violation, with the smaller objective."""
     if other is None:
         return design
-    return min((design, other), key=lambda each: (max(each.excess, KEPT), each.value))
+    return min((design, other), key=lambda each: (max(each.violation, KEPT), each.value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +149,7 @@ class Reading:
 
 
 def read_under(
-    problem: Problem, evaluation: Evaluation, value: float, bound: float, nothing: float,
+    problem: Problem, evaluation: Evaluation, value: float, bound: float, zero_level: float,
     prices: Mapping[Side, Price] | None = None,
 ) -> Reading:  # fmt: skip
     """Return the objective of a design, read at so many angles that what bounds all of a cycle lies under it (P7).
@@ -157,31 +157,31 @@ def read_under(
     Means averaged about angles bound those of the whole cycle, and a mean at few angles may lie under them.
     """
     for _ in range(READINGS):
-        if not is_over(bound, value, nothing) or not any(is_sampled(term.measure) for term in problem.objective):
+        if not is_over(bound, value, zero_level) or not any(is_sampled(term.measure) for term in problem.objective):
             break
         evaluation = with_fine_sampling(evaluation)
         value = objective_value(problem, evaluation)
-    return Reading(evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, nothing) else 0.0)
+    return Reading(evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, zero_level) else 0.0)
 
 
-def result_under(result: Result, bound: float, nothing: float) -> tuple[Result, float]:
+def result_under(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
     """Return a result read at so many angles that a bound lies under it, and by how much it may be read too low."""
     if result.objective is None:
         return result, 0.0
-    read = read_under(result.problem, result.final, result.objective.value, bound, nothing, result.prices)
+    read = read_under(result.problem, result.final, result.objective.value, bound, zero_level, result.prices)
     return replace(result, final=read.evaluation, objective=replace(result.objective, value=read.value)), read.doubt
 
 
-def known_of(design: Design, place: Array, excess: float = FEASIBLE) -> Known | None:
+def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Known | None:
     """Return a design as a witness of bounds in coordinates of theirs; None where it exceeds a limit by more."""
-    if design.excess > excess:
+    if design.violation > violation:
         return None
     problem, evaluation = design.problem, design.evaluation
 
     def read() -> float:
-        nothing = numerical_zero(problem, evaluation.engine)
-        found = read_under(problem, evaluation, design.value, math.inf, nothing)
-        return found.value * (1.0 + STEEP * max(design.excess, 0.0)) + found.doubt + nothing
+        zero_level = numerical_zero(problem, evaluation.engine)
+        found = read_under(problem, evaluation, design.value, math.inf, zero_level)
+        return found.value * (1.0 + STEEP * max(design.violation, 0.0)) + found.doubt + zero_level
 
     return Known(place, design.value, read)
 
@@ -194,13 +194,13 @@ def is_sampled(measure: Measure) -> bool:
 def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
     # P7: possible underestimate of the objective; infinite if the design breaks limits at many angles
     many = with_fine_sampling(evaluation) if problem.limits else evaluation
-    if many.excess(problem.limits) > FEASIBLE:
+    if many.violation(problem.limits) > FEASIBLE:
         return math.inf
     missing = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
         found = many.standing(limit)
         if found.side == side and price.relaxed > 0.0:
-            missing += price.relaxed * max(found.excess, 0.0) * abs(found.edge)
+            missing += price.relaxed * max(found.violation, 0.0) * abs(found.edge)
     return missing
 
 
@@ -208,21 +208,21 @@ def build_result(design: Design, initial: Evaluation, shown: ProofData, timing: 
     """The result of a design, or of the one given where that is better."""
     problem = design.problem
     given = objective_value(problem, initial)
-    as_given = Design(problem, problem.start, initial, given, initial.excess(problem.limits))
+    as_given = Design(problem, problem.start, initial, given, initial.violation(problem.limits))
     design = min(design, as_given, key=lambda each: each.rank)
-    met = design.excess <= KEPT
-    nothing = numerical_zero(problem, design.evaluation.engine)
+    met = design.violation <= KEPT
+    zero_level = numerical_zero(problem, design.evaluation.engine)
     if met:
-        read = read_under(problem, design.evaluation, design.value, shown.bound, nothing, shown.prices)
+        read = read_under(problem, design.evaluation, design.value, shown.bound, zero_level, shown.prices)
         design = replace(design, evaluation=read.evaluation, value=read.value)
         certificate = certified(
-            design.value, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method,
+            design.value, shown.bound, zero_level, problem.tolerance, shown.reach, shown.kkt_residual, shown.method,
             read.doubt,
         )  # fmt: skip
     else:
         # the bound is of designs, and this is none
         bound = max(shown.bound, 0.0)
-        gap = gap_of(design.value, bound, nothing)
+        gap = gap_of(design.value, bound, zero_level)
         certificate = Certificate(Proof.NONE, bound, gap, shown.kkt_residual, shown.method)
     # prices under what the proof leaves open are those of its rounding
     unfelt = max(_FELT, min(certificate.gap, problem.tolerance))
@@ -314,16 +314,16 @@ def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], t
 
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
     """Names of those that a design breaks."""
-    return tuple(limit.name for limit in limits if evaluation.standing(limit).excess > KEPT)
+    return tuple(limit.name for limit in limits if evaluation.standing(limit).violation > KEPT)
 
 
 def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> Nearest:
     """A design that is no answer, and the limit that it breaks most."""
-    broken = max(problem.limits, key=lambda limit: design.standing(limit).excess)
+    broken = max(problem.limits, key=lambda limit: design.standing(limit).violation)
     stands = design.standing(broken)
     names = broken_limits(problem.limits, design)
     return Nearest(
-        broken.name, stands.side, stands.edge, broken.measure.unit, stands.value, stands.excess, names, decisions
+        broken.name, stands.side, stands.edge, broken.measure.unit, stands.value, stands.violation, names, decisions
     )
 
 
@@ -353,14 +353,14 @@ def _limit_value(
     if prices is None:
         # nothing is open that takes a step
         price = Price.both(math.nan)
-    elif found.excess >= -ACTIVE and not _is_moved(problem, evaluation, limit):
+    elif found.violation >= -ACTIVE and not _is_moved(problem, evaluation, limit):
         # nothing open moves it: relaxed it changes nothing, and tightened no design keeps it
         price = Price(0.0, math.inf)
     else:
         # an active side without a price has one that nothing here tells
         price = prices.get((limit, found.side), Price.both(math.nan))
-    told = price.relaxed * abs(found.edge) > _TOLD * value and found.excess >= -problem.tolerance
-    active = bool(found.excess >= -ACTIVE or told)
+    told = price.relaxed * abs(found.edge) > _TOLD * value and found.violation >= -problem.tolerance
+    active = bool(found.violation >= -ACTIVE or told)
     price = price.felt(unfelt * value / abs(found.edge) if found.edge else 0.0) if active else Price(0.0, 0.0)
     error = relative(missed(limit.measure, evaluation), found.value)
     return LimitValue(
@@ -397,7 +397,7 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     still, finer = result.final, with_fine_sampling(result.final)
     shown = tuple(
-        known.get(limit) or _limit_value(problem, limit, finer if still.excess([limit]) > KEPT else still, {}, 0.0)
+        known.get(limit) or _limit_value(problem, limit, finer if still.violation([limit]) > KEPT else still, {}, 0.0)
         for limit in limits
     )
     resonant = not known and result.final.resonance

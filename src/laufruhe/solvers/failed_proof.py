@@ -24,7 +24,7 @@ def without_proof(result: Result, error: BoundError) -> Result:
     return replace(
         result,
         status=STATUS.get(result.status, result.status),
-        certificate=_nothing(result.certificate, value),
+        certificate=_without_bound(result.certificate, value),
         message="; ".join(filter(None, (result.message, why))),
         conflict=(),
         ranks=tuple(replace(rank, lower_bound=0.0, gap=1.0, proof=Proof.NONE) for rank in result.ranks),
@@ -32,5 +32,5 @@ def without_proof(result: Result, error: BoundError) -> Result:
     )
 
 
-def _nothing(own: Certificate | None, value: float) -> Certificate | None:
+def _without_bound(own: Certificate | None, value: float) -> Certificate | None:
     return None if own is None else unproven_certificate(value, own.kkt_residual, own.method)

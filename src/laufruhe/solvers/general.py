@@ -23,7 +23,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import build_result, evaluate_design, values_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, shown, spread_starts
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, spread_starts
 from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.moved_throws import solve_moved_throws
@@ -69,7 +69,7 @@ def solve_generally(
         best = _in_turns(program, best, decide)
     design = evaluate_design(problem, program.values(best))
     text = f"local programs from the best of {counted(len(places), 'start')}"
-    found = shown(program, design, 0.0, ProofStrength.ASIDE, text)
+    found = proof_data(program, design, 0.0, ProofStrength.ASIDE, text)
     # gas and speeds may follow from open numbers
     own = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}

@@ -216,7 +216,7 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
             given = evaluate_design(problem, problem.start)
             if (
                 problem.phasing is None
-                and max(given.excess, violation_at_fine_sampling(problem, given.evaluation)) <= KEPT
+                and max(given.violation, violation_at_fine_sampling(problem, given.evaluation)) <= KEPT
             ):
                 shown = ProofData(0.0, ProofStrength.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
                 return build_result(given, given.evaluation, shown, {})
@@ -314,7 +314,7 @@ def _is_settled(problem: Problem) -> bool:
 
 def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Result:
     design = evaluate_design(problem, problem.start)
-    if design.excess > KEPT:
+    if design.violation > KEPT:
         return rest(problem)
     shown = ProofData(design.value, ProofStrength.WHOLE, 0.0, "nothing open changes what is minimised")
     return build_result(design, design.evaluation, shown, {})

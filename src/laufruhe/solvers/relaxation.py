@@ -39,7 +39,7 @@ def solve_by_relaxation(problem: Problem, fewer: Problem, prove: Solve, solve: S
         return with_limits(known, problem.limits)
     certificate = known.certificate
     proven = certificate is not None and certificate.kind is Proof.GLOBAL and fewer.objective == problem.objective
-    if proven and known.final.excess(problem.limits) <= KEPT:
+    if proven and known.final.violation(problem.limits) <= KEPT:
         return _under_all(known, problem)
     found = solve(problem)
     if certificate is None:
@@ -63,11 +63,11 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     own, told = result.certificate, result.objective
     if own is None or told is None or own.kind is Proof.NONE or not bound > own.lower_bound:
         return result
-    nothing = numerical_zero(result.problem, result.final.engine)
-    result, doubt = result_under(result, bound, nothing)
+    zero_level = numerical_zero(result.problem, result.final.engine)
+    result, doubt = result_under(result, bound, zero_level)
     value, text = (result.objective or told).value, f"{own.method}; {source}"
     proof = certified(
-        value, bound, nothing, result.problem.tolerance, ProofStrength.NEAR, own.kkt_residual, text, doubt
+        value, bound, zero_level, result.problem.tolerance, ProofStrength.NEAR, own.kkt_residual, text, doubt
     )
     status = Status.OPTIMAL if proof.kind is Proof.GLOBAL else result.status
     return replace(result, certificate=proof, status=status)

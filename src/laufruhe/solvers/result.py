@@ -51,7 +51,7 @@ class Status(StrEnum):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Told:
+class ResultContent:
     """Content of a result, solved now or read from a file; the fields are named as in `Result`."""
 
     status: Status
@@ -103,7 +103,7 @@ class Details:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Result(Told):
+class Result(ResultContent):
     """A design, what was proven of it, and everything a report shows.
 
     Attributes

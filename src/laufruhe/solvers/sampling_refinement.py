@@ -61,10 +61,10 @@ def _evaluated_at_fine_sampling(result: Result) -> Result:
         return result
     value = told.value - _misread(problem, result.measured)
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
-    nothing = numerical_zero(problem, final.engine)
-    gap = gap_of(value, proof.lower_bound, nothing)
+    zero_level = numerical_zero(problem, final.engine)
+    gap = gap_of(value, proof.lower_bound, zero_level)
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
-    check_bound(proof.method, proof.lower_bound, value, nothing + doubt)
+    check_bound(proof.method, proof.lower_bound, value, zero_level + doubt)
     weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
     met = violation_at_fine_sampling(problem, result.final) <= KEPT or result.measured is not result.final
     kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
@@ -83,7 +83,7 @@ def _evaluated_at_fine_sampling(result: Result) -> Result:
 def violation_at_fine_sampling(problem: Problem, evaluation: Evaluation) -> float:
     """Largest relative excess that many angles tell over a limit which few tell of; negative where all have room."""
     limits = _coarsely_sampled_limits(problem, evaluation)
-    return with_fine_sampling(evaluation).excess(limits) if limits else -math.inf
+    return with_fine_sampling(evaluation).violation(limits) if limits else -math.inf
 
 
 def _coarsely_sampled_limits(problem: Problem, evaluation: Evaluation) -> list[Limit]:
@@ -103,7 +103,7 @@ def _untold(result: Result) -> float:
     limits, many = _coarsely_sampled_limits(problem, few), with_fine_sampling(few)
     # what a search missed at fewer angles than by default is sought at these, wherever the design as given stands
     minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
-    return max((max(minimum, abs(many.standing(x).excess - few.standing(x).excess)) for x in limits), default=0.0)
+    return max((max(minimum, abs(many.standing(x).violation - few.standing(x).violation)) for x in limits), default=0.0)
 
 
 def _misread(problem: Problem, evaluation: Evaluation) -> float:
@@ -130,8 +130,8 @@ def _misproven(result: Result) -> float:
     value = told.value - over
     if abs(over) <= FELT * problem.tolerance * value:
         return 0.0
-    nothing = numerical_zero(problem, result.final.engine)
-    proven = gap_of(value, proof.lower_bound, nothing) <= problem.tolerance
+    zero_level = numerical_zero(problem, result.final.engine)
+    proven = gap_of(value, proof.lower_bound, zero_level) <= problem.tolerance
     # a bound over the value is none
     agree = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)
     return 0.0 if agree else max(abs(over) / (problem.tolerance * value), LEAST_TIMES)

@@ -176,7 +176,7 @@ class Nearest:
 
     Attributes
     ----------
-    value, excess
+    value, violation
         Of the measure that is limited, and the share by which it is beyond the limit.
     broken
         Names of all limits that it breaks.
@@ -187,7 +187,7 @@ class Nearest:
     limit: float
     unit: str
     value: float
-    excess: float
+    violation: float
     broken: tuple[str, ...]
     decisions: tuple[DecisionValue, ...]
 

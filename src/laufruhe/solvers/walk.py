@@ -78,7 +78,7 @@ class Visit:
     ----------
     value
         Objective.
-    excess
+    violation
         Largest relative excess over a limit.
     sure
         The same with what samples may have missed of each limit.
@@ -87,12 +87,12 @@ class Visit:
     stand: Stand
     evaluation: Evaluation
     value: float
-    excess: float
+    violation: float
     sure: float
 
     def is_better(self, other: Visit, allowed: float) -> bool:
         """Compare by the limits first, then by the objective."""
-        own, theirs = (max(each.excess, allowed) for each in (self, other))
+        own, theirs = (max(each.violation, allowed) for each in (self, other))
         return (own, self.value) < (theirs, other.value)
 
 
@@ -147,7 +147,7 @@ class _Walk:
         here = self._visit(self.start, None)
         if here is None:
             return None
-        allowed, witness = 0.0 if self.is_none else max(here.excess, 0.0), None
+        allowed, witness = 0.0 if self.is_none else max(here.violation, 0.0), None
         sources = [self._choices(), self._steps()]
         coming = [next(source, None) for source in sources]
         seen = 0
@@ -180,12 +180,12 @@ class _Walk:
             is_told = engine == final.engine and problem.fidelity == final.fidelity
             evaluation = final if is_told else evaluate(problem, engine, self.samples)
             value = objective_value(problem, evaluation)
-            if not math.isfinite(value) or (here is not None and here.excess <= 0.0 and value >= here.value):
+            if not math.isfinite(value) or (here is not None and here.violation <= 0.0 and value >= here.value):
                 return None
-            excesses = [evaluation.standing(limit).excess for limit in self.limits]
+            excesses = [evaluation.standing(limit).violation for limit in self.limits]
         except LaufruheError:
             return None
-        sure = max((excess + error for excess, error in zip(excesses, self.errors, strict=True)), default=0.0)
+        sure = max((violation + error for violation, error in zip(excesses, self.errors, strict=True)), default=0.0)
         return Visit(stand, evaluation, value, max(excesses, default=0.0), sure)
 
     def _steps(self) -> Generator[tuple[Move, float], bool, None]:
@@ -401,7 +401,9 @@ def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
         if witness.value * over + numerical_zero(problem, own.engine) >= bound:
             return False
     standings = ((limit, own.standing(limit)) for limit in problem.limits)
-    kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)
+    kept = all(
+        stands.violation + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings
+    )
     return kept and violation_at_fine_sampling(problem, own) <= 0.0
 
 
@@ -409,7 +411,7 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
     """The design of the walk, of which nothing is proven."""
     stand, candidate, own = witness.stand, witness.stand.candidate, found.problem
     shown = replace(stand.problem, phasing=own.phasing)
-    design = Design(shown, stand.values, witness.evaluation, witness.value, witness.excess)
+    design = Design(shown, stand.values, witness.evaluation, witness.value, witness.violation)
     decisions, details = decided(design), found.phasing
     if details is not None and candidate is not None and own.phasing is not None:
         decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)

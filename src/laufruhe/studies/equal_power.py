@@ -61,7 +61,7 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
         bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
         extras=tuple(extra.scaled(k, m) for extra in engine.extras),
         mounts=tuple(
-            mount.each(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))
+            mount.mapped(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))
             for mount in engine.mounts
         ),
     )

@@ -98,7 +98,7 @@ def _disk_errors() -> Iterator[None]:
 
 
 @dataclass(frozen=True)
-class Answer:
+class PointResult:
     """Outcome of a task.
 
     Attributes
@@ -126,7 +126,7 @@ class _Piece:
     folder: Path
 
 
-def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answer, None, None]:
+def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[PointResult, None, None]:
     """Yield the answer of every task in any order; raise the error of the first task that fails.
 
     Those who were given the work do all of it; processes of this machine are started once what is left would take
@@ -152,22 +152,22 @@ def _time_limit_error() -> SolverError:
     return TimeIsOver("the time limit is over; finished points are kept, the same command goes on")
 
 
-def _other_files(answer: Answer, task: Task) -> SolverError:
+def _other_files(answer: PointResult, task: Task) -> SolverError:
     where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
     rule = f"'{task[1]}' had other files, another Laufruhe or other libraries {where}, so its answer is not kept"
     return SolverError(f"{rule}; have the same everywhere, and the same command goes on")
 
 
-def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
+def _answer(k: int, task: Task, scenes: Scenes) -> PointResult:
     started = time.perf_counter()
     part, point = task
     with scenes.blamed(point):
         record = part.answer(point, scenes)
     seconds = time.perf_counter() - started
-    return Answer(k, scenes.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
+    return PointResult(k, scenes.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
 
 
-def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[Answer]:
+def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[PointResult]:
     """Yield answers of the tasks from `first` on; pieces grow with the measured speed."""
     done, spent = 0, 0.0
     worth = NEAR if current_executor() is None else FAR
@@ -196,7 +196,7 @@ def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -
             raise WorkersGone(f"{error}; finished points are kept, the same command goes on") from None
 
 
-def _work(piece: _Piece) -> list[Answer]:
+def _work(piece: _Piece) -> list[PointResult]:
     if Path.cwd() != piece.folder:
         piece.scenes.folder = piece.folder / piece.scenes.folder
     return [_answer(k, task, piece.scenes) for k, task in zip(piece.numbers, piece.tasks, strict=True)]

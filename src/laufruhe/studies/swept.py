@@ -16,7 +16,7 @@ from pydantic import Field
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityName
-from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
+from laufruhe.files.study_tables import CaseTable, SweepAxis, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, measured
@@ -212,7 +212,7 @@ class SweptPart(Part):
         """Return the number of cases times combinations."""
         return len(self.cases) * math.prod(sweep.count for sweep in self.sweep)
 
-    def axes(self) -> list[Axis]:
+    def axes(self) -> list[SweepAxis]:
         """Return the swept axes."""
         return [axis_of(sweep) for sweep in self.sweep]
 
@@ -287,7 +287,7 @@ class SweptPart(Part):
                 raise scenes.refused(case, "objective", rule, "minimise a mount force or transmissibility")
 
 
-def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]:
+def coordinates(axes: Sequence[SweepAxis], points: Sequence[Point]) -> dict[str, Any]:
     """Return swept values along the points: numbers with their unit, or labels as in a problem file."""
     coords: dict[str, Any] = {}
     for axis in axes:

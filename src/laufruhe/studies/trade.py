@@ -41,7 +41,7 @@ _LEAST_TIME, _LONG, _MOST_REPEATS = 0.02, 0.1, 50
 
 
 @dataclass(frozen=True)
-class Row:
+class TradeRow:
     """Measurements of one fidelity on one problem.
 
     Attributes
@@ -54,7 +54,7 @@ class Row:
         where nothing is open, or this fidelity cannot decide it.
     memory
         Largest of an evaluation from nothing [byte].
-    optimum, excess
+    optimum, violation
         Reference objective of the design that this fidelity decides, and the largest share by which that is beyond a
         limit at the reference; NaN as above.
     regret
@@ -70,13 +70,13 @@ class Row:
     fresh: float
     memory: int
     optimum: float
-    excess: float
+    violation: float
     regret: float = math.nan
 
     @property
     def decides(self) -> bool:
         """True if its design keeps the limits."""
-        return self.excess <= KEEPS
+        return self.violation <= KEEPS
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ class Trade:
     """
 
     problem: Problem
-    rows: tuple[Row, ...]
+    rows: tuple[TradeRow, ...]
     value: float
     optimum: float
     flywheel: tuple[float, float] | None
@@ -132,7 +132,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     scale = Scale.of(problem)
     say("solving the reference")
     decided = _Decided(scale)
-    rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], Row]()
+    rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], TradeRow]()
     for name, variant in ladder(scale):
         say(name)
         # several tolerances may select the same physics
@@ -214,11 +214,11 @@ class _Decided:
         """Return the reference objective of a design, and its largest relative violation of a limit."""
         problem = self._problem
         final = reference(problem, engine)
-        value, excess = objective_value(problem, final), final.excess(problem.limits)
-        if excess <= FEASIBLE and not self.minimum <= value:
+        value, violation = objective_value(problem, final), final.violation(problem.limits)
+        if violation <= FEASIBLE and not self.minimum <= value:
             # a zero objective has no relative regret
             self.minimum = 0.0 if value <= numerical_zero(problem, engine) else value
-        return value, excess
+        return value, violation
 
     def by(self, variant: Problem) -> Engine | None:
         """Return the design that a fidelity decides; None if it finds none within the limits."""
@@ -230,25 +230,25 @@ class _Decided:
             return None if self._known is None else next_to(variant, self._known)
         return None
 
-    def regretted(self, row: Row) -> Row:
+    def regretted(self, row: TradeRow) -> TradeRow:
         """Return a row with its regret; call it after all designs are known."""
         return replace(row, regret=row.optimum / self.minimum - 1.0) if self.minimum > 0.0 else row
 
 
-def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> Row:
+def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeRow:
     """Measure a fidelity, all but its regret."""
     evaluation, truth = evaluate(variant), decided.given
     value = objective_value(variant, evaluation)
     prepared, gradient = _prepared_times(variant)
-    solve_time = optimum = excess = math.nan
+    solve_time = optimum = violation = math.nan
     if is_open(variant) and variant.fidelity.mounts != "time":
         started = time.process_time()
         engine = decided.by(variant)
         if engine is not None:
             solve_time = time.process_time() - started
-            optimum, excess = decided.of(engine)
+            optimum, violation = decided.of(engine)
     fresh = seconds(lambda: _from_nothing(variant))
-    return Row(
+    return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
         # the bound is relative to the computed value, the table to the reference
@@ -259,7 +259,7 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> Row:
         fresh=fresh,
         memory=_memory(lambda: _from_nothing(variant)),
         optimum=optimum,
-        excess=excess,
+        violation=violation,
     )
 
 

@@ -144,7 +144,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
             for each in near:
                 inside = np.concatenate([domain.project(each[domain.columns]) for domain in at.domains])
                 design = started_at(problem, (mounts.tolist(), inside))
-                if design is not None and design.excess <= 0.0:
+                if design is not None and design.violation <= 0.0:
                     assert bound <= design.value * (1.0 + 1e-7)
     assert told >= 2
 
@@ -188,12 +188,12 @@ def test_what_is_asked_may_be_crossed(kind: str) -> None:
             at = boxes.loads.at(mounts)
             columns, multipliers = best_at(at)
             design = started_at(problem, (mounts.tolist(), columns))
-            if design is not None and design.excess <= 0.0:
+            if design is not None and design.violation <= 0.0:
                 told += bound > 0.5 * design.value
                 assert bound <= design.value * (1.0 + 1e-7)
             # widened limits have multipliers too, which are so of any unbalances
             u = np.concatenate([d.project(rng.normal(size=d.width) * d.scale) for d in at.domains])
-            assert lower_bound(at, multipliers).value <= at.objective(u) or at.excess(u) > 0.0
+            assert lower_bound(at, multipliers).value <= at.objective(u) or at.violation(u) > 0.0
     assert told
 
 

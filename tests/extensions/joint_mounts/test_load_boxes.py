@@ -57,7 +57,7 @@ def test_no_design_of_a_box_is_under_its_bound_and_small_boxes_come_near(seed: i
         for share in generator.random((6, len(low))):
             values = columns(problem, lower + share * (upper - lower), numbers)
             found = evaluate(problem, problem.design(values))
-            if is_inside(problem, values) and found.excess(problem.limits) <= 0.0:
+            if is_inside(problem, values) and found.violation(problem.limits) <= 0.0:
                 assert bound <= objective_value(problem, found) * (1.0 + 1e-9)
             if widest == 1e-4 and bound < np.inf:
                 near.append(bound / objective_value(problem, found))

@@ -117,9 +117,9 @@ def test_limits_at_rest_are_over_zero_only_where_they_break(seed: int) -> None:
     for lower, upper in boxes_of(problem, generator, 300, 0.02):
         over = max(float(each.min()) for each in rest.over(lower, upper))
         design = evaluate_start(problem.changed(engine=problem.design(upper.tolist(), problem.mount_decisions)))
-        excess = max(design.standing(limit).excess for limit in problem.mount_limits)
+        violation = max(design.standing(limit).violation for limit in problem.mount_limits)
         # none is over zero where a design keeps all, and small boxes tell of what breaks one
-        assert over <= 0.0 or excess > 0.0
-        assert excess < 0.1 or over > 0.0
-        near += abs(excess) < 0.03
+        assert over <= 0.0 or violation > 0.0
+        assert violation < 0.1 or over > 0.0
+        near += abs(violation) < 0.03
     assert near

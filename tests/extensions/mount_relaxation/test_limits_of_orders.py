@@ -52,7 +52,7 @@ def drawn(problem: Problem, count: int) -> list[tuple[np.ndarray, float, float]]
     for share in generator.random((count, len(low))):
         x = low * (high / low) ** share
         each = remounted(given, problem.design(x.tolist()))
-        if each.excess(problem.limits) <= 0.0:
+        if each.violation(problem.limits) <= 0.0:
             found.append((x, objective_value(problem, each), each.value(asked_limit(problem).measure)))
     return found
 
@@ -192,7 +192,7 @@ def test_a_half_of_the_motions_may_have_nothing_open() -> None:
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
     others = [remounted(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
-    minimum = min(objective_value(problem, each) for each in others if each.excess(problem.limits) <= 0.0)
+    minimum = min(objective_value(problem, each) for each in others if each.violation(problem.limits) <= 0.0)
     assert result.certificate.lower_bound <= minimum
     assert result.objective is not None
     assert result.objective.value <= minimum * (1.0 + 1e-6)

@@ -12,7 +12,13 @@ from extensions.mount_relaxation.test_spring_bound import powertrain
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
 from laufruhe.extensions.mount_relaxation.modes import mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
-from laufruhe.extensions.mount_relaxation.program import ModeMultipliers, Multipliers, Program, Solution, proven_bound
+from laufruhe.extensions.mount_relaxation.program import (
+    ModeMultipliers,
+    SdpMultipliers,
+    SdpProgram,
+    Solution,
+    proven_bound,
+)
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
@@ -79,7 +85,7 @@ def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[
     while len(found) < count:
         x = np.clip(near * np.exp(generator.normal(0.0, 0.25, len(near))), low, high)
         each = remounted(given, problem.design(x.tolist()))
-        if each.excess(problem.limits) <= 0.0:
+        if each.violation(problem.limits) <= 0.0:
             found.append((x, objective_value(problem, each)))
     return found
 
@@ -87,7 +93,7 @@ def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[
 NEAR = np.array([90e3, 40e3, 110e3, 60e3])
 
 
-def spoilt(found: Multipliers, by: float, noise: float, generator: Any) -> Multipliers:
+def spoilt(found: SdpMultipliers, by: float, noise: float, generator: Any) -> SdpMultipliers:
     """Multipliers of caps, conditions and modes off by a factor each, and by as much as they are large."""
 
     def bad(m: np.ndarray) -> np.ndarray:
@@ -120,7 +126,7 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     half = 0.5 * (boxes.upper - boxes.lower)
     inside = [x for x, value in designs if value <= 1.1 * minimum]
     for number in (0, 2):
-        own: Program = replace(program, objective=np.eye(program.numbers + 10)[number])
+        own: SdpProgram = replace(program, objective=np.eye(program.numbers + 10)[number])
         told: Solution = stated.solve(own)
         side = mounts.straight[number]
         assert side is not None

@@ -20,7 +20,13 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import HighOrder, linear
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import Order
 from laufruhe.extensions.mount_relaxation.parameter_maps import mount_axes
-from laufruhe.extensions.mount_relaxation.program import ModeMultipliers, Multipliers, Program, Solution, mode_scores
+from laufruhe.extensions.mount_relaxation.program import (
+    ModeMultipliers,
+    SdpMultipliers,
+    SdpProgram,
+    Solution,
+    mode_scores,
+)
 from laufruhe.extensions.mount_relaxation.prover import spring_bound
 from laufruhe.extensions.mount_relaxation.response import ResponseBound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
@@ -77,7 +83,7 @@ def designs_of(
     for share in generator.random((count, len(low))):
         x = low + share * (high - low)
         each = remounted(given, problem.design(x.tolist()))
-        if each.excess(problem.limits) <= 0.0:
+        if each.violation(problem.limits) <= 0.0:
             yield x, objective_value(problem, each)
 
 
@@ -389,7 +395,7 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
             else:
                 values.append(d.lower + part * (d.upper - d.lower))
         each = evaluate(problem, problem.design(values))
-        if each.excess(problem.limits) <= 0.0:
+        if each.violation(problem.limits) <= 0.0:
             given.append((objective_value(problem, each), values))
     assert len(domains) == 2
     assert len(given) > 20
@@ -420,7 +426,7 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     right = ConeProgram.solve
 
     def spoilt(by: float, noise: float) -> Any:
-        def wrong(self: ConeProgram, program: Program, tolerances: tuple[float, float] = FINE) -> Solution:
+        def wrong(self: ConeProgram, program: SdpProgram, tolerances: tuple[float, float] = FINE) -> Solution:
             solution = right(self, program, tolerances)
             told = solution.multipliers
 
@@ -432,7 +438,7 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
             along = [[bad(each) for each in own] for own in told.lengths]
             roots = bad(told.chords), along, float(generator.uniform(0.0, by) * told.limit + noise)
             linear = bad(told.linear), bad(told.sets)
-            return replace(solution, multipliers=Multipliers(quadratics, constraints, *linear, links, *roots))
+            return replace(solution, multipliers=SdpMultipliers(quadratics, constraints, *linear, links, *roots))
 
         return wrong
 
@@ -560,7 +566,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
 
     def worth(s: np.ndarray) -> float:
         each = remounted(given, problem.design(np.clip(low * (high / low) ** s, low, high).tolist()))
-        return objective_value(problem, each) * (1.0 + 100.0 * max(each.excess(problem.limits), 0.0))
+        return objective_value(problem, each) * (1.0 + 100.0 * max(each.violation(problem.limits), 0.0))
 
     best = np.log(np.array([decision.value for decision in result.decisions]) / low) / np.log(high / low)
     starts = [0.95 * best + 0.02, *np.random.default_rng(7).random((2, 6))]

@@ -139,7 +139,7 @@ def test_no_tolerance_is_the_drawing(read: Callable[[str], Problem], problem: Pr
 
 
 def scaled(tolerances: Tolerances, factor: float) -> Tolerances:
-    return replace(tolerances, each=tuple(replace(t, scale=factor * t.scale) for t in tolerances.each))
+    return replace(tolerances, tolerances=tuple(replace(t, scale=factor * t.scale) for t in tolerances.tolerances))
 
 
 def test_more_tolerance_is_never_better(problem: Problem, result: Result) -> None:
@@ -219,7 +219,7 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
 
         def at(self, values: Sequence[complex], proven: bool) -> WorstEngines:
             drawn = evaluate(problem, problem.design(values))
-            return replace(super().at(values, proven), violation=drawn.excess(problem.limits) + 1e-3)
+            return replace(super().at(values, proven), violation=drawn.violation(problem.limits) + 1e-3)
 
     adversary = Stricter(problem, 2 * problem.fidelity.samples, 0.5 * problem.tolerance)
     solved = program.solved(angles)

@@ -11,8 +11,8 @@ import xarray as xr
 from laufruhe import load
 from laufruhe.extensions.robust.study import (
     GRAVITY,
-    Tolerance,
-    TolerancesTable,
+    StudyTolerance,
+    StudyTolerancesTable,
     _marks,
     built,
     mean_mount_forces,
@@ -42,8 +42,8 @@ def test_long_words_over_neighbouring_lines_keep_apart() -> None:
 
 def tolerances_of(
     mass: float = 0.0, unbalance: float = 0.0, planes: int = 2, alignment: float = 0.0, aligned: tuple[float, ...] = ()
-) -> TolerancesTable:
-    return TolerancesTable.model_construct(
+) -> StudyTolerancesTable:
+    return StudyTolerancesTable.model_construct(
         reciprocating_mass=mass, unbalance=unbalance, planes=planes, alignment=alignment, aligned_masses=list(aligned)
     )
 
@@ -85,7 +85,7 @@ def test_second_order_outweighs_the_worst_sum() -> None:
     six = load(PROBLEMS / "tractor-six.toml")
     cases = [{"name": name, "problem": "x.toml"} for name in ("four", "six")]
     told = {"kind": "tolerance", "name": "t", "title": "t", "tolerances": {"reciprocating_mass": "10 g"}}
-    part = Tolerance.model_validate({**told, "cases": cases})
+    part = StudyTolerance.model_validate({**told, "cases": cases})
     data = part.dataset([Point(case) for case in part.cases], [spread(one, tolerances, 700) for one in (problem, six)])
     four = data.sel(case="four")
     worst, nominal = float(four["worst"]) / KILOPOND, float(four["nominal"]) / KILOPOND

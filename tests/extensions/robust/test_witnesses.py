@@ -89,7 +89,7 @@ def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.slow
 def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
-    monkeypatch.setattr(assembly_solver._Search, "enough", property(lambda _: -math.inf))
+    monkeypatch.setattr(assembly_solver._Search, "cutoff", property(lambda _: -math.inf))
     found = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
     assert found.certificate is not None
     assert found.certificate.kind is Proof.WITHIN_GAP
@@ -104,7 +104,7 @@ def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def turned(self: Any, taken: Any) -> Iterator[Any]:
         for part in right(self, taken):
-            yield Over(self.enough) if isinstance(part, tuple) and part[0] < self.enough else part
+            yield Over(self.cutoff) if isinstance(part, tuple) and part[0] < self.cutoff else part
 
     monkeypatch.setattr(assembly_solver._Search, "parts", turned)
 

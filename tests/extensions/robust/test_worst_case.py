@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lanes import first_fast
-from laufruhe.extensions.robust.worst_case import Block, bound_part, value_at, worst_case
+from laufruhe.extensions.robust.worst_case import ErrorBlock, bound_part, value_at, worst_case
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import NORMS, Grid
 
@@ -50,7 +50,7 @@ def test_worst_of_corners_and_circles(name: str, seed: int) -> None:
 def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
     """Whole discs, arcs of them, and some intervals held."""
     random, terms = np.random.default_rng(3), [(1.0, random_norm(name, 4, 1.0))]
-    whole = [Block(own, np.eye(own.stop - own.start)) for own in COLUMNS]
+    whole = [ErrorBlock(own, np.eye(own.stop - own.start)) for own in COLUMNS]
     for centre, arc in whole[3].parts(np.zeros(5)):
         assert arc is not None
         for middle, narrow in arc.parts(centre):

@@ -351,7 +351,7 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
     for x in low + (high - low) * r.random((80, len(low))):
         design = remounted(given, problem.design(x.tolist()))
         met += design.value(OF_RUNS[1]) > 1.1e-3
-        if design.excess(problem.limits) <= 0.0:
+        if design.violation(problem.limits) <= 0.0:
             kept += 1
             assert objective_value(problem, design) >= result.certificate.lower_bound
     assert min(kept, met) > 5
@@ -387,7 +387,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
         measure = next(m for m in OF_RUNS if m.name == name)
         maximum = float(np.quantile([design.value(measure) for design in designs], 0.2))
         problem = random_problem(seed, **asked, constraints=[{"limit": name, "max": f"{maximum * scale} {unit}"}])
-    values = [objective_value(problem, d) for d in designs if d.excess(problem.limits) <= 0.0]
+    values = [objective_value(problem, d) for d in designs if d.violation(problem.limits) <= 0.0]
     value = min(values)
     result = laufruhe.solve(problem)
     assert result.certificate.lower_bound <= min(value, result.objective.value)

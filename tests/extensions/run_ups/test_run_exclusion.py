@@ -56,12 +56,12 @@ def test_what_is_excluded_no_search_meets(seed: int) -> None:
     low, high = sides(problem)
     given = evaluate(problem)
 
-    def excess(x: Array) -> float:
-        return remounted(given, problem.design(np.clip(x, low, high).tolist())).excess(problem.limits)
+    def violation(x: Array) -> float:
+        return remounted(given, problem.design(np.clip(x, low, high).tolist())).violation(problem.limits)
 
     r = np.random.default_rng(seed)
-    start = min(low + (high - low) * r.random((60, len(low))), key=excess)
-    assert minimize(excess, start, method="Nelder-Mead", options={"maxfev": 120}).fun > 0.0
+    start = min(low + (high - low) * r.random((60, len(low))), key=violation)
+    assert minimize(violation, start, method="Nelder-Mead", options={"maxfev": 120}).fun > 0.0
 
 
 @pytest.mark.slow

@@ -61,7 +61,7 @@ def test_a_linear_run_is_that_of_integration(limited: tuple[Problem, Result]) ->
         strict=True,
     ):  # fmt: skip
         mounting = mounting_in(engine)
-        told = run_through(mounting, inertia.kept(12.0), None, first, last, seconds, 60, "DOP853", 1e-9)
+        told = run_through(mounting, inertia.truncated(12.0), None, first, last, seconds, 60, "DOP853", 1e-9)
         for name in ("force", "travel", "twist"):
             assert getattr(own, name) == pytest.approx(getattr(told, name), rel=2e-3)
 
@@ -84,7 +84,7 @@ def test_run_up_limits_hold_the_proven_optimum(limited: tuple[Problem, Result]) 
     for share in rng.random(30):
         mass, real, imag = best + share * (inside - best) + rng.normal(0.0, [0.01, 3e-4, 3e-4])
         other = evaluate(problem, problem.design([max(mass, 0.0), complex(real, imag)]))
-        if other.excess(problem.limits) <= 0.0:
+        if other.violation(problem.limits) <= 0.0:
             kept += 1
             assert other.value(problem.objective[0].measure) >= result.certificate.lower_bound
     assert kept > 3

@@ -113,7 +113,7 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
         assert travel.shadow_price == pytest.approx(-force / moved, rel=5e-3)
     # what is best without the limit breaks it
     free = laufruhe.solve(problem.changed(limits=problem.limits[:1]))
-    assert not free.final.standing(problem.limits[1]).excess <= 0.0
+    assert not free.final.standing(problem.limits[1]).violation <= 0.0
     assert free.objective.value < result.objective.value
 
 
@@ -127,9 +127,9 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
     for pair in np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2).tolist():
         design = remounted(initial, problem.design(pair))
         value = objective_value(problem, design)
-        if value < 1.1 * result.objective.value and design.standing(problem.limits[0]).excess <= 0.0:
+        if value < 1.1 * result.objective.value and design.standing(problem.limits[0]).violation <= 0.0:
             looked += 1
-            if design.standing(problem.limits[1]).excess <= 0.0:
+            if design.standing(problem.limits[1]).violation <= 0.0:
                 best = min(best, value)
     assert looked > 15
     assert result.objective.value <= best * (1.0 + 1e-6) < np.inf
@@ -234,7 +234,7 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
     for stiffness in np.linspace(60e3, 400e3, 40):
         design = remounted(initial, problem.design([float(stiffness)]))
         if objective_value(problem, design) < result.objective.value * (1.0 - 2e-3):
-            assert design.standing(problem.limits[0]).excess > 0.0
+            assert design.standing(problem.limits[0]).violation > 0.0
 
 
 @pytest.mark.slow
@@ -324,7 +324,7 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
     assert result.final.value(OF_RUNS[1]) == travel.value
     assert evaluate(problem).value(OF_RUNS[1]) > travel.limit
     other = evaluate(problem, problem.design([2.0 + 0.0j, 300e3]))
-    assert other.excess(problem.limits) <= 0.0
+    assert other.violation(problem.limits) <= 0.0
     assert result.objective.value < objective_value(problem, other)
 
 

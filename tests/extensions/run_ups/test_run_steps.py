@@ -97,7 +97,7 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
 
 def test_a_run_up_in_equal_steps_is_that_of_scipy() -> None:
     mounting, load = hydraulic(0, damping=200.0), wrench(0, orders=2)
-    sized = load.each(lambda values: values / 60.0**2)
+    sized = load.mapped(lambda values: values / 60.0**2)
     steps = LinearRun(time_model(mounting), sweep_of(0.0, 60.0, 1.0))
     assert steps.is_known
     own = steps.response(steps.sweep.wrenches([(sized.orders, sized.coefficients)]))

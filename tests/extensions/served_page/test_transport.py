@@ -14,7 +14,7 @@ import pytest
 
 from laufruhe.extensions.served_page import transport
 from laufruhe.extensions.served_page.guard import HEADERS, TOKEN
-from laufruhe.extensions.served_page.transport import MOST_AT_ONCE, MOST_BYTES, Answer, Server
+from laufruhe.extensions.served_page.transport import MOST_AT_ONCE, MOST_BYTES, HttpAnswer, Server
 
 SECRET = "the problem"
 PATIENCE = 60.0
@@ -23,8 +23,8 @@ PATIENCE = 60.0
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
     made = Server(0, {"page.html": "<!doctype html>", "page.js": "0", "page.css": "p {}"})
-    made.handles["/told"] = lambda body: Answer(json.dumps({"told": SECRET, "asked": body}))
-    made.handles["/lines"] = lambda _: Answer(lines=iter(["1", "2"]))
+    made.handles["/told"] = lambda body: HttpAnswer(json.dumps({"told": SECRET, "asked": body}))
+    made.handles["/lines"] = lambda _: HttpAnswer(lines=iter(["1", "2"]))
     thread = threading.Thread(target=made.serve_forever, kwargs={"poll_interval": 0.02})
     thread.start()
     yield made
@@ -161,10 +161,10 @@ def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back
     wait_for(lambda: server._room._value == MOST_AT_ONCE)
     done, started = threading.Event(), threading.Semaphore(0)
 
-    def work(_: object) -> Answer:
+    def work(_: object) -> HttpAnswer:
         started.release()
         done.wait(PATIENCE)
-        return Answer("{}")
+        return HttpAnswer("{}")
 
     server.handles["/work"] = work
     asking = [threading.Thread(target=asked, args=(server, "/work")) for _ in range(MOST_AT_ONCE)]

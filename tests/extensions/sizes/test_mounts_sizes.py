@@ -76,11 +76,11 @@ def placed(problem: Problem, values: list[float]) -> list[complex]:
 @pytest.mark.slow
 def test_a_local_optimum_keeps_its_limits_and_no_random_design_is_better(solved: Result, problem: Problem) -> None:
     assert solved.certificate.kind is Proof.LOCAL
-    assert solved.final.excess(problem.limits) <= 1e-5
+    assert solved.final.violation(problem.limits) <= 1e-5
     rng = np.random.default_rng(1)
     for _ in range(150):
         evaluation = evaluate(problem, problem.design(placed(problem, random_design(problem, rng))))
-        if evaluation.excess(problem.limits) <= 0.0:
+        if evaluation.violation(problem.limits) <= 0.0:
             assert objective_value(problem, evaluation) >= solved.objective.value * (1.0 - 1e-6)
         # the bound knows nothing of stresses
         assert objective_value(problem, evaluation) >= solved.certificate.lower_bound

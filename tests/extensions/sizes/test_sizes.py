@@ -166,7 +166,7 @@ def test_boxes_bound_what_is_in_them() -> None:
                 evaluation.value(problem.objective[0].measure), rel=1e-9
             )
             assert evaluation.value(problem.objective[0].measure) >= bound * (1.0 - 1e-9)
-            allowed = evaluation.excess(problem.limits) <= 0.0
+            allowed = evaluation.violation(problem.limits) <= 0.0
             assert not (allowed and dropped)
             if allowed:
                 assert cut is not None
@@ -393,7 +393,7 @@ def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
     for _ in range(60):
         x = np.clip(found * (1.0 + 0.02 * rng.standard_normal(2)), model.lower, model.upper)
         evaluation = evaluate(problem, problem.design(x.tolist()))
-        if evaluation.excess(problem.limits) <= 0.0:
+        if evaluation.violation(problem.limits) <= 0.0:
             kept += 1
             assert evaluation.value(problem.objective[0].measure) >= result.certificate.lower_bound
     assert kept > 10

@@ -216,7 +216,7 @@ def test_a_peak_between_the_angles_breaks_its_limit() -> None:
     kept = [value for value in values.values() if value <= allowed]
     assert (result.status in (Status.OPTIMAL, Status.FEASIBLE)) == bool(kept)
     if kept:
-        assert result.final.excess(result.problem.limits) <= 1e-5
+        assert result.final.violation(result.problem.limits) <= 1e-5
 
 
 def test_time_that_runs_out_proves_nothing() -> None:

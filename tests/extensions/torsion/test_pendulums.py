@@ -13,7 +13,7 @@ import pytest
 import laufruhe
 from lanes import first_fast
 from laufruhe.extensions.torsion.boxes import TwistBoxes
-from laufruhe.extensions.torsion.machine import Absorber, Disc, Section, Torsion
+from laufruhe.extensions.torsion.machine import Absorber, Disc, ShaftSection, Torsion
 from laufruhe.extensions.torsion.physics import critical_modes, natural_modes
 from laufruhe.problem.evaluation import evaluate
 
@@ -57,7 +57,7 @@ def crankshaft(rng: np.random.Generator) -> Torsion:
     """Return discs with rubber rings and pendulums of several orders on them."""
     count = int(rng.integers(2, 5))
     discs = tuple(Disc(f"d{k}", float(rng.uniform(0.05, 0.5))) for k in range(count))
-    sections = tuple(Section(f"s{k}", float(rng.uniform(2e5, 2e6))) for k in range(count - 1))
+    sections = tuple(ShaftSection(f"s{k}", float(rng.uniform(2e5, 2e6))) for k in range(count - 1))
     hung = []
     for k in range(int(rng.integers(1, 4))):
         on, inertia = f"d{rng.integers(count)}", float(rng.uniform(0.002, 0.02))
@@ -80,7 +80,7 @@ def test_an_order_meets_modes_where_the_determinant_vanishes(seed: int) -> None:
 def test_a_pendulum_stands_its_disc_still_in_its_order() -> None:
     """The rest of the crankshaft swings against it as against a wall."""
     own = Torsion(
-        (Disc("a", 0.1), Disc("b", 0.2)), (Section("s", 4e5),), (Absorber("pendulum", "a", 0.004, order=2.5),)
+        (Disc("a", 0.1), Disc("b", 0.2)), (ShaftSection("s", 4e5),), (Absorber("pendulum", "a", 0.004, order=2.5),)
     )  # fmt: skip
     met = critical_modes(own, 2.5)
     assert math.tau * met.frequencies == pytest.approx([math.sqrt(4e5 / 0.2)])
@@ -89,7 +89,7 @@ def test_a_pendulum_stands_its_disc_still_in_its_order() -> None:
 
 def test_modes_without_pendulums_are_the_same_in_every_order() -> None:
     own = Torsion(
-        (Disc("a", 0.1), Disc("b", 0.2), Disc("c", 0.9)), (Section("s", 4e5), Section("t", 7e5)),
+        (Disc("a", 0.1), Disc("b", 0.2), Disc("c", 0.9)), (ShaftSection("s", 4e5), ShaftSection("t", 7e5)),
         (Absorber("ring", "a", 0.01, stiffness=2e4), Absorber("fluid", "b", 0.01, damping=3.0)),
     )  # fmt: skip
     assert critical_modes(own, 3.0).frequencies == pytest.approx(natural_modes(own, 70.0).frequencies, rel=1e-12)
@@ -104,7 +104,7 @@ def test_the_critical_speed_of_a_two_disc_crank_with_a_pendulum() -> None:
     assert limit.value == pytest.approx(by_hand, rel=1e-9)
     assert by_hand * RPM == pytest.approx(5535.8, abs=0.05)
     assert limit.active
-    assert result.final.excess(result.problem.limits) > 1e-3
+    assert result.final.violation(result.problem.limits) > 1e-3
 
 
 def test_no_flywheel_of_the_bounds_leaves_the_forbidden_band() -> None:
@@ -130,12 +130,12 @@ def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
         ends = np.sort(rng.uniform(boxes.coordinates.lower, boxes.coordinates.upper, (2, 2)), axis=0)
         (bound,), _ = boxes.bounds(ends[:1], ends[1:])
         inside = [evaluate(problem, problem.design(rng.uniform(*ends).tolist())) for _ in range(12)]
-        keeps = [each.excess((own,)) <= 0.0 for each in inside]
+        keeps = [each.violation((own,)) <= 0.0 for each in inside]
         told[math.isinf(bound)] += 1
         assert not (math.isinf(bound) and any(keeps))
         # a narrow enough box of designs that all break it is excluded
         point = rng.uniform(*ends)
         (thin,), _ = boxes.bounds(point[None] * (1.0 - 1e-7), point[None] * (1.0 + 1e-7))
-        at = evaluate(problem, problem.design(point.tolist())).excess((own,))
+        at = evaluate(problem, problem.design(point.tolist())).violation((own,))
         assert math.isinf(thin) == (at > 0.0) or abs(at) < 1e-5
     assert min(told.values()) > 3

@@ -11,7 +11,7 @@ from scipy.linalg import eigh
 
 import laufruhe
 from laufruhe.errors import ModelError
-from laufruhe.extensions.torsion.machine import Absorber, Disc, Section, Torsion, stiffness_of
+from laufruhe.extensions.torsion.machine import Absorber, Disc, ShaftSection, Torsion, stiffness_of
 from laufruhe.extensions.torsion.physics import (
     absorber_heat,
     chain_of,
@@ -36,7 +36,7 @@ from problem_files import PROBLEMS
 def chain(inertias: list[float], stiffness: list[float], *absorbers: Absorber, **kept: float) -> Torsion:
     discs = tuple(Disc(f"{k}", j, kept.get("damping", 0.0)) for k, j in enumerate(inertias))
     loss = kept.get("loss_factor", 0.0)
-    return Torsion(discs, tuple(Section(f"{k}", s, loss_factor=loss) for k, s in enumerate(stiffness)), absorbers)
+    return Torsion(discs, tuple(ShaftSection(f"{k}", s, loss_factor=loss) for k, s in enumerate(stiffness)), absorbers)
 
 
 def random_chain(seed: int, discs: int = 6) -> Torsion:
@@ -137,7 +137,7 @@ def test_any_mechanism_drives_its_throw(name: str) -> None:
     discs = [Disc("front", 0.01), Disc("rear", 0.3)]
     parts = [Disc(part.name, 0.02, cylinders=(part.name,)) for part in problem.engine.slider_cranks]
     own = (discs[0], *parts, discs[1])
-    engine = problem.engine.with_extra(Torsion(own, tuple(Section(d.name, 1e5) for d in own[1:])))
+    engine = problem.engine.with_extra(Torsion(own, tuple(ShaftSection(d.name, 1e5) for d in own[1:])))
     together = throw_torques(engine, problem.points[0]).coefficients.sum(axis=1)
     whole = crank_torque(engine, problem.points[0]).rebased(engine.cycle.base_order).coefficients
     count = min(len(together), len(whole))
@@ -311,8 +311,8 @@ def test_scaling() -> None:
 def test_a_chain_that_cannot_be() -> None:
     for wrong, said in (
         (lambda: Disc("a", 0.0), "must be positive"),
-        (lambda: Section("a", 0.0), "stiffness of 0"),
-        (lambda: Section("a", 1.0, diameter=0.02, bore=0.02), "bore"),
+        (lambda: ShaftSection("a", 0.0), "stiffness of 0"),
+        (lambda: ShaftSection("a", 1.0, diameter=0.02, bore=0.02), "bore"),
         (lambda: Absorber("a", "0", 0.0, damping=1.0), "no inertia"),
         (lambda: Absorber("a", "0", 1.0), "nothing holds"),
         (lambda: chain([1.0], []), "two discs"),

@@ -84,10 +84,10 @@ def test_a_shaft_under_a_limit_of_its_frequencies() -> None:
     result = laufruhe.solve(problem)
     grid = np.linspace(0.040, 0.060, 41)
     values = {float(d): value_at(problem, [d]) for d in grid}
-    kept = [v for d, v in values.items() if evaluate(problem, problem.design([d])).excess(problem.limits) <= 0.0]
+    kept = [v for d, v in values.items() if evaluate(problem, problem.design([d])).violation(problem.limits) <= 0.0]
     assert 0 < len(kept) < len(grid)
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
-    assert result.final.excess(problem.limits) <= 1e-6
+    assert result.final.violation(problem.limits) <= 1e-6
     assert result.objective.value <= min(kept) * (1.0 + 1e-6)
     assert result.certificate.lower_bound <= result.objective.value
     # without the limit there is more freedom

@@ -97,7 +97,7 @@ def test_boxes_of_a_limit_that_no_design_keeps() -> None:
         excluded += 1
         for share in rng.random((3, 2)):
             design = problem.design(own.decisions(low + share * (high - low)).tolist())
-            assert evaluate(problem, design).excess(problem.limits) > 0.0
+            assert evaluate(problem, design).violation(problem.limits) > 0.0
     assert 0 < excluded < 60
 
 

@@ -45,7 +45,7 @@ _FREE = {
 }
 
 
-class Claim(Table):
+class SourceClaim(Table):
     """What a source says about a set of shafts; it is confirmed or not."""
 
     says: Judgement | None = None
@@ -54,13 +54,13 @@ class Claim(Table):
     where: str = f.optional("Figure or passage of the source.", "")
 
     @model_validator(mode="after")
-    def _says_something(self) -> Claim:
+    def _says_something(self) -> SourceClaim:
         if self.says is None and self.falls_by is None:
             raise f.refusal("has no claim; give says, falls_by, or both")
         return self
 
 
-NO_CLAIM = Claim.model_construct()
+NO_CLAIM = SourceClaim.model_construct()
 _SERIES: tuple[p.Colour, ...] = ("blue", "vermilion", "green", "purple", "orange", "sky")
 
 
@@ -70,7 +70,7 @@ class BuildTable(Table):
     name: Name
     case: Name | None = f.optional("Case that has these shafts; the first by default.")
     shafts: list[Name] = f.optional("Balancer shafts that are built; none makes the plain engine of another case.", [])
-    claim: Claim | None = None
+    claim: SourceClaim | None = None
 
     @model_validator(mode="after")
     def _is_not_plain(self) -> BuildTable:

@@ -30,7 +30,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Around, Box, BoxResult, BoxSearch
+from laufruhe.prove.best_first import Around, BoundedBoxes, Box, BoxResult
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
@@ -158,7 +158,7 @@ class DesignBoxes:
             for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True)
         )
         pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, limits))
-        if value < self.value and problem.excess(columns) <= FEASIBLE:
+        if value < self.value and problem.violation(columns) <= FEASIBLE:
             evaluate_design = self._judge(mounts, columns)
             if evaluate_design < self.value:
                 self.value, self.best = evaluate_design, (mounts, columns)
@@ -321,7 +321,7 @@ def _concavity(values: Array) -> Array:
     return np.array(out)
 
 
-class _VertexBranching(BoxSearch):
+class _VertexBranching(BoundedBoxes):
     """Branch and bound with designs at vertices as incumbents."""
 
     def __init__(self, search: DesignBoxes, room: float, known: Known | None = None) -> None:

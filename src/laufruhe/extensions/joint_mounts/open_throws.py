@@ -70,7 +70,9 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
 
     Gas loads depend on throws nonlinearly, and open bank angles, pins or shafts are no throws.
     """
-    unknown = problem.feels_gas or problem.fidelity.is_uneven or any(phasing.opened) or phasing.shafts.optional
+    unknown = (
+        problem.feels_gas or problem.fidelity.is_uneven or any(phasing.is_geometry_open) or phasing.shafts.optional
+    )
     if phasing.throw_bounds is None or unknown:
         return None
     realised, rides = (

@@ -32,7 +32,7 @@ def corner_answers(question: Question) -> Iterator[BoxResult]:
 
     def judge(mounts: Array, columns: Array) -> float:
         design = started_at(problem, (mounts.tolist(), columns))
-        if design is None or design.excess > 0.0:
+        if design is None or design.violation > 0.0:
             return math.inf
         return design.value - over_read(problem, design.evaluation)
 

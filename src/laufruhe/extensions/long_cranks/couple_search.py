@@ -110,7 +110,7 @@ class _Search:
 
     def __init__(self, space: StarSpace, objective: CoupleObjective, best: BestStars) -> None:
         self.space, self.objective, self.best = space, objective, best
-        self.nothing = NEGLIGIBLE * objective.upper_bound(space)
+        self.zero_level = NEGLIGIBLE * objective.upper_bound(space)
         self.looked_at, self.ended = 0, False
 
     def run(self) -> None:
@@ -118,7 +118,7 @@ class _Search:
 
         Pieces and rounds do not depend on the workers, so the result does not either.
         """
-        if self.best.cut <= self.nothing:
+        if self.best.cut <= self.zero_level:
             return
         work = work_of(self.space)
         self.ended = work > MOST

@@ -25,8 +25,8 @@ from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.even_search import (
-    Answer,
     EvenDesign,
+    EvenStarResult,
     amplitudes,
     can_list,
     listed_answer,
@@ -47,7 +47,7 @@ def solve_long_cranks(problem: Problem) -> Result:
     return solve_phasing(problem, search_long)
 
 
-def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
     """Return the best designs of all even stars, by what suits objective and size (S18)."""
     if can_list(problem, families):
         return search_even(problem, phasing, families)
@@ -71,7 +71,7 @@ def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
     return None if objective is None else StarAmplitudes(objective.orders, objective.terms)
 
 
-def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer | None:
+def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult | None:
     """Evaluate stars with little couple, then all that may be better (S46, S48).
 
     None where stars differ by more than their couples, or anything else is open.
@@ -97,7 +97,7 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
 
 def _evaluate_stars(
     problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
-) -> Answer:  # fmt: skip
+) -> EvenStarResult:  # fmt: skip
     """Return stars with their values; complete if the best of them meets the bound of every even star (S40)."""
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
@@ -113,7 +113,7 @@ def _evaluate_stars(
         designs.append(EvenDesign.of_steps(phasing, family, steps, (), value, bound, is_proven))
     designs.sort(key=lambda design: design.value)
     method = "star without couples, which leaves what every even one has"
-    return Answer(tuple(designs), bound, complete, len(designs), method)
+    return EvenStarResult(tuple(designs), bound, complete, len(designs), method)
 
 
 def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
@@ -125,9 +125,9 @@ def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
     return best_starts(replace(family.space, mirror=True, reflect=True), objective, phasing.best).stars
 
 
-def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
     """Return the best star that exchanges of throws lead to, bounded by its own dual rows over all stars (S44, S14)."""
-    nothing = numerical_zero(problem)
+    zero_level = numerical_zero(problem)
     answers = []
     for family in families:
         is_simple = _amplitudes(phasing, family) is not None
@@ -140,15 +140,15 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         first = min(starts, key=values.__getitem__, default=family.first)
         built = min(phasing.shafts.allowed, key=lambda some: coarse_value(model, first, some, owners))
         star = improved(model, first, built, owners)
-        design, cut = solve_design(model, star, built, owners, problem.tolerance, nothing)
+        design, cut = solve_design(model, star, built, owners, problem.tolerance, zero_level)
         if design is None or cut is None:
-            answers.append(Answer((), 0.0, False, 1, "exchanges of throws"))
+            answers.append(EvenStarResult((), 0.0, False, 1, "exchanges of throws"))
             continue
         bound = cut.minimum(space)
-        done = gap_of(design.value, bound, nothing) <= 2.0 * problem.tolerance
+        done = gap_of(design.value, bound, zero_level) <= 2.0 * problem.tolerance
         method = f"exchanges of throws at {model.samples} angles"
         best = EvenDesign.of_steps(phasing, family, design.star, design.built, design.value, design.bound, done)
-        answers.append(Answer((best,), bound, done, 1, method))
+        answers.append(EvenStarResult((best,), bound, done, 1, method))
     return merge_answers(answers, phasing.best)
 
 

@@ -25,9 +25,9 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import (
 )
 from laufruhe.extensions.mount_relaxation.orders import EpigraphVariable, MeasureOrders, Order
 from laufruhe.extensions.mount_relaxation.program import (
-    Program,
     QuadraticBound,
     RootTerm,
+    SdpProgram,
     Solution,
     mode_scores,
     proven_bound,
@@ -62,7 +62,7 @@ class BoxRelaxation:
         The relaxation of the whole problem.
     query
         The norm.
-    upper_norm, enough
+    upper_norm, cutoff
         The number that the norm is not over, and the bound at which no better one is sought.
     """
 
@@ -72,7 +72,7 @@ class BoxRelaxation:
         self, search: SdpRelaxation, query: MeasureOrders, ends: tuple[float, float], lower: Array, upper: Array
     ) -> None:
         self.search, self.query, self.lower, self.upper = search, query, lower, upper
-        self.upper_norm, self.enough = ends
+        self.upper_norm, self.cutoff = ends
         self.parts = search.parts(lower, upper)
         self.mounts = self.parts[0]
         self._solution_s = np.zeros(self.mounts.numbers)
@@ -106,7 +106,7 @@ class BoxRelaxation:
             self.roots[k] = max(self.roots[k], units[k] * math.sqrt(max(squared_root, 0.0)))
         result = self._bound_mean(variables, self.roots)
         is_all = np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
-        if result[0] < self.enough and is_all:
+        if result[0] < self.cutoff and is_all:
             if self.hides_mean(variables):
                 self.roots = self._narrow_roots(variables, self.roots)
                 result = max(result, self._bound_mean(variables, self.roots), key=lambda each: each[0])
@@ -115,7 +115,7 @@ class BoxRelaxation:
 
     def _bound_mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> tuple[float, Array, Array | None]:
         mean = self._mean(variables, roots)
-        if mean.floor >= self.enough:
+        if mean.floor >= self.cutoff:
             return mean.floor, np.zeros(len(self.lower)), None
         bound, scores, middle = self._solve(variables, mean.prices, mean)
         bound = max(bound + mean.constant, mean.floor)
@@ -126,8 +126,8 @@ class BoxRelaxation:
                 high = self._high_order(order)
                 if high is not None:
                     weight = variable.share * variable.factor / multiple / len(self.query.mounts)
-                    for j, excess in enumerate(high.looseness(self._solution_s) * weight):
-                        self._score(loose, [j], float(excess))
+                    for j, violation in enumerate(high.looseness(self._solution_s) * weight):
+                        self._score(loose, [j], float(violation))
         return bound, joint_scores(scores, loose, self.upper_norm - bound), middle
 
     def _narrow_roots(self, variables: Sequence[EpigraphVariable], known: Array) -> Array:
@@ -216,7 +216,7 @@ class BoxRelaxation:
         scores = self._branching_scores(orders, responses, solution)
         return size * proven_bound(program, solution.multipliers), scores, middle
 
-    def cut_off(self, variables: Sequence[EpigraphVariable], known: Array) -> Program:
+    def cut_off(self, variables: Sequence[EpigraphVariable], known: Array) -> SdpProgram:
         """Return the constraints of designs whose norm is not over its upper bound."""
         if _is_single(variables):
             uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
@@ -229,7 +229,7 @@ class BoxRelaxation:
 
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
-    ) -> tuple[Program, list[Response]]:
+    ) -> tuple[SdpProgram, list[Response]]:
         """Return the program of these variables at these prices, and the responses to its orders."""
         quadratics: list[QuadraticBound] = []
         responses: list[Response] = []
@@ -254,7 +254,7 @@ class BoxRelaxation:
                 constraints += stiffness_constraints(mounts, responses[0].size)
         terms = self.search.limits.terms(variables, self._state, responses)
         responses += terms.responses
-        program = Program(
+        program = SdpProgram(
             tuple(response.size for response in responses), tuple(response.reaches for response in responses),
             self.mounts.numbers, responses[0].columns,
             np.append(0.0 * prices if roots else prices, np.zeros(len(terms.uppers))),

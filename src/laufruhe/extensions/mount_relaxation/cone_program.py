@@ -24,10 +24,10 @@ from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.program import (
     ModeMultipliers,
-    Multipliers,
-    Program,
     QuadraticBound,
     RootTerm,
+    SdpMultipliers,
+    SdpProgram,
     Solution,
     proven_bound,
 )
@@ -62,7 +62,7 @@ class ConeProgram:
     of every order and of every mode.
     """
 
-    def __init__(self, program: Program) -> None:
+    def __init__(self, program: SdpProgram) -> None:
         self.program = program
         self.rows: list[Any] = []
         self.right: list[Array] = []
@@ -217,7 +217,7 @@ class ConeProgram:
         modes = [each[0, 0, 1:] for each in solution.modes]
         return proven_bound(program, solution.multipliers), np.concatenate([solution.s, *modes])
 
-    def solve(self, program: Program, tolerances: tuple[float, float] = FINE) -> Solution:
+    def solve(self, program: SdpProgram, tolerances: tuple[float, float] = FINE) -> Solution:
         """Return multipliers and moments of a program with the same constraints, whatever the solver says of them."""
         x, z, value = self._solver(tolerances).solve(self._cost(program))
         parts: _Parts = defaultdict(list)
@@ -228,7 +228,7 @@ class ConeProgram:
             # the vectors of the cones, beside their first number, order by order
             vectors = iter(parts["lengths", number])
             lengths.append([-np.array([next(vectors)[1:] for _ in rows]) for _, rows in root.rows])
-        multipliers = Multipliers(
+        multipliers = SdpMultipliers(
             [matrix_of(part, bound.size) for part, bound in zip(parts["quadratics"], program.quadratics, strict=True)],
             [matrix_of(part, own.size) for part, own in zip(parts["constraints"], program.constraints, strict=True)],
             _joined(parts["linear"]),
@@ -256,7 +256,7 @@ class ConeProgram:
         (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
         return ModeMultipliers(matrices, sides, -equal, corners, [*zip(above, under, strict=True)])
 
-    def _cost(self, program: Program) -> Array:
+    def _cost(self, program: SdpProgram) -> Array:
         cost = np.zeros(int(self.modes[-1]))
         cost[: len(program.prices)] = program.prices
         for number, (at, root) in enumerate(zip(self.roots, program.roots, strict=False)):

@@ -158,8 +158,8 @@ class Chord:
     def looseness(self, s: Array) -> Array:
         """Return the excess over the number at s, shared by the change that every s makes."""
         reach = np.abs(self.slopes)
-        excess = self.bound(s).near - abs(self.constant + float(self.slopes @ s))
-        return np.asarray(max(excess, 0.0) * reach / max(float(reach.sum()), 1e-300))
+        violation = self.bound(s).near - abs(self.constant + float(self.slopes @ s))
+        return np.asarray(max(violation, 0.0) * reach / max(float(reach.sum()), 1e-300))
 
 
 def _place_deflections(mounts: OpenMounts, m: int, load: ComplexArray) -> list[ComplexArray]:

@@ -116,7 +116,7 @@ class LinearLimit:
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class SdpProgram:
     """Objective and constraints of a relaxation.
 
     Attributes
@@ -164,7 +164,7 @@ class Program:
 
 
 @dataclass(frozen=True, eq=False)
-class Multipliers:
+class SdpMultipliers:
     """Multipliers of a program.
 
     Attributes
@@ -203,14 +203,14 @@ class ModeMultipliers:
 class Solution:
     """A solver's multipliers, s, moments of orders and modes, and value; infinite where it finds no point."""
 
-    multipliers: Multipliers
+    multipliers: SdpMultipliers
     s: Array
     moments: Sequence[Array]
     value: float
     modes: Sequence[Array] = ()
 
 
-def proven_bound(program: Program, multipliers: Multipliers) -> float:
+def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
     """Return the lower bound of a program that multipliers prove, whatever they are (E44)."""
     remainders, bound = [np.zeros((d, d)) for d in program.sizes], 0.0
     objective, mode_objectives = program.slopes
@@ -301,7 +301,7 @@ def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, m
     return priced.sum(axis=1), np.asarray((priced.sum(axis=0) + plain)[1:])
 
 
-def _scaled_to_prices(program: Program, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
+def _scaled_to_prices(program: SdpProgram, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
     # multipliers of the quadratic bounds take the price of each epigraph variable
     uppers = program.uppers
     positive = [_psd_part(multiplier) for multiplier in multipliers]

@@ -164,11 +164,11 @@ def _prove_levels(
         if divided.bound < level:
             places = divided.places
             break
-    if known is not None and 0.0 < bound < relaxation.enough:
+    if known is not None and 0.0 < bound < relaxation.cutoff:
         # at the last level the box of the best design was compared with it
         check_around(_Around(root_search, known), known.place, known)
     count = relaxation.mount_numbers
-    candidates = (*relaxation.candidates, *places) if bound < relaxation.enough else ()
+    candidates = (*relaxation.candidates, *places) if bound < relaxation.cutoff else ()
     return BoxResult(bound, spent, tuple(place[:count] for place in candidates))
 
 
@@ -190,9 +190,9 @@ class _Narrowing(BoxBisection):
         self._search, self._maximum, self._root_bound, self.spent = search, maximum, root_bound, 0
 
     @property
-    def enough(self) -> float:
+    def cutoff(self) -> float:
         """Bound from which a box holds no design that is worth looking for."""
-        return self._search.enough
+        return self._search.cutoff
 
     @property
     def level(self) -> float:
@@ -219,10 +219,10 @@ class _Narrowing(BoxBisection):
             before, best = best, max(best, bound)
             if self.known is not None and self.holds(Box(lower, upper, 0)):
                 self.known.check(self.what, best)
-            if best >= self.enough:
+            if best >= self.cutoff:
                 return Over(min(best, self.level))
             if before > -math.inf:
-                narrows = best - before >= PROGRESS * (self.enough - before)
+                narrows = best - before >= PROGRESS * (self.cutoff - before)
             if self.spent >= self._maximum or passed() or not scores.any() or not narrows:
                 return best, Box(lower, upper, int(np.argmax(scores)), narrows)
             box, solved = narrowed(self._search, lower, upper, scores)

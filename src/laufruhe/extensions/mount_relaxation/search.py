@@ -22,7 +22,7 @@ from laufruhe.extensions.mount_relaxation.orders import (
     measure_orders,
 )
 from laufruhe.extensions.mount_relaxation.parameter_maps import PlaneFrames
-from laufruhe.extensions.mount_relaxation.program import Program
+from laufruhe.extensions.mount_relaxation.program import SdpProgram
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, response_of
 from laufruhe.extensions.mount_relaxation.speculation import Ahead
 from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts
@@ -73,7 +73,7 @@ class SdpRelaxation:
     def __init__(
         self, problem: Problem, value: float, room: float, near: Sequence[Value], ahead: Ahead | None = None
     ) -> None:
-        self.problem, self.value, self.enough, self.ahead = problem, value, value - NEARLY * room, ahead
+        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - NEARLY * room, ahead
         lower, upper = sides_of(problem.mount_decisions)
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._frames = number_ranges(problem, self._near, self._near)[0]
@@ -190,7 +190,7 @@ class SdpRelaxation:
         if self._stiffness_boxes is not None:
             count = len(self._near)
             known = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
-        bound, scores = (known, np.zeros(len(lower))) if known >= self.enough else self.relax(lower, upper)
+        bound, scores = (known, np.zeros(len(lower))) if known >= self.cutoff else self.relax(lower, upper)
         return max(known, bound), scores
 
     def relax(self, lower: Array, upper: Array) -> tuple[float, Array]:
@@ -210,10 +210,10 @@ class SdpRelaxation:
 
     def _box(self, term: int, lower: Array, upper: Array) -> BoxRelaxation:
         weight, query = self._terms[term]
-        ends = (self.value - self._constant) / weight, (self.enough - self._constant) / weight
+        ends = (self.value - self._constant) / weight, (self.cutoff - self._constant) / weight
         return BoxRelaxation(self, query, ends, lower, upper)
 
-    def cut_off(self, lower: Array, upper: Array) -> tuple[Program, OpenMounts]:
+    def cut_off(self, lower: Array, upper: Array) -> tuple[SdpProgram, OpenMounts]:
         """Return the constraints by the first term of designs of a box that are not over the value."""
         box = self._box(0, lower, upper)
         # bounds of the roots on the last box hold in all of it
@@ -224,7 +224,7 @@ class SdpRelaxation:
     def under(self, value: float) -> SdpRelaxation:
         """Return the relaxation of designs that are better than a value, without orders that this hardly needs."""
         relaxation = copy(self)
-        relaxation.value = relaxation.enough = value
+        relaxation.value = relaxation.cutoff = value
         relaxation._variables = [
             [replace(variable, orders=self._needed(variable, value)) for variable in variables]
             for variables in self._variables
@@ -246,8 +246,8 @@ class SdpRelaxation:
     def _needed(self, variable: EpigraphVariable, value: float) -> tuple[Order, ...]:
         size = np.array([float(np.sum(np.abs(order.signal) ** 2)) for order in variable.orders])
         rest = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
-        enough = rest <= OMITTED * (1.0 - value / self.value)
-        return variable.orders[: int(np.argmax(enough)) + 1] if enough.any() else variable.orders
+        cutoff = rest <= OMITTED * (1.0 - value / self.value)
+        return variable.orders[: int(np.argmax(cutoff)) + 1] if cutoff.any() else variable.orders
 
     def response(self, mounts: OpenMounts, order: Order, bound: ResponseBound, lower: Array, upper: Array) -> Response:
         """Return the response to an order, in units of the best design or of the next to it in the box."""

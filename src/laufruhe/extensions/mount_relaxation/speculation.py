@@ -11,7 +11,7 @@ from typing import TypeAlias
 from uuid import uuid4
 
 from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
-from laufruhe.extensions.mount_relaxation.program import Program
+from laufruhe.extensions.mount_relaxation.program import SdpProgram
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.workers import Speculation, speculation
 
@@ -47,7 +47,7 @@ def bounds_ahead() -> AbstractContextManager[Ahead]:
 class Objectives:
     """Objectives of one program; every worker has a copy of it, so that all return the same."""
 
-    def __init__(self, program: Program, ahead: Ahead | None) -> None:
+    def __init__(self, program: SdpProgram, ahead: Ahead | None) -> None:
         self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead
         if ahead is not None:
             ahead.discard()

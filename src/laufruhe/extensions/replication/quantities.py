@@ -11,7 +11,7 @@ import numpy as np
 
 from laufruhe.extensions.replication.expressions import check_name
 from laufruhe.files import fields as f
-from laufruhe.files.measures import QuantityTable, Scene
+from laufruhe.files.measures import MeasureContext, QuantityTable
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import turning_amplitudes
@@ -81,7 +81,7 @@ def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
     if name.startswith(DECISION):
         values = {decision.name: decision.value for decision in result.decisions}
         return Labelled(values.get(name.removeprefix(DECISION), math.nan), {})
-    scene = Scene(result.final.engine, result.problem.points)
+    scene = MeasureContext(result.final.engine, result.problem.points)
     found = list(result.final.values(scene.measure(name, table, "quantities.quantity")))
     return Labelled(found, {"number": list(range(1, len(found) + 1))}) if len(found) > 1 else Labelled(found[0], {})
 

@@ -10,5 +10,5 @@ EXTENSION = Extension(
     reductions=tuple(f"{_HERE}.reductions:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
     sections=tuple(f"{_HERE}.section:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
     pictures=tuple(f"{_HERE}.section:{name}_PICTURE" for name in ("TOLERANCES", "ASSEMBLY")),
-    study_kinds=(f"{_HERE}.study:Tolerance",),
+    study_kinds=(f"{_HERE}.study:ToleranceStudy",),
 )

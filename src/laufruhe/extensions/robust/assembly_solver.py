@@ -77,7 +77,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
             value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.WHOLE, 0.0,
             f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
         )  # fmt: skip
-    met = final.excess(problem.limits) <= KEPT
+    met = final.violation(problem.limits) <= KEPT
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     found = Result(
         problem=problem, status=status if met else Status.FAILED,
@@ -186,13 +186,13 @@ class _Search(BranchAndBound[Chosen]):
         )
 
     @property
-    def enough(self) -> float:
+    def cutoff(self) -> float:
         """Bound from which no assembly of a node is better by half the tolerance."""
         return self.value * (1.0 - 0.5 * self.tolerance)
 
     def is_fathomed(self, one: OpenNode[Chosen]) -> bool:
         """Return whether no assembly of it is better by half the tolerance."""
-        return one.bound >= self.enough
+        return one.bound >= self.cutoff
 
     def parts(self, taken: Sequence[OpenNode[Chosen]]) -> Parts[Chosen]:
         """Yield the parts left for the cylinder that counts most of those without one."""
@@ -231,7 +231,7 @@ class _Search(BranchAndBound[Chosen]):
             end = self._mass(corner)
             best = max(best, value + float(slope @ (end - point)))
             self._try(corner)
-            if best >= self.enough or value - best <= 0.1 * self.tolerance * value:
+            if best >= self.cutoff or value - best <= 0.1 * self.tolerance * value:
                 break
             tried = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
             point = point + min(tried)[1] * (end - point)

@@ -148,7 +148,7 @@ def _price_tolerances(
 ) -> tuple[PricedTolerance, ...]:
     """Return every tolerance with its price, the dearest first."""
     told = []
-    for tolerance in tolerances_of(problem).each:
+    for tolerance in tolerances_of(problem).tolerances:
         wide, narrow = (
             _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP)
         )
@@ -215,10 +215,10 @@ def robust_result(
     timing: dict[str, float],
 ) -> Result:
     """Return the result of a design for built engines; `given` is of the one given."""
-    met = max(found.violation, design.excess) <= KEPT
-    nothing = numerical_zero(problem, design.evaluation.engine)
+    met = max(found.violation, design.violation) <= KEPT
+    zero_level = numerical_zero(problem, design.evaluation.engine)
     certificate = certified(
-        found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
+        found.bound, shown.bound, zero_level, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
     )
     prices: dict[Limit, float] = {}
     for limit, price in (priced for own in active.prices for priced in own):

@@ -117,7 +117,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         drawing = solve(problem.drawing)
     nonzero = tolerances_of(problem).nonzero
     without = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
-    if without or not nonzero.each:
+    if without or not nonzero.tolerances:
         return replace(drawing, problem=problem)
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalances_of(problem, drawing))
@@ -143,20 +143,20 @@ def _decide(
 ) -> tuple[Adversary, RobustDesign]:
     """Return the adversary that fits the tolerances, and the best design against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
-    nothing, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
+    zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
         every = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
-        return every, _minimise_worst_case(problem, every, start, nothing)
+        return every, _minimise_worst_case(problem, every, start, zero_level)
     if over.share is None:
         drawn = SampledEngines(problem, tolerances.draw(random, over.engines), samples)
-        return drawn, _minimise_worst_case(problem, drawn, start, nothing)
+        return drawn, _minimise_worst_case(problem, drawn, start, zero_level)
     drawn = SampledEngines(problem, tolerances.draw_mirrored(random, over.engines), samples)
-    found = _minimise_share(problem, drawn, start, over.share, nothing)
+    found = _minimise_share(problem, drawn, start, over.share, zero_level)
     # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     found = replace(found, bound=bound if problem.decisions else found.found.bound)
     for _ in in_time(range(READINGS)):
-        if not is_over(found.bound, found.found.bound, nothing):
+        if not is_over(found.bound, found.found.bound, zero_level):
             break
         drawn = replace(drawn, samples=fine_samples(found.samples))
         level = _quantile(drawn, found.values, over.share)
@@ -203,8 +203,8 @@ def _method(problem: Problem, found: RobustDesign) -> str:
 class _Program:
     """The cone program of several sets of errors, as they join."""
 
-    def __init__(self, problem: Problem, nothing: float) -> None:
-        self.problem, self.nothing, self.samples = problem, nothing, problem.fidelity.samples
+    def __init__(self, problem: Problem, zero_level: float) -> None:
+        self.problem, self.zero_level, self.samples = problem, zero_level, problem.fidelity.samples
         self.errors: list[Array] = []
         self.models: list[AffineModel] = []
         self.shares: list[float] = []
@@ -283,7 +283,7 @@ class _Program:
 
 
 def _minimise_worst_case(
-    problem: Problem, adversary: Adversary, start: tuple[Value, ...], nothing: float
+    problem: Problem, adversary: Adversary, start: tuple[Value, ...], zero_level: float
 ) -> RobustDesign:
     """Return the design whose worst engine is least, from a given one (R8)."""
     found = adversary.at(start, proven=not problem.decisions)
@@ -292,8 +292,8 @@ def _minimise_worst_case(
         # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
         engine = evaluate_built(with_errors(problem, found.errors[0]), start, adversary.samples)
         best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=found.broken)
-        return _refine_sampling(adversary, best, nothing)
-    program, values, bound = _Program(problem, nothing), start, 0.0
+        return _refine_sampling(adversary, best, zero_level)
+    program, values, bound = _Program(problem, zero_level), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
     for _ in in_time(range(MOST_ROUNDS)):
@@ -320,22 +320,22 @@ def _minimise_worst_case(
         values, own = solved
         bound, level = max(bound, own), program.level(values)
         found = adversary.at(values, proven=False)
-        if gap_of(found.value, bound, nothing) <= problem.tolerance and found.violation <= FEASIBLE:
+        if gap_of(found.value, bound, zero_level) <= problem.tolerance and found.violation <= FEASIBLE:
             found = adversary.at(values, proven=True)
         each = RobustDesign(
             values, found, bound, program.active, len(program.errors), samples, adversary.samples, program.margin
         )
         best = min(best, each, key=lambda one: (one.found.violation > KEPT, one.found.value))
-        if gap_of(found.bound, bound, nothing) <= problem.tolerance and found.violation <= FEASIBLE:
+        if gap_of(found.bound, bound, zero_level) <= problem.tolerance and found.violation <= FEASIBLE:
             break
     if not best.found.proven or best.samples < adversary.samples:
         best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
-    return _refine_sampling(adversary, replace(_keep_limits(program, adversary, best), bound=bound), nothing)
+    return _refine_sampling(adversary, replace(_keep_limits(program, adversary, best), bound=bound), zero_level)
 
 
-def _refine_sampling(adversary: Adversary, best: RobustDesign, nothing: float) -> RobustDesign:
+def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float) -> RobustDesign:
     for _ in in_time(range(READINGS)):
-        if not is_over(best.bound, best.found.bound, nothing):
+        if not is_over(best.bound, best.found.bound, zero_level):
             break
         adversary = replace(adversary, samples=fine_samples(best.samples))
         best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
@@ -364,7 +364,7 @@ def _quantile(adversary: SampledEngines, values: Sequence[Value], share: float) 
 
 
 def _minimise_share(
-    problem: Problem, adversary: SampledEngines, start: tuple[Value, ...], share: float, nothing: float
+    problem: Problem, adversary: SampledEngines, start: tuple[Value, ...], share: float, zero_level: float
 ) -> RobustDesign:
     """Return the design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
     below = math.ceil(share * len(adversary.errors))
@@ -372,7 +372,7 @@ def _minimise_share(
     for _ in in_time(range(OUTER)):
         order = np.argsort(adversary.objective(values), kind="stable")
         lower_share = adversary.subset(order[:below])
-        each = _minimise_worst_case(problem, lower_share, values, nothing)
+        each = _minimise_worst_case(problem, lower_share, values, zero_level)
         if best is not None and each.found.value >= best.found.value * (1.0 - SAME):
             break
         best, values = each, each.values

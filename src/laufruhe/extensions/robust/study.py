@@ -48,7 +48,7 @@ _TOP, _STEP = -0.55, 0.3
 """Where the words above all rows stand, the first one lowest, in rows."""
 
 
-class TolerancesTable(Table):
+class StudyTolerancesTable(Table):
     """How far a built engine may differ from its drawing."""
 
     reciprocating_mass: f.Mass = f.optional("Tolerance of the reciprocating mass of each cylinder, either way.", 0.0)
@@ -60,7 +60,7 @@ class TolerancesTable(Table):
     )
 
     @model_validator(mode="after")
-    def _is_something(self) -> TolerancesTable:
+    def _is_something(self) -> StudyTolerancesTable:
         aligned = self.alignment * sum(self.aligned_masses)
         if not self.reciprocating_mass + self.unbalance + aligned > 0.0:
             raise f.refusal("leave nothing to chance; give one above zero (alignment needs aligned_masses)")
@@ -102,23 +102,23 @@ def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array
     return np.array([forces - drawn for forces in each]).reshape(tolerances.count, steps, 2)
 
 
-def worst_parts(engine: Engine, speed: float, tolerances: TolerancesTable) -> dict[str, float]:
+def worst_parts(engine: Engine, speed: float, tolerances: StudyTolerancesTable) -> dict[str, float]:
     """Bound the free force [N] of each kind of tolerance, all of that kind at their limits (R4).
 
     Unbalances may point anywhere, so the parts add up to the worst of all together.
     """
     found, own = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0)
     added = _added_forces(engine, speed, found)
-    for cause in found.each:
+    for cause in found.tolerances:
         slope = np.ascontiguousarray(np.moveaxis(added[found.columns_of(cause.name)], 0, -1))
-        nothing, steps = np.zeros(slope.shape[:2]), len(slope)
-        norm = AffineNorm(MAXIMUM, nothing, slope, Grid(np.full(steps, 1.0 / steps), steps))
+        zero, steps = np.zeros(slope.shape[:2]), len(slope)
+        norm = AffineNorm(MAXIMUM, zero, slope, Grid(np.full(steps, 1.0 / steps), steps))
         columns = Tolerances((cause,)).columns
         own[cause.name] = worst_case([(1.0, norm)], columns, CLOSE).bound
     return own
 
 
-def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, builds: int, seed: int) -> Array:
+def random_forces(engine: Engine, speed: float, tolerances: StudyTolerancesTable, builds: int, seed: int) -> Array:
     """Return the largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
@@ -130,13 +130,15 @@ def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, bui
     return np.concatenate([np.hypot(forces[..., 0], forces[..., 1]).max(axis=1) for forces in pieces])
 
 
-def built(engine: Engine, tolerances: TolerancesTable, random: np.random.Generator) -> Engine:
+def built(engine: Engine, tolerances: StudyTolerancesTable, random: np.random.Generator) -> Engine:
     """Return one engine out of many, for the exact model."""
     found = tolerances.of(engine)
     return _built(engine, found, found.draw(random, 1)[0])
 
 
-def mean_mount_forces(problem: Problem, tolerances: TolerancesTable, builds: int, seed: int) -> tuple[float, Array]:
+def mean_mount_forces(
+    problem: Problem, tolerances: StudyTolerancesTable, builds: int, seed: int
+) -> tuple[float, Array]:
     """Return the mean mount force [N] of the engine as drawn, and of each of many as built."""
     random = np.random.default_rng(seed)
     drawn = evaluate(problem).value(MEAN_MOUNT_FORCE)
@@ -144,7 +146,7 @@ def mean_mount_forces(problem: Problem, tolerances: TolerancesTable, builds: int
     return drawn, np.array([evaluate(problem, engine).value(MEAN_MOUNT_FORCE) for engine in engines])
 
 
-def spread(problem: Problem, tolerances: TolerancesTable, builds: int = 10_000, seed: int = 1964) -> Record:
+def spread(problem: Problem, tolerances: StudyTolerancesTable, builds: int = 10_000, seed: int = 1964) -> Record:
     """Return what tolerances do to the free force of one engine [N], at its crank speed [rad/s].
 
     The largest over the cycle of the drawing (`nominal`), the worst that each cause adds, the mean of what is added at
@@ -192,12 +194,12 @@ class MarkTable(Table):
     force: f.Force
 
 
-class Tolerance(Part):
+class ToleranceStudy(Part):
     """Free forces that manufacturing tolerances leave, at their worst and at random."""
 
     kind: Literal["tolerance"]
     cases: list[ToleranceCase] = Field(min_length=1)  # type: ignore[assignment]
-    tolerances: TolerancesTable
+    tolerances: StudyTolerancesTable
     engines: Annotated[int, Field(ge=100, le=1_000_000)] = f.optional("Number of engines that are drawn.", 10_000)
     seed: Annotated[int, Field(ge=0)] = 1964
     marks: list[MarkTable] = Field(default_factory=list)

@@ -241,21 +241,21 @@ class Tolerances:
 
     Attributes
     ----------
-    each
+    tolerances
         In the order of the file.
     """
 
-    each: tuple[Tolerance, ...]
+    tolerances: tuple[Tolerance, ...]
 
     @property
     def nonzero(self) -> Tolerances:
         """Tolerances but those of no size."""
-        return replace(self, each=tuple(t for t in self.each if t.size * t.scale > 0.0))
+        return replace(self, tolerances=tuple(t for t in self.tolerances if t.size * t.scale > 0.0))
 
     @cached_property
     def errors(self) -> tuple[Error, ...]:
         """Errors of all tolerances."""
-        return tuple(error for tolerance in self.each for error in tolerance.errors)
+        return tuple(error for tolerance in self.tolerances for error in tolerance.errors)
 
     @cached_property
     def columns(self) -> tuple[slice, ...]:
@@ -276,7 +276,7 @@ class Tolerances:
     def columns_of(self, name: str) -> slice:
         """Return the columns of one tolerance in the vector of all errors."""
         start = 0
-        for tolerance in self.each:
+        for tolerance in self.tolerances:
             width = sum(error.width for error in tolerance.errors)
             if tolerance.name == name:
                 return slice(start, start + width)
@@ -285,12 +285,12 @@ class Tolerances:
 
     def scaled(self, name: str, factor: float) -> Tolerances:
         """Return all with one of them so many times as wide."""
-        each = tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.each)
-        return replace(self, each=each)
+        tolerances = tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.tolerances)
+        return replace(self, tolerances=tolerances)
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
         """Return errors of many engines, shape (count, columns)."""
-        return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.each)], axis=1)
+        return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.tolerances)], axis=1)
 
     def draw_mirrored(self, random: np.random.Generator, count: int) -> Array:
         """Return errors of as many engines, half of them the others with every error turned round (R9)."""
@@ -301,7 +301,7 @@ class Tolerances:
         """Return the drawing of engines with these errors, shape (columns,); numbers of a file draw it anew."""
         moves: list[tuple[ErrorDrive, complex]] = []
         at = iter(self.columns)
-        for tolerance in self.each:
+        for tolerance in self.tolerances:
             for error in tolerance.errors:
                 own = errors[next(at)] * tolerance.scale
                 value = complex(own[0], own[1] if error.width > 1 else 0.0)

@@ -89,7 +89,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
     if not count:
         return WorstCase(np.zeros(0), best[0], best[0], 0)
     search = _ErrorSearch(terms, tolerance, best)
-    blocks = [Block(own, np.eye(own.stop - own.start)) for own in columns]
+    blocks = [ErrorBlock(own, np.eye(own.stop - own.start)) for own in columns]
     root = bound_part(terms, np.zeros(count), blocks, best[0], search.reaches)
     search.improve(_climb(terms, columns, root.errors))
     bound = search.divide((-root.bound, _Part(np.zeros(count), blocks, root.split)), maximum)
@@ -112,11 +112,11 @@ class _Around:
     columns: Sequence[slice]
     what: str = "errors that no engine exceeds"
 
-    def around(self, errors: Array) -> tuple[Array, list[Block]]:
+    def around(self, errors: Array) -> tuple[Array, list[ErrorBlock]]:
         """Return a centre and thin blocks about it that reach some errors."""
-        return (1.0 - THIN) * errors, [Block(own, THIN * np.eye(own.stop - own.start)) for own in self.columns]
+        return (1.0 - THIN) * errors, [ErrorBlock(own, THIN * np.eye(own.stop - own.start)) for own in self.columns]
 
-    def bound(self, part: tuple[Array, list[Block]]) -> float:
+    def bound(self, part: tuple[Array, list[ErrorBlock]]) -> float:
         """Return the lower bound of the negative sum over a part."""
         return -bound_part(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
 
@@ -126,7 +126,7 @@ class _Part:
     """Node of the search: a centre, free blocks, and the number of the block to divide next."""
 
     centre: Array
-    blocks: list[Block]
+    blocks: list[ErrorBlock]
     split: int
 
 
@@ -179,7 +179,7 @@ def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class ErrorBlock:
     """A free error: local numbers in an interval of -1 to 1 each, or in the unit disc.
 
     Attributes
@@ -201,7 +201,7 @@ class Block:
         """Return whether its local numbers lie in the unit disc and not in intervals."""
         return self.arc is None and len(self.spans) > 1
 
-    def parts(self, centre: Array) -> list[tuple[Array, Block | None]]:
+    def parts(self, centre: Array) -> list[tuple[Array, ErrorBlock | None]]:
         """Return centres and free blocks that together hold every extreme point."""
         if len(self.spans) == 1:
             ends = [centre.copy(), centre.copy()]
@@ -213,14 +213,14 @@ class Block:
         middle, half = self.arc
         return [self._arc(centre, middle + side * 0.5 * half, 0.5 * half) for side in (-1.0, 1.0)]
 
-    def _arc(self, centre: Array, middle: float, half: float) -> tuple[Array, Block]:
+    def _arc(self, centre: Array, middle: float, half: float) -> tuple[Array, ErrorBlock]:
         along = np.array([np.cos(middle), np.sin(middle)])
         across = np.array([-along[1], along[0]])
         near = float(np.cos(half))
         moved = centre.copy()
         moved[self.columns] = 0.5 * (1.0 + near) * along
         spans = np.stack([0.5 * (1.0 - near) * along, np.sin(half) * across], axis=1)
-        return moved, Block(self.columns, spans, (middle, half))
+        return moved, ErrorBlock(self.columns, spans, (middle, half))
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +232,7 @@ class PartBound:
     errors: Array
 
 
-def bound_part(terms: Terms, centre: Array, blocks: Sequence[Block], enough: float, reaches: Reaches) -> PartBound:
+def bound_part(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, reaches: Reaches) -> PartBound:
     """Bound the sum of norms over a part of the errors from above (R5, R6).
 
     Parameters
@@ -241,7 +241,7 @@ def bound_part(terms: Terms, centre: Array, blocks: Sequence[Block], enough: flo
         Weights and norms.
     centre
         Errors about which the blocks are free, shape (columns,).
-    enough
+    cutoff
         Bound at which no better one is sought.
     reaches
         What blocks move, one cache per term; filled here.
@@ -262,7 +262,7 @@ def bound_part(terms: Terms, centre: Array, blocks: Sequence[Block], enough: flo
             best, local = above, at
         reached = [lengths(part.rows + part.moves @ at) for part in parts]
         value = sum(part.value(sizes) for part, sizes in zip(parts, reached, strict=True))
-        if best <= enough or best <= value * (1.0 + ROUNDING):
+        if best <= cutoff or best <= value * (1.0 + ROUNDING):
             break
         touched = [(a * k + b) / (k + 1) for a, b in zip(touched, reached, strict=True)]
     errors, at_block = centre.copy(), 0
@@ -294,7 +294,7 @@ class _TermAbout:
     """
 
     def __init__(
-        self, weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[Block], cached: dict[_Key, _Reach]
+        self, weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[ErrorBlock], cached: dict[_Key, _Reach]
     ) -> None:
         self.weight, self.norm, self.blocks = weight, norm, blocks
         self.rows = norm.rows(centre)
@@ -328,7 +328,7 @@ class _TermAbout:
 
 
 def _over_majorants(
-    parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[Block]
+    parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[ErrorBlock]
 ) -> tuple[float, Array]:
     """Return a bound of the quadratic majorants over all local numbers, and where it stands, shape (n,).
 
@@ -427,7 +427,7 @@ Reaches: TypeAlias = Sequence[dict[_Key, _Reach]]
 """Reach of blocks of each term, which does not change with the centre."""
 
 
-def _reach(norm: AffineNorm, block: Block, cached: dict[_Key, _Reach]) -> _Reach:
+def _reach(norm: AffineNorm, block: ErrorBlock, cached: dict[_Key, _Reach]) -> _Reach:
     key = block.columns.start, block.arc
     if key not in cached:
         move = norm.slope[..., block.columns] @ block.spans

@@ -11,7 +11,7 @@ from laufruhe import units
 from laufruhe.errors import KeyedError
 from laufruhe.extensions.rotary.unit import FLANKS, RotaryUnit
 from laufruhe.machine.engine import Cycle
-from laufruhe.machine.layouts.base import SPACING, Key
+from laufruhe.machine.layouts.base import SPACING, LayoutKey
 from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.layouts.inline import Inline
 from laufruhe.machine.slider_crank import SliderCrank
@@ -43,11 +43,11 @@ class Rotary(Inline):
     has_pistons = False
     keys = (
         SPACING,
-        Key("eccentricity", "positive length", "Eccentricity of the shaft under every rotor."),
-        Key("rotor_radius", "positive length", "Distance from a rotor's centre to its apexes."),
-        Key("rotor_width", "positive length", "Width along the shaft."),
-        Key("rotor_mass", "mass", "Mass of a rotor with its seals; rotating_mass is that of the eccentric."),
-        Key("rotor_inertia", "inertia", "Moment of inertia of a rotor about its centre.", 0.0),
+        LayoutKey("eccentricity", "positive length", "Eccentricity of the shaft under every rotor."),
+        LayoutKey("rotor_radius", "positive length", "Distance from a rotor's centre to its apexes."),
+        LayoutKey("rotor_width", "positive length", "Width along the shaft."),
+        LayoutKey("rotor_mass", "mass", "Mass of a rotor with its seals; rotating_mass is that of the eccentric."),
+        LayoutKey("rotor_inertia", "inertia", "Moment of inertia of a rotor about its centre.", 0.0),
     )
 
     def cycle(self, said: Cycle) -> Cycle:
@@ -69,8 +69,9 @@ class Rotary(Inline):
                 raise KeyedError(key, "is missing; add it")
         shortest, radius = FLANKS * own["eccentricity"], own["rotor_radius"]
         if radius <= shortest:
-            rule = f"does not let the rotor turn, it must be over three eccentricities, {units.shown(shortest, 'm')}"
-            raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.shown(radius, "m"))
+            limit = units.quantity_text(shortest, "m")
+            rule = f"does not let the rotor turn, it must be over three eccentricities, {limit}"
+            raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.quantity_text(radius, "m"))
         return RotorMechanism(
             own["eccentricity"], math.inf, 0.0, rod_rotating_mass=own["rotor_mass"], rotor_radius=radius,
             rotor_width=own["rotor_width"], rotor_inertia=own["rotor_inertia"], **shared,

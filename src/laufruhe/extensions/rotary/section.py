@@ -19,9 +19,9 @@ def _chambers(result: Result) -> Table:
     for point in result.problem.points:
         for part in rotors_of(result.final.engine):
             chambers = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
-            nothing = np.full_like(chambers.volume, math.nan)
+            undefined = np.full_like(chambers.volume, math.nan)
             pressure, torque = (
-                nothing if quantity is None else quantity for quantity in (chambers.pressure, chambers.torque)
+                undefined if quantity is None else quantity for quantity in (chambers.pressure, chambers.torque)
             )
             for k, columns in enumerate(zip(chambers.volume, pressure, torque, strict=True)):
                 values = np.column_stack([np.degrees(chambers.angles), *columns]).tolist()

@@ -44,7 +44,10 @@ class RotaryUnit(SliderCrank):
         if self.rotor_width <= 0.0 or self.rotor_inertia < 0.0:
             raise ModelError(f"{self.name}: the rotor's width must be positive and its inertia not negative")
         if self.rotor_radius <= FLANKS * self.crank_radius:
-            radius, lower = units.shown(self.rotor_radius, "m"), units.shown(FLANKS * self.crank_radius, "m")
+            radius, lower = (
+                units.quantity_text(self.rotor_radius, "m"),
+                units.quantity_text(FLANKS * self.crank_radius, "m"),
+            )
             raise ModelError(
                 f"{self.name}: the rotor cannot turn, its radius of {radius} must be over three eccentricities, {lower}"
             )

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.extensions.run_ups.dampers import Maps, mapped, pairs_of
 from laufruhe.extensions.run_ups.matrices import Rows, RunMatrices
 from laufruhe.extensions.run_ups.moments import RunMoments
-from laufruhe.extensions.run_ups.motion import FARTHEST, REACH, Equations, Motion, Steps, equations, motion_of
+from laufruhe.extensions.run_ups.motion import FARTHEST, REACH, MotionEquations, RunMotion, Steps, equations, motion_of
 from laufruhe.extensions.run_ups.peaks import RunPeaks, parabola_tops
 from laufruhe.extensions.run_ups.stopped_run import QUICKEST, quickest
 from laufruhe.load_models.simulated import simulated_measures
@@ -83,10 +83,10 @@ class RunBoxes:
                 getattr(out, name)[which] = getattr(bounds, name)
         return out
 
-    def _equations(self, lower: Array, upper: Array) -> Equations:
+    def _equations(self, lower: Array, upper: Array) -> MotionEquations:
         return equations(self._model, self._matrices, self._scale, lower, upper)
 
-    def _under(self, measure: Measure, of: Equations) -> LinearBound:
+    def _under(self, measure: Measure, of: MotionEquations) -> LinearBound:
         maps_of, d = self._rows[measure]
         maps = mapped(maps_of, of.above, of.halves, of.turn, of.roots)
         looks = [_Look(of, run, maps, d).under() for run in self._runs]
@@ -132,7 +132,7 @@ class _Look:
         Maps from motion to the signal of a measure, d rows a place.
     """
 
-    def __init__(self, of: Equations, run: RunMoments, maps: Maps, d: int) -> None:
+    def __init__(self, of: MotionEquations, run: RunMoments, maps: Maps, d: int) -> None:
         self._of, self._run, self._maps, self._d = of, run, maps, d
         self._steps = Steps(of, run.step)
 
@@ -174,7 +174,7 @@ class _Look:
         seen = self._rows(self._maps.position, self._maps.rate) @ z
         return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
 
-    def _of_motion(self, motion: Motion) -> LinearBound:
+    def _of_motion(self, motion: RunMotion) -> LinearBound:
         maps, pairs = self._maps, self._steps.pairs
         at_middle, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
         value = at_middle @ motion.middle
@@ -224,7 +224,7 @@ class _Look:
         moving = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
         return np.asarray(np.hypot(position, moving[..., None]))
 
-    def _further(self, motion: Motion, by: Array) -> Array:
+    def _further(self, motion: RunMotion, by: Array) -> Array:
         # largest signal of both orders beyond the second, shape (boxes, places, times)
         maps, n = self._maps, self._of.softest.shape[-1]
         if maps.is_constant:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from laufruhe.extensions.run_ups.linear_run import Response
+from laufruhe.extensions.run_ups.linear_run import RunResponse
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import RunUp, missed_share, point_of, runs_of
 from laufruhe.machine import Engine
@@ -39,10 +39,12 @@ class RunChannel(NumberChannel):
     of_loads: bool = False
     simulation: str = "laufruhe.extensions.run_ups.simulation"
     missed: Callable[[Engine], float] = _missed
-    part: Callable[[Response], Array] = field(kw_only=True)
+    part: Callable[[RunResponse], Array] = field(kw_only=True)
 
 
-def _maximum(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
+def _maximum(
+    name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[RunResponse], Array]
+) -> RunChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         run = evaluation.engine.extra(Run)
         if run is None or not evaluation.loads:

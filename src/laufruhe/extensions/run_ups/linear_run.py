@@ -73,7 +73,7 @@ class Sweep:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class RunResponse:
     """Motion of the mounts and the block at equal steps of time.
 
     Attributes
@@ -143,13 +143,13 @@ class LinearRun:
         out.real[:, 1:], out.imag[:, 1:] = driving.real @ wrenches, driving.imag @ wrenches
         return out
 
-    def response_of(self, states: ComplexArray) -> Response:
+    def response_of(self, states: ComplexArray) -> RunResponse:
         """Return the motion from the modes after every step, shape (m, steps + 1)."""
         shapes = self.modes[1]
         y, rate = np.split(shapes.real @ states.real - shapes.imag @ states.imag, 2)
-        return Response(self.model, y, rate)
+        return RunResponse(self.model, y, rate)
 
-    def response(self, wrenches: Array) -> Response:
+    def response(self, wrenches: Array) -> RunResponse:
         """Return the motion from rest under wrenches of `Sweep.wrenches`."""
         return self.response_of(_stepped(self.driven(wrenches), np.exp(self.modes[0] * self.sweep.step)))
 

@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.extensions.run_ups.dampers import Linear, LinearMaps
-from laufruhe.extensions.run_ups.linear_run import Response
+from laufruhe.extensions.run_ups.linear_run import RunResponse
 from laufruhe.extensions.run_ups.peaks import signal_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.time_model import time_model
@@ -67,8 +67,8 @@ class RunMatrices:
         beyond = (
             getattr(loss, k) - self.loss_factor * getattr(stiffness, k) for k in ("lowest", "slopes")
         )  # fmt: skip
-        nothing = Linear(np.zeros_like(loss.lowest), np.zeros_like(loss.slopes))
-        return LinearMaps(nothing, Linear(*beyond), nothing)
+        zero = Linear(np.zeros_like(loss.lowest), np.zeros_like(loss.slopes))
+        return LinearMaps(zero, Linear(*beyond), zero)
 
     def maps_of(self, measure: Measure) -> Rows:
         """Return the maps of a measure, one place after the other, and the rows of a place."""
@@ -82,8 +82,8 @@ class RunMatrices:
             return self._seen(measure, no_drag, self._padded(drag), True)
 
         def linear(name: str) -> Linear:
-            nothing = moving(np.zeros((len(no_drag), 6)))
-            by_side = [moving(self._model.slopes[name][j]) - nothing for j in range(count)]
+            zero = moving(np.zeros((len(no_drag), 6)))
+            by_side = [moving(self._model.slopes[name][j]) - zero for j in range(count)]
             return Linear(moving(self._lowest(name)), np.array(by_side))
 
         springs = [at_rest(self._padded(slope)) - at_rest(no_drag) for slope in self._model.slopes["springs"]]
@@ -91,14 +91,14 @@ class RunMatrices:
         return maps, self._shape(measure)[-1]
 
     def _seen(self, measure: Measure, forces: Array, drag: Array, moves: bool) -> Array:
-        one, nothing = np.eye(self.size), np.zeros((self.size, self.size))
+        one, zero = np.eye(self.size), np.zeros((self.size, self.size))
         model = replace(self.base, forces=forces, drag=drag)
-        signal = signal_of(measure, Response(model, *((nothing, one) if moves else (one, nothing))))
+        signal = signal_of(measure, RunResponse(model, *((zero, one) if moves else (one, zero))))
         return np.asarray(signal.reshape(self.size, -1).T)
 
     def _shape(self, measure: Measure) -> tuple[int, ...]:
-        nothing = np.zeros((self.size, 1))
-        return signal_of(measure, Response(self.base, nothing, nothing)).shape
+        zero = np.zeros((self.size, 1))
+        return signal_of(measure, RunResponse(self.base, zero, zero)).shape
 
     def _lowest(self, name: str) -> Array:
         return np.asarray(self._model.at(name, self._model.lower[None])[0])

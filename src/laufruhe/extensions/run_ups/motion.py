@@ -37,7 +37,7 @@ ALIKE = 1e8
 
 
 @dataclass(frozen=True, eq=False)
-class Equations:
+class MotionEquations:
     """Equations of motion on boxes, in the modes of their middles; y is counted in 1 / `scale`.
 
     Attributes
@@ -78,7 +78,7 @@ class Equations:
         return len(self.halves)
 
 
-def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> Equations:
+def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> MotionEquations:
     """Return the equations of motion on boxes, shapes (boxes, open numbers)."""
     above, halves, n = 0.5 * (lower + upper) - model.lower, 0.5 * (upper - lower), matrices.size
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
@@ -99,7 +99,7 @@ def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array
     is_held &= np.linalg.eigvalsh(softest)[:, 0] > 0.0
     load = np.swapaxes(turn, 1, 2) @ matrices.base.load
     drives = _drives(beyond, matrices.loss_factor * _root(corner))
-    return Equations(
+    return MotionEquations(
         scale, above, halves, turn, root_maps, maps, matrix, _under(first), _under(second),
         np.pad(load, [(0, 0), (n, 0), (0, 0)]), softest, drives, is_held & _is_resolved(matrix, scale),
     )  # fmt: skip
@@ -129,7 +129,7 @@ def _is_resolved(matrix: Array, scale: float) -> Mask:
 
 
 @dataclass(frozen=True, eq=False)
-class Motion:
+class RunMotion:
     """Motion over boxes at the ends of long steps, from rest on.
 
     Attributes
@@ -149,7 +149,7 @@ class Motion:
 class Steps:
     """Long steps on boxes: matrices from motion and from moments of the load to the motion after a step."""
 
-    def __init__(self, of: Equations, step: float, orders: bool = True) -> None:
+    def __init__(self, of: MotionEquations, step: float, orders: bool = True) -> None:
         self.of, self.step = of, step
         self.pairs = pairs_of(of.halves.shape[1]) if orders else []
         first, second = (of.first, of.second) if orders else (of.first[:, :0], of.second[:, :0])
@@ -201,7 +201,7 @@ def _followed(moves: Array, driven: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(out, (0, 1, 2, 3), (3, 0, 2, 1)))
 
 
-def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> Motion:
+def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> RunMotion:
     """Return the motion on boxes, each under its own moments.
 
     Parameters
@@ -219,10 +219,10 @@ def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> Mo
     added = h * (0.5 * (at_ends[:, 1:] + at_ends[:, :-1]) + between)
     left = np.concatenate([np.zeros((of.count, 1)), np.cumsum(added, axis=1)], axis=1)
     times = h * np.arange(left.shape[1])
-    return Motion(middle, first, second, left * np.exp(of.drives[:, None] * times))
+    return RunMotion(middle, first, second, left * np.exp(of.drives[:, None] * times))
 
 
-def _force(of: Equations, middle: Array, first: Array, second: Array) -> Array:
+def _force(of: MotionEquations, middle: Array, first: Array, second: Array) -> Array:
     # bound of |f| over the boxes at the ends of steps, shape (boxes, times)
     n = middle.shape[1] // 2
     total = np.zeros((of.count, middle.shape[-1]))
@@ -236,7 +236,7 @@ def _force(of: Equations, middle: Array, first: Array, second: Array) -> Array:
 
 
 def _between(
-    of: Equations, h: float, middle: Array, first: Array, second: Array, pushes: Array, highest: Array
+    of: MotionEquations, h: float, middle: Array, first: Array, second: Array, pushes: Array, highest: Array
 ) -> Array:
     """Return a bound of the mean of |f| over a step beyond that of its ends, shape (boxes, steps).
 

@@ -48,12 +48,12 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     bounded = divides(problem) and bounds_runs(problem)
     search.run()
     was_searched = bool(search.optima) and not stopped and not alone
-    if was_searched and search.best is not None and search.best.design.excess <= NEAR:
+    if was_searched and search.best is not None and search.best.design.violation <= NEAR:
         search.refined()
     divided = divided_by(problem, search, False) if bounded else BoxResult(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     best = search.chosen
-    if best is None or best.design.excess > KEPT:
+    if best is None or best.design.violation > KEPT:
         conflict = conflict_of(problem) if divided.bound == math.inf else ()
         result = infeasible_result(problem, initial, conflict, timing)
         return result if conflict else _none(problem, search, best, result)
@@ -94,7 +94,7 @@ def _none(problem: Problem, search: MountSearch, best: SearchResult | None, resu
     names, miss = "the limits", ""
     if best is not None:
         names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, best.design.evaluation))
-        miss = f" (nearest misses by {best.design.excess:.3g} of a limit)"
+        miss = f" (nearest misses by {best.design.violation:.3g} of a limit)"
     starts = sum(optimum.starts for optimum in search.optima)
     message = f"no design found: from {starts} starts none keeps {names}{miss}; relax it, or open more"
     return replace(result, status=Status.FAILED, message=message)

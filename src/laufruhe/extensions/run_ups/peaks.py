@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.run_ups.channels import RunChannel
-from laufruhe.extensions.run_ups.linear_run import Response, Sweep
+from laufruhe.extensions.run_ups.linear_run import RunResponse, Sweep
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import STRETCHES, point_of, run_loads, sweep_of
 from laufruhe.extensions.run_ups.stopped_run import responses_to
@@ -209,7 +209,7 @@ class RunPeaks:
         return out
 
 
-def signal_of(measure: Measure, response: Response) -> Array:
+def signal_of(measure: Measure, response: RunResponse) -> Array:
     """Return what a measure is the largest length of, shape (times, places, d)."""
     channel = measure.channel
     if not isinstance(channel, RunChannel):

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.run_ups.linear_run import Response, Sweep
+from laufruhe.extensions.run_ups.linear_run import RunResponse, Sweep
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.stopped_run import responses_to
 from laufruhe.machine import Engine, OperatingPoint
@@ -126,7 +126,7 @@ def missed_share(run: Run) -> float:
 def run_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
     """Return the wrench of inertia per square of crank speed, and that of the gas, of the orders of a run (E28)."""
     inertia, gas = split_loads(engine, point, fidelity)
-    return inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
+    return inertia.truncated(HIGHEST), None if gas is None else gas.truncated(HIGHEST)
 
 
 # what stands on other mounts is driven by the same loads
@@ -139,7 +139,7 @@ def _wrenches(sweep: Sweep, engine: Engine, point: OperatingPoint, fidelity: Fid
     return sweep.wrenches([(part.orders, part.coefficients) for part in parts])
 
 
-def _envelope(response: Response, first: float, last: float) -> RunUp:
+def _envelope(response: RunResponse, first: float, last: float) -> RunUp:
     signals = (response.force, response.travel, response.twist)
     edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]

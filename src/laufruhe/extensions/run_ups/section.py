@@ -14,7 +14,7 @@ from laufruhe.present.numbers import RPM, figure
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
-from laufruhe.units import shown
+from laufruhe.units import quantity_text
 
 HEAD = ("", "time", "largest force", "largest travel", "largest roll")
 
@@ -29,7 +29,9 @@ def _tables(result: Result) -> list[Table]:
          figure(envelope.worst_twist, "rad"))
         for name, time, envelope in (("run-up", run.up, up), ("shut-down", run.down, down))
     )  # fmt: skip
-    note = f"On any mount, between rest and {shown(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
+    note = (
+        f"On any mount, between rest and {quantity_text(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
+    )
     return [Table(HEAD, rows, title="Through resonance", note=note, file="through-resonance")]
 
 

@@ -17,7 +17,7 @@ def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, roughly: 
     """Return the peaks of measures of run-ups; roughly: without bump stops, which cost most."""
     if roughly:
         mounts = (
-            mount.each(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
+            mount.mapped(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
             for mount in problem.engine.mounts
         )
         problem = replace(problem, engine=replace(problem.engine, mounts=tuple(mounts)))

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.linear_run import BLOCK, LinearRun, Response, Sweep
+from laufruhe.extensions.run_ups.linear_run import BLOCK, LinearRun, RunResponse, Sweep
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
@@ -69,7 +69,7 @@ class _Side:
 
 def responses_to(
     models: Sequence[TimeModel | None], sweep: Sweep, wrenches: Sequence[Array]
-) -> list[Response | None]:  # fmt: skip
+) -> list[RunResponse | None]:  # fmt: skip
     """Return the motion of each design under wrenches of `Sweep.wrenches`; None where steps fail.
 
     With bump stops they are followed side by side, so that one without an answer leaves all without.

@@ -18,7 +18,7 @@ _FEW = 2
 """Broken limits that a claim names before it counts the others."""
 
 
-class Kind(StrEnum):
+class ClaimKind(StrEnum):
     """Strength of a claim."""
 
     PROVEN = "proven"
@@ -84,7 +84,7 @@ class Claim:
         True if the solution for these settings is complete.
     """
 
-    kind: Kind
+    kind: ClaimKind
     position: int
     lead: str
     words: str
@@ -130,7 +130,7 @@ def preview_claim(
     limits
         Values of the design for all limits of the whole problem.
     """
-    kind = Kind.HELD if simpler else Kind.ESTIMATE
+    kind = ClaimKind.HELD if simpler else ClaimKind.ESTIMATE
     lead = f"Estimate {figure(value, problem.objective_unit or '')}"
     words = f"{problem.objective_name}{simpler.phrase}"
     return Claim(kind, position, lead, words, value, f"the estimate{simpler.phrase}", breaks_words(limits))
@@ -140,10 +140,10 @@ def initial_claim(position: int, problem: Problem, value: float | None, limits: 
     """Return the claim about the design as given, where nothing follows sliders."""
     if value is None or not math.isfinite(value):
         words = "No objective" if value is None else "The design as given stands on a resonance"
-        return Claim(Kind.GIVEN, position, "", words, breaks=breaks_words(limits))
+        return Claim(ClaimKind.GIVEN, position, "", words, breaks=breaks_words(limits))
     lead = figure(value, problem.objective_unit or "")
     words = f"{problem.objective_name} of the design as given"
-    return Claim(Kind.GIVEN, position, lead, words, value, "the design as given", breaks_words(limits))
+    return Claim(ClaimKind.GIVEN, position, lead, words, value, "the design as given", breaks_words(limits))
 
 
 def conflict_claim(
@@ -153,7 +153,7 @@ def conflict_claim(
     names_text = join_phrases([f"'{name}'" for name in names])
     why = f"{names_text} contradict each other" if len(names) > 1 else f"{names_text} cannot be met within the bounds"
     lead = "No design exists:" if is_last else "No design found:"
-    return Claim(Kind.NO_DESIGN, position, lead, f"{why}{simpler.phrase}. Move one of the limits", is_last=is_last)
+    return Claim(ClaimKind.NO_DESIGN, position, lead, f"{why}{simpler.phrase}. Move one of the limits", is_last=is_last)
 
 
 def settled_claim(position: int, result: Result) -> Claim:
@@ -162,7 +162,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     if result.status is Status.INFEASIBLE and result.conflict:
         return conflict_claim(position, result.conflict, is_last=True)
     if not result.status.has_design or objective is None or certificate is None:
-        return Claim(Kind.NO_DESIGN, position, "", result.message or "No design was found.", is_last=True)
+        return Claim(ClaimKind.NO_DESIGN, position, "", result.message or "No design was found.", is_last=True)
     value, breaks = figure(objective.value, objective.unit, 5), breaks_words(result.limits)
     minimum = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
     is_proven = result.status is Status.OPTIMAL and not breaks
@@ -170,7 +170,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     is_drawn = not result.problem.extras
     reference = "the proven optimum" if is_proven else "the best design found"
     return Claim(
-        Kind.PROVEN if is_proven else Kind.FOUND,
+        ClaimKind.PROVEN if is_proven else ClaimKind.FOUND,
         position,
         f"{'Optimum' if is_proven else 'Best design found'} {value}",
         f"{objective.name}, proven: {minimum}"

@@ -145,7 +145,7 @@ def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Contr
 def typed(unit: str) -> tuple[str, float]:
     """Return the unit in which a number is typed, and its factor on SI."""
     _, factor = units.readable(unit)
-    return units.shown(1.0, unit).partition(" ")[2], factor
+    return units.quantity_text(1.0, unit).partition(" ")[2], factor
 
 
 def as_typed(value: float, unit: str) -> str | float:

@@ -32,7 +32,7 @@ _FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 @dataclass(frozen=True, eq=False)
-class Optimum:
+class SliderOptimum:
     """Optimum for the current limits.
 
     Attributes
@@ -93,7 +93,7 @@ class Follower:
         self._fine = model.at(TIMES * self.samples)
         self._whole = model.at(TIMES * self.samples, averaged=True)
 
-    def at(self, limits: Sequence[Limit]) -> Optimum:
+    def at(self, limits: Sequence[Limit]) -> SliderOptimum:
         """Return the optimum under the given limits."""
         moved = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
         coarse, fine, averaged = (self._under(rows, moved) for rows in (self._coarse, self._fine, self._whole))
@@ -119,7 +119,7 @@ class Follower:
         idle = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
         if set(broken) & set(idle):
             return _conflict(tuple(n for n in broken if n in idle))
-        return Optimum(
+        return SliderOptimum(
             values=tuple(domain.complex_value(x) for domain in self._model.domains),
             value=value,
             bound=bound.value,
@@ -140,5 +140,5 @@ def _breaks(value: float, maximum: float) -> bool:
     return value > maximum * (1.0 + KEPT)
 
 
-def _conflict(conflict: tuple[str, ...]) -> Optimum:
-    return Optimum((), np.inf, np.inf, 0.0, (), (), conflict)
+def _conflict(conflict: tuple[str, ...]) -> SliderOptimum:
+    return SliderOptimum((), np.inf, np.inf, 0.0, (), (), conflict)

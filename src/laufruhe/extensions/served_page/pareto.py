@@ -8,9 +8,9 @@ from contextlib import suppress
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.served_page.follower import Follower, Optimum, can_follow
+from laufruhe.extensions.served_page.follower import Follower, SliderOptimum, can_follow
 from laufruhe.files.complaints import Refused
-from laufruhe.files.measures import QuantityTable, Scene
+from laufruhe.files.measures import MeasureContext, QuantityTable
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 
@@ -28,7 +28,7 @@ def partners(problem: Problem) -> dict[str, Measure]:
     minimised = {term.measure for term in problem.objective}
     measures = {limit.name: limit.measure for limit in problem.limits if limit.maximum < math.inf}
     measures |= {m.name: m for rank in problem.ranks for m in (term.measure for term in rank.terms)}
-    scene = Scene(problem.engine, problem.points)
+    scene = MeasureContext(problem.engine, problem.points)
     for name in _USUAL:
         with suppress(Refused):
             measures.setdefault(name, scene.measure(name, QuantityTable(), f"front.{name}"))
@@ -58,7 +58,7 @@ class ParetoFront:
         free = self._follower.at((*self.others, self._limit))
         return minimum.value, max(free.standing[-1], minimum.value)
 
-    def at(self, maximum: float) -> Optimum:
+    def at(self, maximum: float) -> SliderOptimum:
         """Return the least objective with the other measure at most `maximum`, or a conflict."""
         return self._follower.at((*self.others, replace(self._limit, maximum=maximum)))
 

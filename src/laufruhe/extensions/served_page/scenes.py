@@ -12,7 +12,7 @@ from typing import Any
 from laufruhe.errors import ModelError
 from laufruhe.extensions.served_page.claims import Simplification, join_phrases
 from laufruhe.extensions.served_page.drawing import drawing_of
-from laufruhe.extensions.served_page.follower import Follower, Optimum, can_follow
+from laufruhe.extensions.served_page.follower import Follower, SliderOptimum, can_follow
 from laufruhe.extensions.served_page.pareto import partners
 from laufruhe.files.measures import EDGES
 from laufruhe.live import live_model
@@ -41,7 +41,7 @@ STILL: Mapping[Kind, str] = {
 _KEPT = 6
 
 
-class Scene:
+class PageScene:
     """A problem without the values of its limits: its drawing and its follower.
 
     Where something is open that loads are not affine in, it stays as given.
@@ -61,13 +61,15 @@ class Scene:
                 # mounts integrated in time have no affine loads
                 self.follower = None
 
-    def evaluated(self, followed: Optimum | None) -> Evaluation:
+    def evaluated(self, followed: SliderOptimum | None) -> Evaluation:
         """Return the exact evaluation of the followed design; of the given one if there is none."""
         if followed is None or followed.conflict:
             return self.given
         return evaluate(self.problem.fixed_at(followed.values))
 
-    def standing(self, limits: Sequence[Limit], design: Evaluation, followed: Optimum | None) -> tuple[LimitValue, ...]:
+    def standing(
+        self, limits: Sequence[Limit], design: Evaluation, followed: SliderOptimum | None
+    ) -> tuple[LimitValue, ...]:
         """Return how a design stands to limits, with prices [SI]."""
         if design.resonance:
             return ()
@@ -84,7 +86,7 @@ class Scene:
         active = price * abs(limit.maximum) > ROUNDING * value
         return replace(stand, active=active, shadow_price=price if active else 0.0)
 
-    def drawn(self, limits: tuple[Limit, ...], design: Evaluation, followed: Optimum | None) -> dict[str, Any]:
+    def drawn(self, limits: tuple[Limit, ...], design: Evaluation, followed: SliderOptimum | None) -> dict[str, Any]:
         """Return the page's drawing data, or the reason for having no sliders."""
         problem = replace(self.problem, limits=limits)
         result = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=design)
@@ -122,16 +124,16 @@ class Scene:
         return limit in self.problem.load_limits or not moved
 
 
-_scenes: dict[str, Scene] = {}
+_scenes: dict[str, PageScene] = {}
 
 
-def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> Scene:
+def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageScene:
     """Return the scene of a problem from a small cache."""
     key = key_of(tables, content)
     if key not in _scenes:
         while len(_scenes) >= _KEPT:
             _scenes.pop(next(iter(_scenes)))
-        _scenes[key] = Scene(problem, key)
+        _scenes[key] = PageScene(problem, key)
     return _scenes[key]
 
 

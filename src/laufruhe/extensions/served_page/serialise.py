@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from laufruhe.extensions.served_page.claims import Claim, Kind, is_broken
+from laufruhe.extensions.served_page.claims import Claim, ClaimKind, is_broken
 from laufruhe.present.numbers import figure, price_of
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
@@ -28,7 +28,7 @@ def as_text(answer: dict[str, Any]) -> str:
 
 def answer(claim: Claim, found: Iterable[LimitValue], problem: Problem, conflict: Sequence[str]) -> dict[str, Any]:
     """Return a claim, how its design stands to limits, and the names of limits that contradict each other."""
-    is_estimate = claim.kind in (Kind.ESTIMATE, Kind.HELD)
+    is_estimate = claim.kind in (ClaimKind.ESTIMATE, ClaimKind.HELD)
     return {"claim": asdict(claim), "limits": limits(found, problem, is_estimate), "conflict": list(conflict)}
 
 

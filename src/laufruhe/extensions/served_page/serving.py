@@ -20,7 +20,7 @@ from laufruhe.extensions.served_page.file_watcher import FileWatcher
 from laufruhe.extensions.served_page.latest_worker import LatestWorker, Superseded
 from laufruhe.extensions.served_page.page_state import PageState
 from laufruhe.extensions.served_page.pareto import POINTS
-from laufruhe.extensions.served_page.transport import Answer, Server
+from laufruhe.extensions.served_page.transport import HttpAnswer, Server
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
@@ -61,7 +61,7 @@ class Page:
             "/save": self._asked(self._follow, FOLLOWED, answers.save),
             "/front": self._fronted,
             "/pictures": _read(partial(self._lines, self._settle, len(PICTURES), answers.picture)),
-            "/events": lambda _: Answer(lines=self._events()),
+            "/events": lambda _: HttpAnswer(lines=self._events()),
         }
 
     @property
@@ -98,25 +98,25 @@ class Page:
         with suppress(Exception):
             self._follow.ask(FOLLOWED, answers.follow, self.watched.source, PageState())
 
-    def _begun(self, _: Any) -> Answer:
+    def _begun(self, _: Any) -> HttpAnswer:
         answer = json.loads(answers.begin(self.watched.source))
-        return Answer(json.dumps({**answer, **self._state()}))
+        return HttpAnswer(json.dumps({**answer, **self._state()}))
 
     def _state(self) -> dict[str, Any]:
         return {"version": self.watched.version, "complaint": self.watched.complaint}
 
     def _asked(
         self, desk: LatestWorker, seconds: float, work: Callable[..., str], *more: Any
-    ) -> Callable[[Any], Answer]:
+    ) -> Callable[[Any], HttpAnswer]:
         return _read(lambda state: _worked(partial(desk.ask, seconds, work, self.watched.source, state, *more)))
 
     def _lines(
         self, desk: LatestWorker, maximum: int, work: Callable[..., str], state: PageState, *more: Any
-    ) -> Answer:
+    ) -> HttpAnswer:
         source = self.watched.source
-        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), maximum))
+        return HttpAnswer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), maximum))
 
-    def _fronted(self, body: Any) -> Answer:
+    def _fronted(self, body: Any) -> HttpAnswer:
         across = body.pop("across", None) if isinstance(body, dict) else None
         if not isinstance(across, str) or len(across) > 200:
             return _wrong(Complaint("across", "", "is no measure", "load the page again"))
@@ -129,9 +129,9 @@ class Page:
             yield json.dumps(self._state())
 
 
-def _read(answer: Callable[[PageState], Answer]) -> Callable[[Any], Answer]:
+def _read(answer: Callable[[PageState], HttpAnswer]) -> Callable[[Any], HttpAnswer]:
 
-    def answered(body: Any) -> Answer:
+    def answered(body: Any) -> HttpAnswer:
         try:
             return answer(PageState.from_json(body))
         except Refused as refused:
@@ -149,25 +149,25 @@ def _each(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[st
     yield '{"done": true}'
 
 
-def _worked(work: Callable[[], str]) -> Answer:
+def _worked(work: Callable[[], str]) -> HttpAnswer:
     try:
-        return Answer(work())
+        return HttpAnswer(work())
     except Superseded:
-        return Answer('{"dropped": true}')
+        return HttpAnswer('{"dropped": true}')
     except SolverError as error:
-        return Answer(json.dumps({"error": str(error)}))
+        return HttpAnswer(json.dumps({"error": str(error)}))
     except BrokenExecutor:
         text = "the process that solves has ended, most likely for want of memory; it is started again"
-        return Answer(json.dumps({"error": text}))
+        return HttpAnswer(json.dumps({"error": text}))
     except Exception as error:
         # a program fault must not end the page
-        return Answer(
+        return HttpAnswer(
             json.dumps({"error": printed(f"this state cannot be worked out: {type(error).__name__}: {error}")})
         )
 
 
-def _wrong(complaint: Complaint) -> Answer:
-    return Answer(json.dumps({"error": str(complaint)}), status=HTTPStatus.BAD_REQUEST)
+def _wrong(complaint: Complaint) -> HttpAnswer:
+    return HttpAnswer(json.dumps({"error": str(complaint)}), status=HTTPStatus.BAD_REQUEST)
 
 
 def _files() -> dict[str, str]:

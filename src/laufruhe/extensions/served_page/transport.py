@@ -25,7 +25,7 @@ _JSON = "application/json"
 
 
 @dataclass(frozen=True)
-class Answer:
+class HttpAnswer:
     """Response to a request: text, or lines sent as they are made."""
 
     text: str = ""
@@ -33,7 +33,7 @@ class Answer:
     status: HTTPStatus = HTTPStatus.OK
 
 
-Handle = Callable[[Any], Answer]
+Handle = Callable[[Any], HttpAnswer]
 
 
 class Server(ThreadingHTTPServer):
@@ -52,7 +52,7 @@ class Server(ThreadingHTTPServer):
     request_queue_size = MOST_AT_ONCE
 
     def __init__(self, port: int, files: Mapping[str, str]) -> None:
-        super().__init__((HOST, port), Request)
+        super().__init__((HOST, port), HttpRequest)
         self.port: int = self.server_address[1]
         self.guard = Guard(self.port)
         self.files = {f"/{name}": text.encode() for name, text in files.items()}
@@ -130,7 +130,7 @@ class _Incoming(io.RawIOBase):
         return count
 
 
-class Request(BaseHTTPRequestHandler):
+class HttpRequest(BaseHTTPRequestHandler):
     """Connection that carries a single request."""
 
     protocol_version = "HTTP/1.1"
@@ -198,15 +198,15 @@ class Request(BaseHTTPRequestHandler):
             return self._refused(HTTPStatus.BAD_REQUEST, "is no JSON")
         return body if body is not None else self._refused(HTTPStatus.BAD_REQUEST, "is nothing")
 
-    def _exchanged(self, body: Any) -> Answer:
+    def _exchanged(self, body: Any) -> HttpAnswer:
         ticket = body.get("ticket") if isinstance(body, dict) else None
         token = self.server.guard.exchanged(ticket) if isinstance(ticket, str) else None
         if token is None:
             text = json.dumps({"error": "this address was used before; take the one that laufruhe printed"})
-            return Answer(text, status=HTTPStatus.UNAUTHORIZED)
-        return Answer(json.dumps({"token": token}))
+            return HttpAnswer(text, status=HTTPStatus.UNAUTHORIZED)
+        return HttpAnswer(json.dumps({"token": token}))
 
-    def _answer(self, answer: Answer) -> None:
+    def _answer(self, answer: HttpAnswer) -> None:
         if answer.lines is None:
             self._send(answer.status, answer.text.encode(), _JSON)
             return

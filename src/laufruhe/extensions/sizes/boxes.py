@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Bundle, Number, SizeReach, Ways, corner
+from laufruhe.extensions.sizes.bundles import Bundle, SizeNumber, SizeReach, Ways, corner
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.extensions.sizes.programs import Ask, SizePrograms, Together
 from laufruhe.extensions.sizes.rod_series import RodSeries, rod_series
@@ -39,7 +39,7 @@ MOST_KNOWN, WORTH = 2, 0.1
 NEAR = 2e-3
 
 
-class Cut(NamedTuple):
+class SizeCut(NamedTuple):
     """Rest of a box, its bound, the side worth halving, and the dual rows that gave the bound."""
 
     lower: Array
@@ -71,7 +71,7 @@ class SizeBoxes:
         # for each size whether masses grow with it or fall
         self._light = self._mass_ways()
         self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
-        self.limits: list[tuple[float, Number, Limit]] = []
+        self.limits: list[tuple[float, SizeNumber, Limit]] = []
         for limit in problem.limits:
             for edge, sense in ((limit.maximum, 1.0), (limit.minimum, -1.0)):
                 if math.isfinite(edge):
@@ -86,9 +86,9 @@ class SizeBoxes:
         terms = [(weight, number) for weight, number in self.terms if number.pieces]
         return SizePrograms(self.model, terms, [x[:2] for x in self.limits if x[1].pieces], ask)
 
-    def _number(self, measure: Measure, sense: float) -> Number:
+    def _number(self, measure: Measure, sense: float) -> SizeNumber:
         if measure.channel.of_engine is not None:
-            return Number(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
+            return SizeNumber(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
         if not measure.norm.of_row_lengths or sense < 0.0:
             raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
         pieces = self.model.pieces(measure)
@@ -100,12 +100,12 @@ class SizeBoxes:
 
         if not self.model.moves_rod:
             bundles = tuple(Bundle(RodSeries.fixed(piece, self.model.rod_span[0])) for piece in pieces)
-            return Number(measure, sense, self._ways(factors), bundles)
+            return SizeNumber(measure, sense, self._ways(factors), bundles)
         start = self.model.problem.engine.slider_cranks[0].rod_length
         masks = self.model.fixed_rows(measure)
         self.is_whole = self.is_whole and all(rows.all() for rows in masks)
         series = rod_series(self.model.pieces_over_length(measure), start, *self.model.rod_span, masks)
-        return Number(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
+        return SizeNumber(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
         """Return for each size if all numbers rise (1) or fall (-1) with it; zero if none changes."""
@@ -160,7 +160,7 @@ class SizeBoxes:
                 for masses in (reach.low, middle) if bundle.count < maximum else ():
                     bundle.touch(np.append(masses, unbalances), length)
 
-    def minimum(self, number: Number, lower: Array, upper: Array, reach: SizeReach) -> float:
+    def minimum(self, number: SizeNumber, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return a lower bound of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
@@ -196,7 +196,7 @@ class SizeBoxes:
             if k is None or number.ways[k] == way
         )
 
-    def cut(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...] = ()) -> Cut | None:
+    def cut(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...] = ()) -> SizeCut | None:
         """Return a box without sides that hold no better design; None where nothing is left."""
         self.touch(lower, upper)
         if self.breaks(lower, upper) or self.objective(lower, upper, known) >= target:
@@ -213,7 +213,7 @@ class SizeBoxes:
         bound = self.objective(lower, upper, known)
         if bound >= target:
             return None
-        return Cut(lower, upper, bound, self._side(lower, upper, known, bound, target), known)
+        return SizeCut(lower, upper, bound, self._side(lower, upper, known, bound, target), known)
 
     def learned(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
         """Return the dual rows of the box and those of the last one; exact ones where the bound is near."""
@@ -285,11 +285,11 @@ class _Sizes(BoxBisection):
     @property
     def level(self) -> float:
         """Level to which boxes are cut: no design in what is cut off is better."""
-        return self.enough
+        return self.cutoff
 
     def bounded(self, lower: Array, upper: Array, known: tuple[Together, ...] = ()) -> tuple[float, Box] | Over:
         """Return the bound of a box and its rest."""
-        cut = self._boxes.cut(lower, upper, self.enough, known)
+        cut = self._boxes.cut(lower, upper, self.cutoff, known)
         if cut is None:
             return Over(self.level)
         box = _SizeBox(cut.lower, cut.upper, cut.side)

@@ -140,7 +140,7 @@ class Grouped:
 
 
 @dataclass(frozen=True, eq=False)
-class Number:
+class SizeNumber:
     """Measure, or its negative, as boxes see it.
 
     Attributes

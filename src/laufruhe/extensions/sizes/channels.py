@@ -33,7 +33,7 @@ _AT_EACH_WEB: Where = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    return strength.journal_torques(engine, point, fidelity).each(lambda values: values[..., None])
+    return strength.journal_torques(engine, point, fidelity).mapped(lambda values: values[..., None])
 
 
 def _number(

@@ -15,7 +15,7 @@ from laufruhe.extensions.sizes.machine import (
     ROD_LENGTH,
     STEEL,
     Bolts,
-    Moving,
+    MovingGear,
     PistonPin,
     RunningGear,
     Shank,
@@ -92,7 +92,7 @@ def _weighed(
     others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
-    moving = Moving(gear, parts, (), bearings)
+    moving = MovingGear(gear, parts, (), bearings)
     ways, size = dict(gear.throws).values(), moving.throw_unbalance
     heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
     return moving.weighed().parts, (*heavy, *others)
@@ -101,7 +101,9 @@ def _weighed(
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
     if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
         rule = "weighs running gear of plain slider-cranks on one crankshaft"
-        raise Refused("running_gear.density", units.shown(table.density, "kg/m^3"), rule, "give the masses in [engine]")
+        raise Refused(
+            "running_gear.density", units.quantity_text(table.density, "kg/m^3"), rule, "give the masses in [engine]"
+        )
     if any(part.master_bank is not None for part in parts):
         rule = "sizes rods that work on the crank pin, and these are hinged to a master rod"
         raise Refused("running_gear", None, rule, "leave it out")
@@ -124,7 +126,10 @@ def _start(value: float | Open) -> float:
 def _piston_pin(table: PistonPinTable) -> PistonPin:
     bore, diameter = Open.from_value(table.bore), Open.from_value(table.diameter)
     if bore.upper >= diameter.lower:
-        value, rule = units.shown(bore.upper, "m"), f"does not fit into a pin of {units.shown(diameter.lower, 'm')}"
+        value, rule = (
+            units.quantity_text(bore.upper, "m"),
+            f"does not fit into a pin of {units.quantity_text(diameter.lower, 'm')}",
+        )
         raise Refused("running_gear.piston_pin.bore", value, rule, "make it smaller")
     return PistonPin(diameter.start, bore.start, _start(table.length), table.in_bosses, table.span)
 
@@ -169,7 +174,7 @@ def _decisions(
         if engine.kind.is_free or engine.offset:
             raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
-            length = units.shown(shortest, "m")
+            length = units.quantity_text(shortest, "m")
             raise Refused("engine.rod_length", length, "does not let the crank turn", "raise its lower bound")
     return decisions
 

@@ -207,7 +207,7 @@ class RunningGear(Extra):
 
 
 @dataclass(frozen=True)
-class Moving:
+class MovingGear:
     """Parts of an engine that sizes change: all that turns, reciprocates or carries."""
 
     gear: RunningGear | None
@@ -215,7 +215,7 @@ class Moving:
     rotors: tuple[Rotor, ...]
     bearings: tuple[Bearing, ...]
 
-    def weighed(self, sense: float = 1.0) -> Moving:
+    def weighed(self, sense: float = 1.0) -> MovingGear:
         """Return the parts with the masses of the running gear added (`sense` 1) or removed (-1) (Z2)."""
         gear = self.gear
         if gear is None or gear.density is None or not self.parts:
@@ -227,7 +227,7 @@ class Moving:
         return replace(self, parts=tuple(_heavier(gear, part, sense) for part in self.parts), rotors=tuple(rotors))
 
     @cached_property
-    def bare(self) -> Moving:
+    def bare(self) -> MovingGear:
         """Parts without the masses of the running gear (Z2)."""
         return self.weighed(-1.0)
 
@@ -255,7 +255,7 @@ class Moving:
             sizes |= {(name, f.name): getattr(part, f.name) for f in fields(part) if f.name in MOVED} if part else {}
         return sizes
 
-    def resized(self, sizes: Mapping[Size, float]) -> Moving:
+    def resized(self, sizes: Mapping[Size, float]) -> MovingGear:
         """Return the parts with other sizes, and the masses that follow from them."""
         unweighed = self.bare
         parts, gear = unweighed.parts, unweighed.gear
@@ -278,9 +278,9 @@ class Moving:
         return replace(unweighed, gear=gear, parts=parts, bearings=bearings).weighed()
 
 
-def moving_of(engine: Engine) -> Moving:
+def moving_of(engine: Engine) -> MovingGear:
     """Return what sizes move in an engine."""
-    return Moving(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, engine.bearings)
+    return MovingGear(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, engine.bearings)
 
 
 def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:

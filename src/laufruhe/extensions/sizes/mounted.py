@@ -27,7 +27,7 @@ from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import KEPT, Design, build_result, evaluate_design
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, shown, spread_starts
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, spread_starts
 
 STARTS, LOOKS = 2, 6
 """Searches, and designs looked at before these."""
@@ -47,7 +47,7 @@ def solve_mounted_sizes(problem: Problem) -> Result:
     design = evaluate_design(problem, program.values(best))
     bound = _bound(problem, design)
     words = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
-    proof = shown(program, design, bound, ProofStrength.ASIDE, words)
+    proof = proof_data(program, design, bound, ProofStrength.ASIDE, words)
     return build_result(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
@@ -86,7 +86,7 @@ def _decided(without_mounts: Problem, result: Result) -> list[Value]:
 def _bound(problem: Problem, design: Design) -> float:
     model = SizeModel(_on_given_mounts(problem))
     of_sizes = any(term.measure.channel.of_engine is not None or _sized(term.measure) for term in problem.objective)
-    if model.moves_rod or of_sizes or design.excess > KEPT:
+    if model.moves_rod or of_sizes or design.violation > KEPT:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
     room = room_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Grouped, Number, SizeReach, corner, minimum_of
+from laufruhe.extensions.sizes.bundles import Grouped, SizeNumber, SizeReach, corner, minimum_of
 from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.machine import Engine
@@ -42,7 +42,7 @@ class Together:
         Whether no terms are in it: where it is more than nothing no design is allowed.
     """
 
-    parts: tuple[tuple[Number, tuple[Grouped, ...]], ...]
+    parts: tuple[tuple[SizeNumber, tuple[Grouped, ...]], ...]
     constant: float
     size: float
     excludes: bool
@@ -62,7 +62,11 @@ class SizePrograms:
     """
 
     def __init__(
-        self, model: SizeModel, terms: Sequence[tuple[float, Number]], limits: Sequence[tuple[float, Number]], ask: Ask
+        self,
+        model: SizeModel,
+        terms: Sequence[tuple[float, SizeNumber]],
+        limits: Sequence[tuple[float, SizeNumber]],
+        ask: Ask,
     ) -> None:
         self._model, self._terms, self._limits, self._ask = model, tuple(terms), tuple(limits), ask
 
@@ -85,7 +89,7 @@ class SizePrograms:
         masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, ()) for k in moving]
         columns = [*moving, *range(MASSES, MASSES + len(self._model.start))]
 
-        def norm(number: Number) -> AffineNorm:
+        def norm(number: SizeNumber) -> AffineNorm:
             rows = self._rows(number, self._engine(number, lower, upper), reach)
             constant, slope = (np.concatenate([getattr(row, part) for row in rows]) for part in ("constant", "slope"))
             grid = rows[0].grid if len(rows) == 1 else Grid(np.full(len(constant), 1.0 / len(constant)), len(constant))
@@ -97,7 +101,7 @@ class SizePrograms:
         decisions = (*masses, *(domain.decision for domain in self._model.domains))
         return AffineProblem(terms, limits, domains_of(decisions), self._model.problem.fidelity.samples)
 
-    def _rows(self, number: Number, engine: Engine, reach: SizeReach) -> list[AffineNorm]:
+    def _rows(self, number: SizeNumber, engine: Engine, reach: SizeReach) -> list[AffineNorm]:
         rows = []
         for bundle in number.pieces:
             factors = self._model.factors(bundle.piece, number.measure, engine)
@@ -105,7 +109,7 @@ class SizePrograms:
             rows.append(lengths.at_length(reach.middle[1]))
         return rows
 
-    def _engine(self, number: Number, lower: Array, upper: Array) -> Engine:
+    def _engine(self, number: SizeNumber, lower: Array, upper: Array) -> Engine:
         moves = np.any(number.ways)
         return self._model.engine(corner(number.ways, lower, upper)) if moves else self._model.problem.engine
 

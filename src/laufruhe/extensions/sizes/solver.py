@@ -26,7 +26,7 @@ from laufruhe.solvers.conclusion import Design, build_result, infeasible_result,
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
 
 MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
 """Boxes where the length of the rod is open, which take ten times as long, and where each has cone programs."""
@@ -122,7 +122,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         rod = "; nothing bounds what the length of the rod makes of a load"
         words = f"local programs{rod if model.moves_rod else ''}"
     reach = ProofStrength.ASIDE if boxes is None else ProofStrength.WHOLE if boxes.is_whole else ProofStrength.NEAR
-    proof = shown(program, outcome.design, outcome.bound, reach, words)
+    proof = proof_data(program, outcome.design, outcome.bound, reach, words)
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 

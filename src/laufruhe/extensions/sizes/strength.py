@@ -89,7 +89,7 @@ def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
     places = [bearing.x for part in engine.slider_cranks for bearing in _span(engine, part)]
     torques = _torques(engine, point, fidelity, places)
     onto, last = np.eye(3, 4), np.eye(4)[3]
-    return forces.each(lambda own: own @ onto) + torques.each(lambda own: own[..., None] * last)
+    return forces.mapped(lambda own: own @ onto) + torques.mapped(lambda own: own[..., None] * last)
 
 
 def cap_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -105,12 +105,12 @@ def _shared(
         raise ModelError("sections are sized of engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
     by_rod = by_rod.reshape(len(shares), len(engine.slider_cranks))
-    total = crank_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
+    total = crank_forces(engine, point, fidelity).mapped(partial(np.einsum, "kc,ncd->nkd", by_rod))
     for rotor in engine.rotors:
         factors = np.array([share(rotor.x) for share in shares])
         if rotor.shaft == CRANKSHAFT and rotor.unbalance and factors.any():
             load = rotor_loads((rotor,), point.speed, engine.cycle)
-            total = total + load.each(lambda wrench: wrench[:, :3]).each(partial(np.einsum, "k,nd->nkd", factors))
+            total = total + load.mapped(lambda wrench: wrench[:, :3]).mapped(partial(np.einsum, "k,nd->nkd", factors))
     return total
 
 
@@ -122,7 +122,7 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: 
         behind = np.array([float(part.x > x) for x in places])
         if behind.any():
             torque = crank_torque(replace(engine, slider_cranks=(part,)), point, fidelity)
-            total = total + torque.each(partial(np.einsum, "k,n->nk", behind))
+            total = total + torque.mapped(partial(np.einsum, "k,n->nk", behind))
     return total
 
 

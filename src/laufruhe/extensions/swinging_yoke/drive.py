@@ -10,7 +10,7 @@ from typing import Any
 from laufruhe.errors import KeyedError
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine.drives.base import DriveKind, Sizes
-from laufruhe.machine.layouts.base import Key
+from laufruhe.machine.layouts.base import LayoutKey
 from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.slider_crank import SliderCrank
 
@@ -31,12 +31,14 @@ class SwingingYokeDrive(DriveKind):
     name = "swinging-yoke"
     has_rod = False
     keys = (
-        Key("pivot_distance", "positive length", "From the crank axis to the pivot of a swinging yoke."),
-        Key("return_ratio", "ratio", "Time of the slow stroke over that of the quick one, of a swinging yoke."),
-        Key("lever_length", "positive length", "From pivot to ram, of a swinging yoke, in place of return_ratio."),
-        Key("lever", "rod", "Of a swinging yoke, as a rigid body, its centre of gravity from the pivot."),
-        Key("lever_weight", "open mass", "Behind the pivot of a swinging yoke."),
-        Key("lever_weight_radius", "positive length", "Of lever_weight, from the pivot."),
+        LayoutKey("pivot_distance", "positive length", "From the crank axis to the pivot of a swinging yoke."),
+        LayoutKey("return_ratio", "ratio", "Time of the slow stroke over that of the quick one, of a swinging yoke."),
+        LayoutKey(
+            "lever_length", "positive length", "From pivot to ram, of a swinging yoke, in place of return_ratio."
+        ),
+        LayoutKey("lever", "rod", "Of a swinging yoke, as a rigid body, its centre of gravity from the pivot."),
+        LayoutKey("lever_weight", "open mass", "Behind the pivot of a swinging yoke."),
+        LayoutKey("lever_weight_radius", "positive length", "Of lever_weight, from the pivot."),
     )
 
     def radius(self, sizes: Sizes) -> float:

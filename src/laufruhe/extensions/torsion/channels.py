@@ -37,7 +37,7 @@ def _of_shafts(
     title: str = "", places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = CHAIN,
 ) -> LoadChannel:  # fmt: skip
     of_sections = of_what_moves(
-        name, lambda moving, at: signal(moving, at.point, at.fidelity).each(lambda values: values[:, :, None])
+        name, lambda moving, at: signal(moving, at.point, at.fidelity).mapped(lambda values: values[:, :, None])
     )
     return LoadChannel(
         name, unit, (*ON_BLOCK, "sections"), needs, signal=of_sections, places=places, feels_unbalances=False,

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.extensions.torsion.machine import TORSION, Section, Torsion
+from laufruhe.extensions.torsion.machine import TORSION, ShaftSection, Torsion
 from laufruhe.extensions.torsion.physics import Resonance, chain_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.problem import Problem
@@ -39,7 +39,7 @@ class TwistCoordinates:
         return all(section.damping == 0.0 for _, section in self._round)
 
     @property
-    def _round(self) -> list[tuple[int, Section]]:
+    def _round(self) -> list[tuple[int, ShaftSection]]:
         named = {section.name: section for section in self._chain.sections}
         return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 

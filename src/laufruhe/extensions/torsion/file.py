@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import Field
 
 from laufruhe import units
-from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, Section, Torsion, stiffness_of
+from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, ShaftSection, Torsion, stiffness_of
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
 from laufruhe.files.fields import ListOrSingle, Name, Number, Open, Table
@@ -56,7 +56,7 @@ class SectionTable(Table):
     loss_factor: f.LossFactor | None = None
 
 
-class ShaftTable(SectionTable):
+class TorsionShaftTable(SectionTable):
     """A shaft between two discs: its stiffness, or what it follows from."""
 
     stiffness: OpenTorsionalStiffness | None = None
@@ -75,7 +75,7 @@ class DiscTable(Table):
     end: Literal["front", "rear"]
     inertia: f.OpenInertia
     damping: TorsionalDamping = f.optional("Viscous damping against the block.", 0.0)
-    shaft: ShaftTable = f.required("Shaft from this disc to the next one towards the throws.")
+    shaft: TorsionShaftTable = f.required("Shaft from this disc to the next one towards the throws.")
 
 
 class AbsorberTable(Table):
@@ -109,7 +109,7 @@ class TorsionTable(Table):
     absorbers: list[AbsorberTable] = Field(default_factory=list)
 
 
-class _Opened:
+class _OpenNumbers:
     """Numbers as they are given, and the decisions about those that are open."""
 
     def __init__(self) -> None:
@@ -141,10 +141,10 @@ def _chain(
         rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be given beside the throws"
         raise Refused("torsion.discs", None, rule, "join those that turn together")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
-    opened, discs_of_throws = _Opened(), _throw_discs(table, parts, throws)
+    open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
     front, rear = (
-        [Disc(one.name, opened.number(one.inertia, "inertia", "kg m^2", one.name, [one.name]), one.damping)
+        [Disc(one.name, open_numbers.number(one.inertia, "inertia", "kg m^2", one.name, [one.name]), one.damping)
          for _, one in ends[end]]
         for end in ("front", "rear")
     )  # fmt: skip
@@ -153,19 +153,23 @@ def _chain(
     links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
     joined = [*links[: len(front)], *links[len(links) - len(rear) :]]
     shafts = [
-        _section(disc.shaft, table, f"torsion.discs[{k + 1}].shaft", disc.shaft.stiffness, disc.name, [link], opened)[0]
+        _section(
+            disc.shaft, table, f"torsion.discs[{k + 1}].shaft", disc.shaft.stiffness, disc.name, [link], open_numbers
+        )[0]
         for (k, disc), link in zip((*ends["front"], *ends["rear"]), joined, strict=True)
     ]
-    crank = _crank_sections(table, links[len(front) : len(links) - len(rear)], opened)
+    crank = _crank_sections(table, links[len(front) : len(links) - len(rear)], open_numbers)
     sections = (*shafts[: len(front)], *crank, *shafts[len(front) :])
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
     if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
         raise Refused("torsion.speeds", None, "is no range", "write the smaller one first")
-    absorbers = [_absorber(a, names, f"torsion.absorbers[{k + 1}]", opened) for k, a in enumerate(table.absorbers)]
+    absorbers = [
+        _absorber(a, names, f"torsion.absorbers[{k + 1}]", open_numbers) for k, a in enumerate(table.absorbers)
+    ]
     with blamed_on("torsion"):
         speeds = None if table.speeds is None else (table.speeds[0], table.speeds[1])
-        return Torsion(discs, sections, tuple(absorbers), table.output or "", speeds), opened.decisions
+        return Torsion(discs, sections, tuple(absorbers), table.output or "", speeds), open_numbers.decisions
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:
@@ -185,7 +189,7 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     return discs
 
 
-def _crank_sections(table: TorsionTable, links: Sequence[str], opened: _Opened) -> list[Section]:
+def _crank_sections(table: TorsionTable, links: Sequence[str], open_numbers: _OpenNumbers) -> list[ShaftSection]:
     where, crank = "torsion.crank", table.crank
     if not links:
         if crank is not None:
@@ -195,23 +199,23 @@ def _crank_sections(table: TorsionTable, links: Sequence[str], opened: _Opened) 
         raise Refused(where, None, "is missing", "say how stiff the crankshaft is from throw to throw")
     if crank.stiffness is None or len(crank.stiffness) == 1:
         value = None if crank.stiffness is None else crank.stiffness[0]
-        return _section(crank, table, where, value, "crank", links, opened)
+        return _section(crank, table, where, value, "crank", links, open_numbers)
     stiffnesses = _for_each(crank.stiffness, len(links), f"{where}.stiffness", "shafts between throws")
     return [
-        _section(crank, table, where, stiffness, link, [link], opened)[0]
+        _section(crank, table, where, stiffness, link, [link], open_numbers)[0]
         for stiffness, link in zip(stiffnesses, links, strict=True)
     ]
 
 
 def _section(
     shaft: SectionTable, table: TorsionTable, where: str, stiffness_given: float | Open | None, name: str,
-    links: Sequence[str], opened: _Opened,
-) -> list[Section]:  # fmt: skip
+    links: Sequence[str], open_numbers: _OpenNumbers,
+) -> list[ShaftSection]:  # fmt: skip
     """Shafts that are alike, by the names of what they join."""
     one_of(shaft, where, "stiffness", "pieces")
     diameter, bore, length = shaft.diameter, shaft.bore, None
     if stiffness_given is not None:
-        stiffness = opened.number(stiffness_given, "stiffness", "N m/rad", name, links)
+        stiffness = open_numbers.number(stiffness_given, "stiffness", "N m/rad", name, links)
     else:
         pieces = [_piece(piece, f"{where}.pieces[{k + 1}]", len(shaft.pieces)) for k, piece in enumerate(shaft.pieces)]
         stiffness = stiffness_of(pieces, table.shear_modulus)
@@ -219,13 +223,14 @@ def _section(
             _, diameter, bore = min(pieces, key=lambda piece: (piece[1] ** 4 - piece[2] ** 4) / piece[1])
             length = pieces[0][0] if len(pieces) == 1 else None
         if length is not None:
-            opened.number(shaft.pieces[0].diameter, "diameter", "m", name, links)
+            open_numbers.number(shaft.pieces[0].diameter, "diameter", "m", name, links)
         elif any(isinstance(piece.diameter, Open) for piece in shaft.pieces):
             raise Refused(f"{where}.diameter", None, "is given beside one that is open", "leave it out")
     loss = table.loss_factor if shaft.loss_factor is None else shaft.loss_factor
     with blamed_on(where):
         return [
-            Section(link, stiffness, shaft.damping, loss, diameter, bore, length, table.shear_modulus) for link in links
+            ShaftSection(link, stiffness, shaft.damping, loss, diameter, bore, length, table.shear_modulus)
+            for link in links
         ]
 
 
@@ -234,11 +239,13 @@ def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, flo
     if diameter.is_open and count > 1:
         raise Refused(f"{where}.diameter", None, "is open, and its shaft has other pieces", "fix it, or give one piece")
     if piece.bore >= diameter.lower:
-        raise Refused(f"{where}.bore", units.shown(piece.bore, "m"), "is as wide as its shaft", "give it a wall")
+        raise Refused(
+            f"{where}.bore", units.quantity_text(piece.bore, "m"), "is as wide as its shaft", "give it a wall"
+        )
     return piece.length, diameter.start, piece.bore
 
 
-def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _Opened) -> Absorber:
+def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbers: _OpenNumbers) -> Absorber:
     if table.on not in names:
         raise Refused(f"{where}.on", table.on, "is no disc", nearest(table.on, list(names)))
     if table.order is not None and table.stiffness is not None:
@@ -248,7 +255,7 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _O
         rule = "leaves its ring to nothing where it is zero"
         raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")
     inertia, stiffness, damping = (
-        opened.number(value, key, unit, table.name, [table.name])
+        open_numbers.number(value, key, unit, table.name, [table.name])
         for key, unit, value in (
             ("inertia", "kg m^2", table.inertia),
             ("stiffness", "N m/rad", table.stiffness or 0.0),
@@ -285,10 +292,10 @@ def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Probl
     inertia, without_rings = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
     maximum = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
     if not without_rings * (1.0 - _ROUNDED) <= inertia <= maximum * (1.0 + _ROUNDED):
-        of_discs = units.shown(without_rings, "kg m^2")
+        of_discs = units.quantity_text(without_rings, "kg m^2")
         rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
         remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"
-        raise Refused(where, units.shown(inertia, "kg m^2"), rule, remedy)
+        raise Refused(where, units.quantity_text(inertia, "kg m^2"), rule, remedy)
 
 
 def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:

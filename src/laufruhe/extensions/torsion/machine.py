@@ -50,7 +50,7 @@ class Disc:
 
 
 @dataclass(frozen=True)
-class Section:
+class ShaftSection:
     """A shaft without mass from each disc to the next.
 
     Attributes
@@ -86,7 +86,7 @@ class Section:
         if self.diameter is not None and not 0.0 <= self.bore < self.diameter:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
 
-    def moved(self, stiffness: float, diameter: float | None) -> Section:
+    def moved(self, stiffness: float, diameter: float | None) -> ShaftSection:
         """Return the section with another stiffness, or another diameter of its one piece and its stiffness."""
         if diameter is None or diameter == self.diameter or self.length is None:
             return replace(self, stiffness=stiffness)
@@ -170,7 +170,7 @@ class Torsion(Extra):
     """
 
     discs: tuple[Disc, ...]
-    sections: tuple[Section, ...]
+    sections: tuple[ShaftSection, ...]
     absorbers: tuple[Absorber, ...] = ()
     output: str = ""
     speeds: tuple[float, float] | None = None

@@ -295,7 +295,7 @@ def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     chain = chain_of(engine)
     sized = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
     stress = times(twist(engine, point, fidelity), stress_factors, chain, point.speed)
-    return stress.each(lambda values: values[:, sized])
+    return stress.mapped(lambda values: values[:, sized])
 
 
 def times(twisted: Spectrum, factors: Factors, chain: Torsion, speed: float) -> Spectrum:

@@ -19,7 +19,7 @@ from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import KEPT, Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.method import Method, is_pointwise
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
 
 # open numbers that are divided, and boxes that this may take
 MOST_OPEN, MOST_BOXES = 3, 3000
@@ -53,9 +53,9 @@ def solve_torsion(problem: Problem) -> Result:
         names = tuple(limit.name for limit in problem.limits)
         return infeasible_result(problem, initial, names, {"solve": time.perf_counter() - started})
     method = f"local programs; lower bound on {outcome.divided.boxes} boxes of discs and shafts"
-    is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.excess <= KEPT
+    is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.violation <= KEPT
     bound = outcome.bound if boxes.coordinates.is_exact else 0.0
-    proof = shown(program, outcome.design, bound, ProofStrength.NEAR if is_near else ProofStrength.ASIDE, method)
+    proof = proof_data(program, outcome.design, bound, ProofStrength.NEAR if is_near else ProofStrength.ASIDE, method)
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.layouts.base import Key
+from laufruhe.machine.layouts.base import LayoutKey
 from laufruhe.machine.layouts.build import Mechanism
 
 
@@ -44,7 +44,7 @@ class DriveKind(ABC):
     """
 
     name: ClassVar[str]
-    keys: ClassVar[tuple[Key, ...]] = ()
+    keys: ClassVar[tuple[LayoutKey, ...]] = ()
     has_rod: ClassVar[bool] = True
 
     def radius(self, sizes: Sizes) -> float:

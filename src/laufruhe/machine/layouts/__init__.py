@@ -6,7 +6,7 @@ Cylinders are counted from the front (C3).
 from collections.abc import Mapping
 
 from laufruhe.extension import extended
-from laufruhe.machine.layouts.base import Key, LayoutInput, LayoutKind, rod_of
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
 from laufruhe.machine.layouts.delta import Delta
@@ -26,9 +26,9 @@ LAYOUTS: Mapping[str, LayoutKind] = extended(
 
 __all__ = [
     "LAYOUTS",
-    "Key",
     "Layout",
     "LayoutInput",
+    "LayoutKey",
     "LayoutKind",
     "Mechanism",
     "Throw",

@@ -17,7 +17,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 
 @dataclass(frozen=True)
-class Key:
+class LayoutKey:
     """A key of [engine] that a layout or a drive takes.
 
     Attributes
@@ -35,7 +35,7 @@ class Key:
     default: Any = None
 
 
-SPACING = Key(
+SPACING = LayoutKey(
     "cylinder_spacing",
     "positive length",
     "Distance between neighbouring throws; in a boxer between neighbours of a bank.",
@@ -78,8 +78,8 @@ class LayoutInput:
 def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:
     """Return the rod of a table of [engine], its centre of gravity counted from the pin `end`."""
     if not 0.0 <= table["centre_of_gravity"] <= length:
-        rule = f"does not lie on the rod of {units.shown(length, 'm')}; count it from the {end}"
-        raise KeyedError(f"{key}.centre_of_gravity", rule, units.shown(table["centre_of_gravity"], "m"))
+        rule = f"does not lie on the rod of {units.quantity_text(length, 'm')}; count it from the {end}"
+        raise KeyedError(f"{key}.centre_of_gravity", rule, units.quantity_text(table["centre_of_gravity"], "m"))
     return Rod(length, **table)
 
 
@@ -109,7 +109,7 @@ class LayoutKind(ABC):
     """
 
     name: ClassVar[str]
-    keys: ClassVar[tuple[Key, ...]] = (SPACING,)
+    keys: ClassVar[tuple[LayoutKey, ...]] = (SPACING,)
     lists: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1

@@ -10,7 +10,7 @@ from fractions import Fraction
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
-from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput, LayoutKind
+from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
@@ -86,9 +86,11 @@ class Delta(LayoutKind):
     name = "delta"
     keys = (
         SPACING,
-        Key("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
-        Key("reversed_crank", "cylinder", "Crank of a triangle against the other two: 1 below, 2 left, 3 right."),
-        Key("crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."),
+        LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        LayoutKey("reversed_crank", "cylinder", "Crank of a triangle against the other two: 1 below, 2 left, 3 right."),
+        LayoutKey(
+            "crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."
+        ),
     )
     openable = ("throws",)
     cylinders_per_throw = 3
@@ -119,7 +121,7 @@ class Delta(LayoutKind):
             raise KeyedError("cycle", rule, str(inputs.cycle))
         if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.shown(inputs.mechanism.offset, "m"))
+            raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
         reversed_one = inputs.own["reversed_crank"] or 0
         if reversed_one > 3:
             raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
-from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput
+from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.inline import Inline
 from laufruhe.machine.layouts.places import Layout
@@ -61,19 +61,21 @@ class OpposedPiston(Inline):
     name = "opposed-piston"
     keys = (
         SPACING,
-        Key("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
-        Key(
+        LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        LayoutKey(
             "crank_ratio",
             "sign",
             "Speed ratio of the second crank of opposed pistons; -1 by default, against the first.",
         ),
-        Key("crank_lead", "open lead", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0),
-        Key(
+        LayoutKey(
+            "crank_lead", "open lead", "Angle by which the pistons of the second crank of opposed pistons lead.", 0.0
+        ),
+        LayoutKey(
             "second_reciprocating_mass",
             "open mass",
             "Reciprocating mass of each piston of the second crank; by default that of the others.",
         ),
-        Key("port_arc", "angle", "Crank angle for which the ports of a piston are open; a lead has to be less."),
+        LayoutKey("port_arc", "angle", "Crank angle for which the ports of a piston are open; a lead has to be less."),
     )
     openable = ()
 
@@ -87,11 +89,11 @@ class OpposedPiston(Inline):
             raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
         ports = inputs.own["port_arc"]
         if ports is not None and abs(lead) >= ports:
-            rule = f"is beyond the ports, which are open for {units.shown(ports, 'rad')} and never together"
-            raise KeyedError("crank_lead", f"{rule}; lessen it", units.shown(lead, "rad"))
+            rule = f"is beyond the ports, which are open for {units.quantity_text(ports, 'rad')} and never together"
+            raise KeyedError("crank_lead", f"{rule}; lessen it", units.quantity_text(lead, "rad"))
         if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.shown(inputs.mechanism.offset, "m"))
+            raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
         crank = Shaft("second crankshaft", float(inputs.own["crank_ratio"] or -1), 0.0, distance)
         upper = facing_pistons(lower, crank, lead, inputs.mechanism.rotating_mass)
         own = inputs.own["second_reciprocating_mass"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 
 from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
-from laufruhe.machine.layouts.base import Key, LayoutInput, LayoutKind, rod_of
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, numbers_of
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.slider_crank import SliderCrank
@@ -81,24 +81,24 @@ class Radial(LayoutKind):
 
     name = "radial"
     keys = (
-        Key(
+        LayoutKey(
             "knuckle_radius",
             "non-negative length",
             "Distance of the knuckle pins of the master rod from the crank pin.",
         ),
-        Key("master_cylinder", "cylinder", "Number of the cylinder with the master rod; 1 by default."),
-        Key(
+        LayoutKey("master_cylinder", "cylinder", "Number of the cylinder with the master rod; 1 by default."),
+        LayoutKey(
             "knuckle_angles",
             "angles",
             "Angle of every knuckle pin from the master rod; by default those of the cylinders.",
         ),
-        Key(
+        LayoutKey(
             "articulated_rod_length",
             "positive length",
             "Length of the articulated rods; by default such that all pistons reach the same height.",
         ),
-        Key("articulated_rod", "rod", "Articulated rod as a rigid body, counted from its knuckle pin."),
-        Key("knuckle_mass", "mass", "Mass at every knuckle pin, beside the share of articulated_rod.", 0.0),
+        LayoutKey("articulated_rod", "rod", "Articulated rod as a rigid body, counted from its knuckle pin."),
+        LayoutKey("knuckle_mass", "mass", "Mass at every knuckle pin, beside the share of articulated_rod.", 0.0),
     )
     lists = ("firing_order",)
     openable = ("firing_order",)

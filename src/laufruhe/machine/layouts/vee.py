@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput, LayoutKind
+from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
 from laufruhe.machine.layouts.places import Layout, check_even, stations
 
-STAGGER = Key("bank_stagger", "length")
+STAGGER = LayoutKey("bank_stagger", "length")
 
 
 def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
@@ -47,8 +47,8 @@ class Vee(LayoutKind):
     name = "vee"
     keys = (
         SPACING,
-        Key("bank_angle", "open angle", "Angle between the banks of a vee."),
-        Key("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
+        LayoutKey("bank_angle", "open angle", "Angle between the banks of a vee."),
+        LayoutKey("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
         STAGGER,
     )  # fmt: skip
     openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")

@@ -13,10 +13,10 @@ from laufruhe.numerics.norms.norm import (
     COUNTS,
     TOUCHES,
     Cones,
+    EpigraphProgram,
     Grid,
     Kinks,
     Norm,
-    SmoothProgram,
     amplitudes,
     curvature,
     fine_lengths,
@@ -72,7 +72,7 @@ class Maximum(Norm):
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a variable that no softened row exceeds (E22)."""
         import casadi as ca
 
@@ -81,7 +81,7 @@ class Maximum(Norm):
         return top * unit
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the squares, which are smooth at zero."""
         import casadi as ca

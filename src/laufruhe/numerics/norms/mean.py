@@ -12,10 +12,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
     VANISHES,
     Cones,
+    EpigraphProgram,
     Grid,
     Kinks,
     Norm,
-    SmoothProgram,
     curvature,
     fine_lengths,
     jumped,
@@ -92,7 +92,7 @@ class Mean(Norm):
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the softened lengths."""
         import casadi as ca
 

@@ -108,7 +108,7 @@ class Cones:
     squares: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]] | None = None
 
 
-class SmoothProgram(Protocol):
+class EpigraphProgram(Protocol):
     """Program that a smooth form adds variables and constraints to (N3, E22)."""
 
     def head(self, value: Any) -> Any:
@@ -206,8 +206,8 @@ class Norm(ABC):
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
         """Return a simple projection of Z into the unit ball of the dual norm (P3)."""
-        excess = self.dual_norm(grid, z)
-        return z if excess <= 1.0 else z / excess
+        violation = self.dual_norm(grid, z)
+        return z if violation <= 1.0 else z / violation
 
     def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
         """Return all dual rows that touch the norm here, with those given; None where they are not known (P19)."""
@@ -242,12 +242,12 @@ class Norm(ABC):
         """Return the norm as second-order cones."""
         raise self._unclaimed("cones")
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
         raise self._unclaimed("smooth form")
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Return a smooth expression for norm <= `maximum`, its largest value, and the slope of that by `maximum`.
 

@@ -22,10 +22,10 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     MOST_KINKS,
     TOUCHES,
     Cones,
+    EpigraphProgram,
     Grid,
     Kinks,
     Norm,
-    SmoothProgram,
     amplitudes,
     curvature,
     lengths,
@@ -114,11 +114,11 @@ class PeakToPeak(Norm):
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a variable over all radii (E22)."""
         return 2.0 * unit * self._radius(program, grid, rows / unit, share)
 
-    def _radius(self, program: SmoothProgram, grid: Grid, rows: Any, share: Any) -> Any:
+    def _radius(self, program: EpigraphProgram, grid: Grid, rows: Any, share: Any) -> Any:
         import casadi as ca
 
         signals = [rows[k : k + grid.steps, :] for k in range(0, rows.shape[0], grid.steps)]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, Grid, Kinks, Norm, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, EpigraphProgram, Grid, Kinks, Norm, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -63,7 +63,7 @@ class RootMeanSquare(Norm):
         """Return a single cone over all rows, each times the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the norm softened as a single length."""
         import casadi as ca
 
@@ -71,7 +71,7 @@ class RootMeanSquare(Norm):
         return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + softness**2) - softness
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the mean square, which is smooth at zero."""
         import casadi as ca

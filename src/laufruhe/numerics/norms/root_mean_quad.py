@@ -11,10 +11,10 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
     Cones,
+    EpigraphProgram,
     Grid,
     Kinks,
     Norm,
-    SmoothProgram,
     amplitudes,
     lengths,
     mean_square,
@@ -85,7 +85,7 @@ class RootMeanQuad(Norm):
             ),
         )
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the norm of the rows and of one length of the share of `unit`, less that length."""
         import casadi as ca
 
@@ -93,7 +93,7 @@ class RootMeanQuad(Norm):
         return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + share**4)) - share)
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Return the mean of fourth powers, which is smooth at zero."""
         import casadi as ca

@@ -16,10 +16,10 @@ from laufruhe.numerics.norms.norm import (
     MOST_KINKS,
     TOUCHES,
     Cones,
+    EpigraphProgram,
     Grid,
     Kinks,
     Norm,
-    SmoothProgram,
     lengths,
     softened_lengths,
 )
@@ -84,7 +84,7 @@ class WorstMean(Norm):
         )
         return Cones(value, np.arange(count), np.ones(count), under=under)
 
-    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """A variable that no mean of softened lengths exceeds (E22)."""
         import casadi as ca
 

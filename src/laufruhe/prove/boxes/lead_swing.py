@@ -102,5 +102,5 @@ def largest_torque(torque: Spectrum) -> float:
     swing = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
     values = np.concatenate([swing.sample(steps), swing.values(swing.bends)])
-    bent = curvature(swing.each(lambda each: each[:, None, None]))[0]
+    bent = curvature(swing.mapped(lambda each: each[:, None, None]))[0]
     return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * bent.max(initial=0.0))

@@ -84,12 +84,12 @@ class _MonotoneBoxes(BoxBisection):
 
     def __init__(self, problem: MonotoneProblem, value: float, room: float, known: Known | None = None) -> None:
         super().__init__(value, room, known)
-        self._uncut, self._problem = problem, problem.with_cutoff(self.enough)
+        self._uncut, self._problem = problem, problem.with_cutoff(self.cutoff)
 
     @property
     def level(self) -> float:
         """Least objective of designs that cuts remove; infinite if cuts use limits alone."""
-        return self.enough if self._problem is not self._uncut else math.inf
+        return self.cutoff if self._problem is not self._uncut else math.inf
 
     def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | Over:
         """Return a box without slices that violate limits, and its least sum."""

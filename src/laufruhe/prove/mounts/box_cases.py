@@ -76,7 +76,7 @@ def _with_stops(
         np.einsum("bij,bj->bi", inverse, pushed)[:, None],
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))
-    excess, span = _stop_errors(stops, at, corner, signs, travel)
+    violation, span = _stop_errors(stops, at, corner, signs, travel)
     rows, factors = counted_rows(model.problem, measure)
     maps, turned = model.maps(STILL, at, _AS_LOADS[measure.channel], rows)
     value = maps.real * factors[:, None]
@@ -93,7 +93,7 @@ def _with_stops(
     reach = _along(corner, value[:, 0])
     if by_side is not None:
         reach = reach + sum(_along(corner, side) for side in model.sides.apart(by_side[:, 0]))
-    error = reach * np.sum(excess * _along(corner, stops.rows), axis=1, keepdims=True) + excess @ np.abs(ends).T
+    error = reach * np.sum(violation * _along(corner, stops.rows), axis=1, keepdims=True) + violation @ np.abs(ends).T
     rest = answer.rest[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
     # the series diverges close to a free mode
     minimum = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)

@@ -59,7 +59,7 @@ class LinearRelaxation:
         self.pulls.append(np.where(known[:, None], np.nan_to_num(minimum.bends) / unit, 0.0))
 
     @property
-    def excess(self) -> Array:
+    def violation(self) -> Array:
         """Lower bound of the largest relative violation of limits in each box, shape (boxes,); -1 without limits.
 
         Every weighted mean of the limits is a lower bound (P4). The method starts with the most violated limit and
@@ -100,7 +100,7 @@ class LinearRelaxation:
         where a slope changes its sign: the best kink is taken.
         """
         value, slopes = self.value, self.slopes
-        bound, broken = value - np.abs(slopes).sum(axis=1), self.excess > 0.0
+        bound, broken = value - np.abs(slopes).sum(axis=1), self.violation > 0.0
         for over, by in self.limits * (ROUNDS if len(self.limits) > 1 else 1):
             prices = np.where(slopes * by < 0.0, -slopes / np.where(by != 0.0, by, 1.0), 0.0)
             loss = np.abs(slopes[:, None] + prices[:, :, None] * by[:, None]).sum(axis=2)

@@ -115,14 +115,14 @@ class StiffnessBoxes:
     ----------
     left_out
         Share of the objective for ignored small orders [SI].
-    enough
+    cutoff
         Bound from which a box needs no simulations; infinite without an incumbent.
     """
 
     what = "boxes of stiffness"
 
-    def __init__(self, problem: Problem, left_out: float, enough: float = math.inf) -> None:
-        self.enough = enough
+    def __init__(self, problem: Problem, left_out: float, cutoff: float = math.inf) -> None:
+        self.cutoff = cutoff
         self.problem = problem = with_default_sampling(named_part(problem))
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
@@ -194,14 +194,14 @@ class StiffnessBoxes:
         bounds = self.constant + numbers + boxes.minimum
         scores = (scores + score) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
         # simulations cost most, and come last
-        left = np.flatnonzero(~violated & (bounds < self.enough))
+        left = np.flatnonzero(~violated & (bounds < self.cutoff))
         if self.simulated is not None and len(left):
             rest = boxes.subset(left)
             scores[left] = np.maximum(scores[left], self._add_simulated(rest, lower[left], upper[left]))
             bounds[left] = self.constant + numbers[left] + rest.minimum
             boxes.pulls.append(np.zeros_like(scores))
             boxes.pulls[-1][left] = rest.pull
-        if math.isinf(self.enough):
+        if math.isinf(self.cutoff):
             # without an incumbent the question is whether the limits can be kept
             scores = boxes.pull
         sides = np.argmax(np.nan_to_num(scores) + EVEN * (upper - lower) / upper.max(), axis=1)
@@ -222,7 +222,7 @@ class StiffnessBoxes:
         weights = {term.measure: term.weight for term in problem.objective}
         for measure in self.simulated.measures:
             # a box that violates one limit needs no other
-            minimum = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
+            minimum = self.simulated.under(measure, lower, upper, boxes.violation <= 0.0)
             boxes.add(weights.get(measure, 0.0), minimum)
             for limit in problem.limits:
                 if limit.measure == measure:

@@ -53,7 +53,7 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
 
 def _averaged(signal: Spectrum, count: int) -> Spectrum:
     shifted = [signal.later(Fraction(k, count), k * signal.period / count) for k in range(count)]
-    return reduce(add, shifted).each(lambda values: values / count)
+    return reduce(add, shifted).mapped(lambda values: values / count)
 
 
 def _is_alike(engine: Engine) -> bool:

@@ -62,7 +62,7 @@ def _sentence(limit: AttainableLimit, lead: str) -> str:
 
 def _nearest(design: Nearest) -> str:
     value, required = figure(design.value, design.unit), with_unit(design.limit, design.unit)
-    beyond = f", {share(design.excess, 3)} beyond" if design.limit else ""
+    beyond = f", {share(design.violation, 3)} beyond" if design.limit else ""
     return (
         f"The nearest design found breaks '{design.name}' most: {value}, but {design.side} {required} is asked{beyond}."
     )

@@ -19,7 +19,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import Known
-from laufruhe.solvers.boxes.search import Box, Search, divided
+from laufruhe.solvers.boxes.search import BoxSearch, SearchBox, divided
 from laufruhe.solvers.conclusion import (
     Design,
     ProofData,
@@ -55,7 +55,7 @@ class RebalancedDesign:
         return self.design.rank
 
 
-class BoundedBox(Box, Protocol):
+class BoundedBox(SearchBox, Protocol):
     """A box with bounds of its numbers."""
 
     @property
@@ -70,7 +70,7 @@ class BoundedBox(Box, Protocol):
 S = TypeVar("S", bound=BoundedBox)
 
 
-class RebalancedSearch(Search[S, RebalancedDesign]):
+class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     """Boxes of decisions that are not affine, with designs whose unbalances are optimal."""
 
     conflict: tuple[str, ...] = ()
@@ -120,8 +120,8 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, Over) and first is not None:
-            nothing = numerical_zero(problem)
-            best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, maximum, f"boxes of {what}")
+            zero_level = numerical_zero(problem)
+            best, bound, boxes = divided(self, root, first, zero_level, problem.tolerance, maximum, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):
             return infeasible_result(problem, initial, self.conflict, timing)

@@ -23,7 +23,7 @@ from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
 
 WIDTH = "flywheel.width"
 # share of the tolerance for a monotone objective, whose boxes close fast
@@ -142,7 +142,7 @@ def solve_flywheel(problem: Problem) -> Result:
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
 
     def bounded(value: float, room: float, design: Design) -> BoxResult:
-        known = None if math.isinf(value) else known_of(design, coordinates.place(design.values), excess=0.0)
+        known = None if math.isinf(value) else known_of(design, coordinates.place(design.values), violation=0.0)
         result = divided(functions, value, (SHARPER if functions.is_monotone else 1.0) * room, known=known)
         return replace(result, places=tuple(coordinates.decisions(x) for x in result.places))
 
@@ -155,5 +155,5 @@ def solve_flywheel(problem: Problem) -> Result:
     if answer.excludes_all:
         return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
     method = f"monotone quantities, bounded on {answer.divided.boxes} boxes of the flywheel's numbers"
-    proof = shown(program, answer.design, answer.bound, ProofStrength.WHOLE, method)
+    proof = proof_data(program, answer.design, answer.bound, ProofStrength.WHOLE, method)
     return build_result(answer.design, initial, proof, timing)

@@ -25,7 +25,7 @@ AHEAD = 32
 POLISHED = 3
 
 
-class Box(Protocol):
+class SearchBox(Protocol):
     """A box of open numbers."""
 
     @property
@@ -49,11 +49,11 @@ class BoxDesign(Protocol):
         """Sort key: feasible designs first, then by objective."""
 
 
-B = TypeVar("B", bound=Box)
+B = TypeVar("B", bound=SearchBox)
 D = TypeVar("D", bound=BoxDesign)
 
 
-class Search(Generic[B, D]):
+class BoxSearch(Generic[B, D]):
     """Boxes and designs of one method.
 
     Attributes
@@ -97,11 +97,12 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
     """Branch and bound that keeps the best design of all boxes."""
 
     def __init__(
-        self, search: Search[B, D], best: D, nothing: float, tolerance: float, what: str, ahead: Speculation[Any, Any]
+        self, search: BoxSearch[B, D], best: D, zero_level: float, tolerance: float, what: str,
+        ahead: Speculation[Any, Any],
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
         self.known = search.known(best)
-        self._search, self._nothing, self._tolerance, self._ahead = search, nothing, tolerance, ahead
+        self._search, self._zero_level, self._tolerance, self._ahead = search, zero_level, tolerance, ahead
 
     @property
     def level(self) -> float:
@@ -114,7 +115,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
 
     def is_fathomed(self, one: OpenNode[B]) -> bool:
         """Return whether the gap between a box and the incumbent is closed."""
-        gap = gap_of(self.value, one.bound, self._nothing)
+        gap = gap_of(self.value, one.bound, self._zero_level)
         # the bound of an exact box differs from its best design by no more than the tolerance of its program
         return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
 
@@ -138,7 +139,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
 
 
 def divided(
-    search: Search[B, D], root: B, best: D, nothing: float, tolerance: float, maximum: int, what: str
+    search: BoxSearch[B, D], root: B, best: D, zero_level: float, tolerance: float, maximum: int, what: str
 ) -> tuple[D, float, int]:
     """Divide boxes until the least bound meets the best design.
 
@@ -146,7 +147,7 @@ def divided(
     ----------
     root, best
         Box of all open numbers, and a design to begin with.
-    nothing
+    zero_level
         Objective that counts as zero [SI].
     tolerance
         Relative gap at which the search ends.
@@ -160,7 +161,7 @@ def divided(
     The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
     """
     with speculation(_parted) as ahead:
-        boxes = _Branching(search, best, nothing, tolerance, what, ahead)
+        boxes = _Branching(search, best, zero_level, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), maximum)
     if boxes.known is not None:
         around: Bounder[D, B | Over] = _Around(search, what)
@@ -172,7 +173,7 @@ def divided(
 class _Around(Generic[B, D]):
     """Thin boxes of a search, to check bounds around a known design."""
 
-    search: Search[B, D]
+    search: BoxSearch[B, D]
     what: str
 
     def around(self, design: D) -> B | Over | None:

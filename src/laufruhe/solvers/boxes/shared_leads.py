@@ -42,7 +42,7 @@ def solve_shared_leads(problem: Problem) -> Result:
     lower, upper = sides_of(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
     value, room, known = math.inf, 0.0, None
-    if best is not None and best.excess <= KEPT:
+    if best is not None and best.violation <= KEPT:
         value = best.value
         room = SHARE * problem.tolerance * max(value, numerical_zero(problem))
         known = known_of(best, np.array([float(x.real) for x in best.values]))
@@ -65,7 +65,7 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
 
     def penalised(leads: Array) -> float:
         at = design(leads)
-        return math.inf if at is None else at.value * (1.0 + 1e3 * max(at.excess, 0.0))
+        return math.inf if at is None else at.value * (1.0 + 1e3 * max(at.violation, 0.0))
 
     ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
     best = design(np.array([d.start_number for d in problem.decisions]))

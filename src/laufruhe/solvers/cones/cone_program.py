@@ -103,7 +103,7 @@ class ConeRows:
 
 
 @dataclass(frozen=True, eq=False)
-class Block:
+class RowBlock:
     """Columns and rows of one norm in the program.
 
     Attributes
@@ -136,7 +136,7 @@ class Block:
 
 def build_program(
     problem: AffineProblem, equations: tuple[Array, Array] | None
-) -> tuple[list[Block], list[int], ConeRows, Array]:  # fmt: skip
+) -> tuple[list[RowBlock], list[int], ConeRows, Array]:  # fmt: skip
     """Assemble the cone program of a problem (P1).
 
     Parameters
@@ -151,13 +151,13 @@ def build_program(
     import clarabel
 
     unit = reach(problem, [norm for _, norm in problem.terms])
-    blocks: list[Block] = []
+    blocks: list[RowBlock] = []
     columns = problem.size
     for norm, size in [
         *((norm, unit) for _, norm in problem.terms),
         *((norm, reach(problem, [norm])) for _, norm in problem.limits),
     ]:
-        blocks.append(Block(norm, norm.norm.cones(norm.grid), size, columns))
+        blocks.append(RowBlock(norm, norm.norm.cones(norm.grid), size, columns))
         columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1
     rows = ConeRows(columns)
     if equations is not None:
@@ -189,7 +189,7 @@ def build_program(
     return blocks, starts, rows, _add_cost(problem, blocks, rows)
 
 
-def _add_cost(problem: AffineProblem, blocks: Sequence[Block], rows: ConeRows) -> Array:
+def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows) -> Array:
     """Return the cost of every column; of several sums it is one more column that none of them exceeds."""
     import clarabel
 
@@ -231,7 +231,7 @@ def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
     rows.cones.append(clarabel.SecondOrderConeT(3))
 
 
-def _add_norm(rows: ConeRows, block: Block, problem: AffineProblem) -> int:
+def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
     """Add V0 + B x in a cone a row, or in one cone for a root mean square; return the first row."""
     import clarabel
 
@@ -274,7 +274,7 @@ def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadra
     return clarabel.DefaultSolver(matrix, cost, rows.matrix(), right, rows.cones, settings).solve()
 
 
-def read_solution(problem: AffineProblem, blocks: list[Block], starts: list[int], solution: Any) -> ConicSolution:
+def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[int], solution: Any) -> ConicSolution:
     """Return decisions in their sets and dual rows [SI]; zeros where the solver has lost its numbers."""
     primal, duals = (
         np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0) for values in (solution.x, solution.z)

@@ -153,8 +153,8 @@ def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> Con
 
     def rank(answer: ConicSolution) -> tuple[float, float]:
         assert answer.x is not None
-        excess = problem.excess(answer.x)
-        return excess if excess > FEASIBLE else 0.0, problem.objective(answer.x)
+        violation = problem.violation(answer.x)
+        return violation if violation > FEASIBLE else 0.0, problem.objective(answer.x)
 
     points = [answer for answer in stopped if answer.x is not None]
     points.append(replace(stopped[0], x=project_on_sets(problem, problem.start)))

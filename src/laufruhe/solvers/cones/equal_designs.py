@@ -105,7 +105,7 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
             there = x + share * (end - x)
             values = [domain.complex_value(there) for domain in model.domains]
             design = evaluate_design(problem, values, result.final.samples)
-            if design.value <= highest and design.excess <= KEPT:
+            if design.value <= highest and design.violation <= KEPT:
                 designs.append(there)
                 break
     return tuple(entry for domain in _moving(rows, designs) for entry in ranges_of(domain, designs))
@@ -134,7 +134,7 @@ def _ends(rows: AffineProblem, x: Array, share: float) -> list[Array]:
 
 def _approach(rows: AffineProblem, goal: AffineNorm, weight: float) -> list[Array]:
     x = solve_cones(replace(rows, terms=(*rows.terms, (weight, goal)))).x
-    return [] if x is None or rows.excess(x) > 10.0 * FEASIBLE else [x]
+    return [] if x is None or rows.violation(x) > 10.0 * FEASIBLE else [x]
 
 
 def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:

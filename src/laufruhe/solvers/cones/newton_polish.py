@@ -38,9 +38,9 @@ class Optimum:
     ----------
     problem
         Rows on the grid that the bound holds on.
-    excess
+    violation
         Largest relative excess over a limit, between the angles too.
-    nothing
+    zero_level
         Objective that counts as zero.
     then
         Method that followed the cones, in words.
@@ -50,9 +50,9 @@ class Optimum:
     bound: Bound
     problem: AffineProblem
     gap: float
-    excess: float
+    violation: float
     samples: int
-    nothing: float
+    zero_level: float
     then: str = ""
 
 
@@ -70,13 +70,13 @@ def polish(model: AffineModel, rough: Optimum) -> Optimum:
     averaged = model.at(samples, averaged=True)
     bound = lower_bound(averaged, Multipliers(tuple(rows), limits))
     value = fine.objective(x)
-    if gap_of(value, bound.value, rough.nothing) > TARGET_GAP:
+    if gap_of(value, bound.value, rough.zero_level) > TARGET_GAP:
         bound = max(bound, lower_bound(averaged, levelled(averaged, x, bound)), key=lambda each: each.value)
-    gap, excess = gap_of(value, bound.value, rough.nothing), fine.excess(x)
-    if gap >= rough.gap or excess > max(rough.excess, FEASIBLE):
+    gap, violation = gap_of(value, bound.value, rough.zero_level), fine.violation(x)
+    if gap >= rough.gap or violation > max(rough.violation, FEASIBLE):
         return rough
     then = " and Newton's method"
-    return replace(rough, x=x, bound=bound, problem=fine, gap=gap, excess=excess, then=then)
+    return replace(rough, x=x, bound=bound, problem=fine, gap=gap, violation=violation, then=then)
 
 
 def _is_smooth(problem: AffineProblem) -> bool:

@@ -103,13 +103,13 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = evaluate_design(problem, values, cycle_samples)
-    if fixed and design.excess > KEPT:
+    if fixed and design.violation > KEPT:
         design = evaluate_design(problem, values, with_fine_sampling(design.evaluation).samples)
     initial = replace(initial, samples=design.evaluation.samples)
     timing["evaluate"] = time.perf_counter() - solved
     bound = optimum.bound
     prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound)
-    unit = design.value if design.value > optimum.nothing else optimum.nothing / ROUNDING
+    unit = design.value if design.value > optimum.zero_level else optimum.zero_level / ROUNDING
     proof = ProofData(
         bound=bound.value,
         reach=ProofStrength.WHOLE,
@@ -132,7 +132,7 @@ def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tu
     return fixed, tuple(broken[:1])
 
 
-def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) -> tuple[Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, zero_level: float, begin: int) -> tuple[Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
 
     Parameters
@@ -152,23 +152,23 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
     # a limit that is nearly the least mean possible needs many angles
     maximum = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in in_time(range(maximum + 1)):
-        optimum = allowed_optimum(problem, model, samples, nothing)
+        optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
-            if best is not None and best.excess <= KEPT and _keeps_limits_finely(problem, best):
+            if best is not None and best.violation <= KEPT and _keeps_limits_finely(problem, best):
                 return best, samples
             # means averaged, for at a few angles alone one may be more than over the whole cycle (P7)
             if is_infeasible(model.at(samples, averaged=True)):
                 return None, samples
             # a limit that is nearly the least value possible is met within the tolerance of limits
-            optimum = _attempt(problem, model, samples, nothing, FEASIBLE - KEPT)
-            if optimum is not None and optimum.excess <= KEPT and _keeps_limits_finely(problem, optimum):
+            optimum = _attempt(problem, model, samples, zero_level, FEASIBLE - KEPT)
+            if optimum is not None and optimum.violation <= KEPT and _keeps_limits_finely(problem, optimum):
                 best = optimum
             samples *= 2
             continue
         best = optimum
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         is_close = best.gap <= problem.tolerance or not problem.search.proves
-        is_allowed = best.excess <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
+        is_allowed = best.violation <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
         is_fathomed = is_allowed and (is_close or k >= MOST_DOUBLINGS)
         if rows > MOST_ROWS or (is_fathomed and _keeps_limits_finely(problem, optimum)):
             break
@@ -184,23 +184,23 @@ def _keeps_limits_finely(problem: Problem, optimum: Optimum) -> bool:
     return violation_at_fine_sampling(problem, evaluate(problem, problem.design(values))) <= KEPT
 
 
-def allowed_optimum(problem: Problem, model: AffineModel, samples: int, nothing: float) -> Optimum | None:
+def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_level: float) -> Optimum | None:
     """Return an optimum at `samples` angles that keeps its limits between them too; None where there is none.
 
     A peak between the angles breaks its limit by a little. The next attempt lowers the limit at the angles
     by that little.
     """
-    optimum = _attempt(problem, model, samples, nothing, 0.0)
+    optimum = _attempt(problem, model, samples, zero_level, 0.0)
     margin = 0.0
     for _ in in_time(range(MOST_MARGINS)):
-        if optimum is None or optimum.excess <= FEASIBLE:
+        if optimum is None or optimum.violation <= FEASIBLE:
             break
-        margin += 1.05 * optimum.excess
-        optimum = _attempt(problem, model, samples, nothing, margin) or optimum
+        margin += 1.05 * optimum.violation
+        optimum = _attempt(problem, model, samples, zero_level, margin) or optimum
     return optimum
 
 
-def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float, margin: float) -> Optimum | None:
+def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: float, margin: float) -> Optimum | None:
     coarse, fine = model.at(samples), model.at(2 * samples)
     solution = solve_cones(tighten_limits(coarse, margin))
     if solution.x is None:
@@ -210,7 +210,9 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     bound = best_bound(averaged, x, refine_multipliers(coarse, averaged, solution.multipliers))
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
     judge = model.at(fine.samples, finer=True) if has_peaks else fine
-    return Optimum(x, bound, fine, gap_of(judge.objective(x), bound.value, nothing), judge.excess(x), samples, nothing)
+    return Optimum(
+        x, bound, fine, gap_of(judge.objective(x), bound.value, zero_level), judge.violation(x), samples, zero_level
+    )
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:

@@ -48,7 +48,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
     for _ in in_time(range(MOST_DIVISIONS)):
         design = search.chosen.design if search.chosen is not None else None
         value, known = math.inf, None
-        if design is not None and design.excess <= KEPT:
+        if design is not None and design.violation <= KEPT:
             # boxes cannot bound what few samples overestimate
             value = design.value - over_read(problem, design.evaluation)
             known = known_of(design, mount_numbers(design))
@@ -65,14 +65,14 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
     return divided
 
 
-def bounded_under(result: Result, value: float, enough: float = math.inf, of_many: bool = False) -> Result:
+def bounded_under(result: Result, value: float, cutoff: float = math.inf, of_many: bool = False) -> Result:
     """Return a result with a lower bound by all provers of its mounts.
 
     Parameters
     ----------
     value
         Objective of a design known from elsewhere; the bound need not be higher [SI].
-    enough
+    cutoff
         Bound at which the proof stops [SI].
     of_many
         Whether many results are bounded, so that cheap bounds come first.
@@ -80,8 +80,8 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
-    nothing = numerical_zero(problem, result.final.engine)
-    room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
+    zero_level = numerical_zero(problem, result.final.engine)
+    room = max(room_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / NEARLY)
     question = Question(problem, value, room, values_of(problem, result), of_many=of_many)
     divided = proven(question)
     if divided.bound <= certificate.lower_bound:
@@ -90,7 +90,7 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
     certificate = certified(
         result.objective.value,
         divided.bound,
-        nothing,
+        zero_level,
         problem.tolerance,
         ProofStrength.NEAR,
         certificate.kkt_residual,

@@ -123,7 +123,7 @@ def _solved(
             divided = divided_by(problem, search, among)
             best = search.chosen
             timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-            if best is None or best.design.excess > KEPT:
+            if best is None or best.design.violation > KEPT:
                 return _none(problem, search, initial, divided, timing), search.turns
             balance = ahead.result(best.design.values, _share(best.design))
     proven = None if balance is None else _rebalanced(best.design, *balance)
@@ -159,7 +159,7 @@ def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tu
     mounts, columns = iter(_mounts(design)), iter(unbalances)
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
     again = evaluate_design_at(design.problem, values)
-    return None if again is None or again.excess > KEPT else (again, gap)
+    return None if again is None or again.violation > KEPT else (again, gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -230,16 +230,16 @@ def _result(
     among: bool,
 ) -> Result:
     problem, design, optimum = search.problem, best.design, best.optimum
-    nothing = numerical_zero(problem, design.evaluation.engine)
+    zero_level = numerical_zero(problem, design.evaluation.engine)
     bound = divided.bound
     # the bound does not hold for moved throws
-    if search.moves is None and problem.search.proves and gap_of(design.value, bound, nothing) > problem.tolerance:
+    if search.moves is None and problem.search.proves and gap_of(design.value, bound, zero_level) > problem.tolerance:
         bound = max(bound, mounts_bound(problem, () if among else design.values))
     proof = ProofData(
         bound=bound,
         reach=ProofStrength.NEAR if divided.boxes else ProofStrength.ASIDE,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
-        method=_method(search.optima, max(design.value, nothing), proven, divided),
+        method=_method(search.optima, max(design.value, zero_level), proven, divided),
         prices=best.joint.prices(optimum) if optimum is not None else {},
     )
     if search.moves is not None:

@@ -23,7 +23,7 @@ from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
 from laufruhe.solvers.mounts.places import Place, evaluate_design_at, started_at
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
-from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear, try_all
+from laufruhe.solvers.smooth.nonlinear import StopWhen, solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
@@ -66,7 +66,7 @@ class SearchResult:
     @property
     def rank(self) -> tuple[float, float]:
         """Sort key: violation of limits, then objective."""
-        return max(self.design.excess, SLACK), self.design.value
+        return max(self.design.violation, SLACK), self.design.value
 
 
 class MountSearch:
@@ -123,16 +123,16 @@ class MountSearch:
         If the time budget is over, the first start is the result if it is feasible.
         """
         start = started_at(self.problem, self._points[0]) if passed() and self.moves is None else None
-        if start is not None and start.excess <= SLACK:
+        if start is not None and start.violation <= SLACK:
             self._keep_best(SearchResult(start, self.joint))
             return
-        nothing = numerical_zero(self.problem)
+        zero_level = numerical_zero(self.problem)
         self._repeat_with_active_limits(lambda: self._search(self._points))
         for _ in rounds(MOST_SIZES):
-            if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
+            if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= zero_level:
                 break
             # the solver's tolerance is relative to the unit of the objective
-            self._size = max(self.best.design.value, nothing)
+            self._size = max(self.best.design.value, zero_level)
             self.joint = self._program()
             self._search([_start_of(self.best), *self._points[1:]])
         self._tighten()
@@ -162,7 +162,7 @@ class MountSearch:
             if columns is not None or not self.problem.unbalances:
                 start = started_at(self.problem, starts[-1])
                 # a rounding over a limit is no improvement
-                if start is not None and start.excess <= 0.0:
+                if start is not None and start.violation <= 0.0:
                     self._keep_best(SearchResult(start, self.joint))
         self._repeat_with_active_limits(lambda: self._take(self._solve([self.joint.start(*start) for start in starts])))
         self._tighten()
@@ -174,7 +174,7 @@ class MountSearch:
         best, baseline = self.best, self._baseline
         if baseline is None or (best is not None and best.rank <= SearchResult(baseline, self.joint).rank):
             return best
-        same = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.excess <= SLACK
+        same = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.violation <= SLACK
         return SearchResult(baseline, self.joint, best.optimum if best is not None and same else None)
 
     @property
@@ -185,7 +185,7 @@ class MountSearch:
 
     @property
     def _is_feasible(self) -> bool:
-        return self.best is not None and self.best.design.excess <= SLACK
+        return self.best is not None and self.best.design.violation <= SLACK
 
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
         """Search from points, then from random points around the best ends."""
@@ -220,7 +220,7 @@ class MountSearch:
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
         for place in self._points[:CHECKED_STARTS] if limits else ():
             design = started_at(self.problem, place)
-            limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
+            limits = [x for x in limits if design is not None and design.evaluation.standing(x).violation < -ROOM]
         return set(limits)
 
     def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
@@ -233,10 +233,14 @@ class MountSearch:
 
     @property
     def _iterations(self) -> int:
-        return ITERATIONS if self.joint.program.told is None else SIMULATED_ITERATIONS
+        return ITERATIONS if self.joint.program.external is None else SIMULATED_ITERATIONS
 
-    def _solve(self, starts: Sequence[Array], enough: Enough | None = None, known: int = 0) -> tuple[LocalOptimum, ...]:
-        return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, enough=enough, known=known)
+    def _solve(
+        self, starts: Sequence[Array], stop_when: StopWhen | None = None, known: int = 0
+    ) -> tuple[LocalOptimum, ...]:
+        return solve_nonlinear(
+            self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when, known=known
+        )
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
@@ -253,7 +257,7 @@ class MountSearch:
                 designs.append(design)
                 result = SearchResult(design, self.joint, optimum)
                 self._keep_best(result)
-                if FEASIBLE < design.excess <= NEAR:
+                if FEASIBLE < design.violation <= NEAR:
                     self._nearly_feasible.append(result)
         self._active_again = {
             limit for limit in self._ignored if any(self._comes_close(design, limit) for design in designs)
@@ -263,7 +267,7 @@ class MountSearch:
         if self.best is not None and self._is_feasible and design.value > self.best.design.value:
             return False
         limits = [other for other in self.problem.limits if other not in self._ignored]
-        return design.evaluation.standing(limit).excess > -CLOSE and design.evaluation.excess(limits) <= NEAR
+        return design.evaluation.standing(limit).violation > -CLOSE and design.evaluation.violation(limits) <= NEAR
 
     def _keep_best(self, result: SearchResult) -> None:
         if self.best is None or result.rank < self.best.rank:
@@ -299,15 +303,15 @@ class MountSearch:
         ]  # fmt: skip
         for near in different[:MOST_AROUND]:
             best = self.best
-            if best is None or best.design.excess > FEASIBLE or near.design.value < best.design.value:
+            if best is None or best.design.violation > FEASIBLE or near.design.value < best.design.value:
                 self._search_with_margin(near)
 
     def _search_with_margin(self, near: SearchResult) -> None:
         margin = 0.0
         for _ in rounds(MOST_MARGINS):
-            if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
+            if near.optimum is None or not FEASIBLE < near.design.violation <= NEAR:
                 break
-            margin += 1.001 * near.design.excess
+            margin += 1.001 * near.design.violation
             joint = self._program(margin)
             ends = solve_nonlinear(joint.program, [near.optimum.x], 1, self._iterations)
             design = self._evaluated(ends[0], joint) if ends else None

@@ -193,17 +193,17 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
     first = bounded_under(found[0].result, minimum, of_many=len(found) > 1)
     out = [replace(found[0], result=first), *found[1:]]
     # the least bound of all stars is that of the problem
-    enough = first.certificate.lower_bound if first.certificate is not None else minimum
+    cutoff = first.certificate.lower_bound if first.certificate is not None else minimum
     pieces = [(k, each.result) for k, each in enumerate(found)][1:]
-    work = partial(_bounded_one, value=minimum, enough=enough)
+    work = partial(_bounded_one, value=minimum, cutoff=cutoff)
     for k, result in ordered_map(work, pieces, "bounds of stars on their mounts"):
         out[k] = replace(out[k], result=result)
     return out
 
 
-def _bounded_one(piece: tuple[int, Result], value: float, enough: float) -> tuple[int, Result]:
+def _bounded_one(piece: tuple[int, Result], value: float, cutoff: float) -> tuple[int, Result]:
     number, result = piece
-    return number, bounded_under(result, value, enough, of_many=True)
+    return number, bounded_under(result, value, cutoff, of_many=True)
 
 
 def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
@@ -235,14 +235,14 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     complete = len(found) == designs and not phasing.continuous
     ranking = [_entry(phasing, each, complete and each is best) for each in found if not _rank(each)[0]]
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
-    nothing = numerical_zero(problem, best.result.final.engine)
+    zero_level = numerical_zero(problem, best.result.final.engine)
     bound = 0.0
     if complete:
         certificates = [each.result.certificate for each in found]
         bound = min(certificate.lower_bound if certificate else 0.0 for certificate in certificates)
     divided = _divided(problem, phasing, best)
     bound = max(bound, divided.bound)
-    result, doubt = result_under(best.result, bound, nothing)
+    result, doubt = result_under(best.result, bound, zero_level)
     best = replace(best, result=result)
     method = details.method
     if divided.boxes:
@@ -251,7 +251,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     if certificate is not None:
         text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
         certificate = certified(
-            best.value, bound, nothing, problem.tolerance, ProofStrength.NEAR, residual, text, doubt
+            best.value, bound, zero_level, problem.tolerance, ProofStrength.NEAR, residual, text, doubt
         )
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 

@@ -132,7 +132,7 @@ def _evaluating(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[
     Points without an evaluation in time have infinite rows.
     """
     # higher orders hardly move a block, but take most of the time
-    loads = tuple(replace(load, wrench=load.wrench.series.kept(POOL_ORDERS)) for load in initial.loads)
+    loads = tuple(replace(load, wrench=load.wrench.series.truncated(POOL_ORDERS)) for load in initial.loads)
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
     shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
     with speculation(_scores, math.inf) as ahead:
@@ -163,10 +163,13 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
             design = remounted(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
-        missed, value = sum(max(design.standing(limit).excess, 0.0) for limit in limits), objective_value(plain, design)
+        missed, value = (
+            sum(max(design.standing(limit).violation, 0.0) for limit in limits),
+            objective_value(plain, design),
+        )
         if peaks is not None and peaks.is_known:
-            excess, worth = _of_peaks(problem, peaks, row)
-            missed, value = MISSED_WEIGHT * (missed + excess), value + worth
+            violation, worth = _of_peaks(problem, peaks, row)
+            missed, value = MISSED_WEIGHT * (missed + violation), value + worth
         out[k] = missed, value
     return out
 

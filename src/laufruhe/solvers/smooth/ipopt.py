@@ -56,7 +56,7 @@ _ENDINGS = {
 }
 
 
-class Teller(Protocol):
+class ExternalModel(Protocol):
     """A model outside a program, that another process can read."""
 
     def values(self, asked: Array) -> Array:
@@ -67,11 +67,11 @@ class Teller(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Outside:
+class SerializedExternal:
     """Numbers that a teller gives, of a serialized function of the variables; the oracle has them as its input r."""
 
     asked: str
-    teller: Teller
+    model: ExternalModel
     count: int
 
 
@@ -90,7 +90,7 @@ class Task:
     max_iterations: int
     max_seconds: float
     expand: bool
-    outside: Outside | None = None
+    outside: SerializedExternal | None = None
     deciding: int | None = None
 
 
@@ -133,7 +133,7 @@ class _Clock(ca.Callback):
         return [float(time.monotonic() > self._until)]
 
 
-class _Told(ca.Callback):
+class _ExternalFunction(ca.Callback):
     """A function of columns that Python answers; its derivative is another one."""
 
     def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
@@ -158,9 +158,9 @@ class _Told(ca.Callback):
         """Return the sparsity of the output: a dense matrix."""
         return ca.Sparsity.dense(*self._shape)
 
-    def eval(self, told: Any) -> list[Any]:
+    def eval(self, external: Any) -> list[Any]:
         """Return the answer at the first input; a derivative also receives the values, and ignores them."""
-        return [ca.DM(self._answer(_flat(told[0])))]
+        return [ca.DM(self._answer(_flat(external[0])))]
 
     def has_jacobian(self, *_: Any) -> bool:
         """Tell if derivatives are available."""
@@ -169,7 +169,7 @@ class _Told(ca.Callback):
     def get_jacobian(self, name: str, *_: Any) -> Any:
         """Kept, for CasADi does not."""
         count = self._shape[0]
-        self._derivative = _Told(name, (*self._sizes, count), (count, self._sizes[0]), self._slopes, None)
+        self._derivative = _ExternalFunction(name, (*self._sizes, count), (count, self._sizes[0]), self._slopes, None)
         return self._derivative
 
 
@@ -193,30 +193,32 @@ class _Program:
 
 
 @lru_cache(maxsize=_BUILT)
-def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | None, near: bool = False) -> _Program:
+def _built(
+    oracle: str, expand: bool, max_iterations: int, outside: SerializedExternal | None, near: bool = False
+) -> _Program:
     """A program that can be solved, and stays `near` its start: to build it costs as much as some starts."""
-    function, told = ca.Function.deserialize(oracle), None
+    function, external = ca.Function.deserialize(oracle), None
     if expand:
         scalars = function.expand()
         if scalars.n_instructions() <= LONG * function.n_instructions():
             function = scalars
     solver = {**_OPTIONS, **(_NEAR if near else {}), "max_iter": max_iterations}
     if outside is not None:
-        function, told = _with_outside(function, outside)
+        function, external = _with_outside(function, outside)
         # slopes are told, and no bends
         solver |= {"hessian_approximation": "limited-memory", "tol": LOOSER}
     n, m = function.size1_in("x"), function.size1_out("g")
     clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
     options: dict[str, Any] = {**_QUIET, "ipopt": solver, "iteration_callback": clock}
-    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, told)
+    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, external)
 
 
-def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
-    asked, teller, count = ca.Function.deserialize(outside.asked), outside.teller, outside.count
-    told = _Told("told", (asked.size1_out(0),), (count, 1), teller.values, teller.slopes)
+def _with_outside(function: Any, outside: SerializedExternal) -> tuple[Any, _ExternalFunction]:
+    asked, model, count = ca.Function.deserialize(outside.asked), outside.model, outside.count
+    external = _ExternalFunction("told", (asked.size1_out(0),), (count, 1), model.values, model.slopes)
     x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
-    found = function(x=x, p=p, r=told(asked(x)))
-    return ca.Function("oracle", {"x": x, "p": p, "f": found["f"], "g": found["g"]}, ["x", "p"], ["f", "g"]), told
+    found = function(x=x, p=p, r=external(asked(x)))
+    return ca.Function("oracle", {"x": x, "p": p, "f": found["f"], "g": found["g"]}, ["x", "p"], ["f", "g"]), external
 
 
 def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:

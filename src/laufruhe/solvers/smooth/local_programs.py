@@ -75,7 +75,7 @@ class LocalProgram:
         edges = self.edges(shares)
         try:
             evaluation = evaluate(self.problem.fixed_at(self.values(shares)))
-            rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
+            rooms = [-evaluation.standing(limit).violation for limit in self.problem.limits]
             return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
         except ModelError:
             return np.array([math.inf, *(-1.0 for _ in self.problem.limits), *edges])
@@ -178,7 +178,7 @@ def _rank(numbers: Array) -> tuple[float, float]:
     return max(-min(rooms, default=0.0), KEPT), float(value)
 
 
-BoxSearch: TypeAlias = Callable[[float, float, Design], BoxResult]
+BoundedBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
 """What no design goes under, where one of this value is known and another by less than this room no better; the one."""
 
 
@@ -193,15 +193,15 @@ class Proven:
     @property
     def excludes_all(self) -> bool:
         """Tell if no design keeps the limits."""
-        return self.design.excess > KEPT and self.divided.bound == math.inf
+        return self.design.violation > KEPT and self.divided.bound == math.inf
 
     @property
     def bound(self) -> float:
         """Lower bound of the objective; zero if the design breaks a limit."""
-        return self.divided.bound if self.design.excess <= KEPT else 0.0
+        return self.divided.bound if self.design.violation <= KEPT else 0.0
 
 
-def proven(program: LocalProgram, best: Array, bounded: BoxSearch) -> Proven:
+def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
     """A design and its bound, sought once more where boxes promise more than what was found."""
     problem = program.problem
     found = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
@@ -209,7 +209,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoxSearch) -> Proven:
         if passed():
             break
         value, room = math.inf, 0.0
-        if found.design.excess <= KEPT:
+        if found.design.violation <= KEPT:
             value = found.design.value
             room = room_of(value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine))
             # boxes do not make good what few angles read too much
@@ -225,7 +225,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoxSearch) -> Proven:
     return found
 
 
-def shown(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
+def proof_data(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
     """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
     from scipy.optimize import nnls
 

@@ -43,10 +43,10 @@ from laufruhe.numerics.workers import (
     unordered_map,
     worker_count,
 )
-from laufruhe.solvers.smooth.ipopt import Outside, Task, Teller, run
+from laufruhe.solvers.smooth.ipopt import ExternalModel, SerializedExternal, Task, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
-Enough: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
+StopWhen: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
 Share: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
 Several: TypeAlias = Callable[[Share], list[LocalOptimum]]
 
@@ -58,12 +58,12 @@ SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Told:
+class ExternalNumbers:
     """Column of symbols, what a teller is asked for them as an expression of the variables, and who tells."""
 
     symbols: Any
     asked: Any
-    teller: Teller
+    model: ExternalModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +93,7 @@ class NonlinearProgram:
     expand
         Whether the expressions may be written out as scalars where several starts share
         the cost and arrays are short: three times as fast to evaluate, and slower to set up.
-    told
+    external
         Numbers in the expressions that a model outside tells.
     deciding
         How many of the first variables tell two ends apart: all when None. Shapes of modes, that
@@ -113,7 +113,7 @@ class NonlinearProgram:
     parameters: Any = None
     stages: tuple[tuple[float, ...], ...] = ((),)
     expand: bool = False
-    told: Told | None = None
+    external: ExternalNumbers | None = None
     deciding: int | None = None
 
     def __post_init__(self) -> None:
@@ -140,13 +140,13 @@ def solve_nonlinear(
     workers: int | None = None,
     max_iterations: int = 500,
     max_seconds: float = 60.0,
-    enough: Enough | None = None,
+    stop_when: StopWhen | None = None,
     known: int = 0,
 ) -> tuple[LocalOptimum, ...]:
     """Local optima that the starts lead to, the best usable one first.
 
-    A search of many starts, which `enough` may end, takes all through the first stage; of those that end there at one
-    point, one goes on, and none that is worse there than the best is in the end: what softens norms less makes no
+    A search of many starts, which `stop_when` may end, takes all through the first stage; of those that end there at
+    one point, one goes on, and none that is worse there than the best is in the end: what softens norms less makes no
     end better (N4). Else each goes through all stages: from one point a solver may come to several optima.
 
     Parameters
@@ -159,7 +159,7 @@ def solve_nonlinear(
         Workers at most; as many as processors when left out, and none where the work is over sooner.
     max_iterations, max_seconds
         Of every start and stage.
-    enough
+    stop_when
         Whether the ends of the first stage so far tell all; all starts are tried when left out.
     known
         Starts that the program has had before, for which it was built.
@@ -172,17 +172,17 @@ def solve_nonlinear(
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
     task = _task(program, max_iterations, max_seconds, known + len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
-        if enough is None:
+        if stop_when is None:
             optima = _first_ends(task, points, workers, None, stack)[0]
         else:
             first = replace(task, stages=task.stages[:1])
-            found, several = _first_ends(first, points, workers, enough, stack)
+            found, several = _first_ends(first, points, workers, stop_when, stack)
             optima = _polished(task, _grouped(found, task), several)
     return tuple(sorted(optima, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
 def _first_ends(
-    task: Task, points: Sequence[tuple[int, Array]], workers: int | None, enough: Enough | None, stack: ExitStack
+    task: Task, points: Sequence[tuple[int, Array]], workers: int | None, stop_when: StopWhen | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], Several]:
     """Return the optima that the starts end at, and the function that ran them."""
     rest = points[1:]
@@ -190,15 +190,15 @@ def _first_ends(
     # threads would share a linear solver that knows of one alone
     at_hand = _AtHand(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
     if at_hand is not None:
-        at_hand.begin((task, rest[:ROUND] if enough is not None else rest))
+        at_hand.begin((task, rest[:ROUND] if stop_when is not None else rest))
     # one start tells whether the others are worth processes of their own
     began = time.process_time()
     found = run((task, points[:1]))
     spent = sum(o.seconds for o in found)
     pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - began - spent)
     several: Several = at_hand or (_Shared(stack, count) if count > 1 and pays else run)
-    while rest and not passed() and not (enough is not None and enough(_grouped(found, task))):
-        some, rest = (rest[:ROUND], rest[ROUND:]) if enough is not None else (rest, [])
+    while rest and not passed() and not (stop_when is not None and stop_when(_grouped(found, task))):
+        some, rest = (rest[:ROUND], rest[ROUND:]) if stop_when is not None else (rest, [])
         found += several((task, some))
     return found, several
 
@@ -296,15 +296,17 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
     scales = program.variable_scales
     constraints = symbol(0, 1) if program.constraints is None else program.constraints
     parameters = symbol(0, 1) if program.parameters is None else program.parameters
-    y, told, outside = symbol.sym("y", program.x.numel()), program.told, None
+    y, external, outside = symbol.sym("y", program.x.numel()), program.external, None
     f, g, asked = ca.substitute(
         [program.objective / program.objective_scale, constraints,
-         symbol(0, 1) if told is None else told.asked], [program.x], [y * ca.DM(scales)]
+         symbol(0, 1) if external is None else external.asked], [program.x], [y * ca.DM(scales)]
     )  # fmt: skip
     inputs = {"x": y, "p": parameters}
-    if told is not None:
-        inputs["r"] = told.symbols
-        outside = Outside(ca.Function("asked", [y], [asked]).serialize(), told.teller, told.symbols.numel())
+    if external is not None:
+        inputs["r"] = external.symbols
+        outside = SerializedExternal(
+            ca.Function("asked", [y], [asked]).serialize(), external.model, external.symbols.numel()
+        )
     oracle = ca.Function("oracle", {**inputs, "f": f, "g": g}, list(inputs), ["f", "g"])
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower,

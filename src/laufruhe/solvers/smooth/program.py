@@ -149,14 +149,14 @@ class SmoothProgram:
             parameters=self._e,
             stages=self._stages,
             expand=True,
-            told=self._simulated.told,
+            external=self._simulated.external,
             deciding=self._turned.stop,
         )
 
     @property
     def _stages(self) -> tuple[tuple[float, ...], ...]:
         # N4: one stage if simulations are costly and no softened term is minimised
-        plain = self._simulated.told is not None and not self.problem.load_terms
+        plain = self._simulated.external is not None and not self.problem.load_terms
         return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -345,6 +345,6 @@ class SmoothProgram:
         if self._held.heads:
             given = [self._v, self._u, self._t, self._simulated.symbols]
             values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
-            told = values(self._inner(mounts), columns, turns, self._simulated.at(mounts, columns))
-            parts.append(1.05 * np.asarray(told, dtype=float).reshape(-1))
+            external = values(self._inner(mounts), columns, turns, self._simulated.at(mounts, columns))
+            parts.append(1.05 * np.asarray(external, dtype=float).reshape(-1))
         return np.concatenate(parts)

@@ -16,7 +16,7 @@ from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.gathered import Gathered
-from laufruhe.solvers.smooth.nonlinear import Told
+from laufruhe.solvers.smooth.nonlinear import ExternalNumbers
 
 
 class SimulatedVariables:
@@ -48,9 +48,9 @@ class SimulatedVariables:
             self._sizes[measure] = maximum if 0.0 < maximum < math.inf else 1.0
 
     @property
-    def told(self) -> Told | None:
+    def external(self) -> ExternalNumbers | None:
         """Outside source of the peaks; None without simulated measures."""
-        return None if self._peaks is None else Told(self.symbols, self._asked, self._peaks)
+        return None if self._peaks is None else ExternalNumbers(self.symbols, self._asked, self._peaks)
 
     def at(self, mounts: Sequence[float], columns: Array) -> Array:
         """Peaks of a design."""

@@ -59,7 +59,7 @@ def search_designs(
     count: int,
     tolerance: float,
     time_limit: float = float("inf"),
-    nothing: float = 0.0,
+    zero_level: float = 0.0,
 ) -> CutSearchResult:
     """Return the best designs of stars and shafts, proven (S15).
 
@@ -75,7 +75,7 @@ def search_designs(
         Relative gap at which a bound meets a value.
     time_limit
         [s].
-    nothing
+    zero_level
         Value that counts as zero [SI].
     """
     started = time.perf_counter()
@@ -93,7 +93,7 @@ def search_designs(
         lower_bound = min([beyond, *(one.bound for one in solved)])
         values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
-        if not is_open.any() or beyond >= target - room_of(target, tolerance, nothing):
+        if not is_open.any() or beyond >= target - room_of(target, tolerance, zero_level):
             complete = True
             break
         has_tried = bool(solved or infeasible)
@@ -103,7 +103,7 @@ def search_designs(
         report_progress("stars and sets of shafts", len(solved) + infeasible, bounds.size, best, lower_bound)
         row, column = divmod(int(np.argmin(left)), len(sets))
         star = tuple(int(p) for p in stars[row])
-        design, cut = solve_design(model, star, sets[column], owners, tolerance, nothing)
+        design, cut = solve_design(model, star, sets[column], owners, tolerance, zero_level)
         is_open[row, column] = False
         if cut is not None:
             _raise_bounds(bounds, cut, design is None, stars, sets, owners)

@@ -64,7 +64,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     shared = sum((term.weight * result.final.value(term.measure) for term in wheel_terms), 0.0)
     value, proof = objective_value(problem, result.final), result.certificate
     bound = shared + (proof.lower_bound if terms else 0.0)
-    nothing = numerical_zero(problem, result.final.engine)
+    zero_level = numerical_zero(problem, result.final.engine)
     details = result.phasing
     if details is not None and terms:
         ranking = (replace(s, value=s.value + shared, lower_bound=s.lower_bound + shared) for s in details.ranking)
@@ -74,7 +74,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
         result,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
         certificate=certified(
-            value, bound, nothing, problem.tolerance, ProofStrength.WHOLE, proof.kkt_residual, method
+            value, bound, zero_level, problem.tolerance, ProofStrength.WHOLE, proof.kkt_residual, method
         ),
         phasing=details,
         error=partial(error_of, result.problem, result.final),

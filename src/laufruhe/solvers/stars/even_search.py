@@ -73,7 +73,7 @@ class EvenDesign:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class EvenStarResult:
     """Designs, best first, and the bound of all designs."""
 
     designs: tuple[EvenDesign, ...]
@@ -108,7 +108,7 @@ def _too_many() -> ModelError:
     return ModelError(f"a crank of more than {MOST_LISTED} even stars {rule}; {remedy}")
 
 
-def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
     """Return the best designs of all even stars: every star where orders alone count, else cuts of cone programs."""
     if not can_list(problem, families):
         raise _too_many()
@@ -147,22 +147,22 @@ def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
     return amplitude_objective(first, phasing, family.layout)
 
 
-def listed_answer(phasing: Phasing, family: Family, listed: StarSearchResult, method: str) -> Answer:
+def listed_answer(phasing: Phasing, family: Family, listed: StarSearchResult, method: str) -> EvenStarResult:
     """Return the result of a search of stars alone as an answer."""
     designs = tuple(
         EvenDesign.of_steps(phasing, family, tuple(map(int, star)), (), float(value), float(value), listed.complete)
         for star, value in zip(listed.stars, listed.values, strict=True)
     )
-    return Answer(designs, listed.lower_bound, listed.complete, listed.nodes, method)
+    return EvenStarResult(designs, listed.lower_bound, listed.complete, listed.nodes, method)
 
 
-def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
-    nothing = numerical_zero(problem)
+def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
+    zero_level = numerical_zero(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
     for family in families:
         model = family.model(phasing)
-        search = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, nothing)
+        search = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, zero_level)
         highest = search.beyond * (1.0 + problem.tolerance)
         designs = tuple(
             EvenDesign.of_steps(phasing, family, s.star, s.built, s.value, s.bound, s.value <= highest)
@@ -170,13 +170,15 @@ def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Famil
         )
         method = f"cone programs of {len(search.solved)} of {search.designs} designs, dual cuts for the others"
         # what is proven of the best does not need the whole ranking
-        is_closed = bool(designs) and gap_of(designs[0].value, search.lower_bound, nothing) <= problem.tolerance
+        is_closed = bool(designs) and gap_of(designs[0].value, search.lower_bound, zero_level) <= problem.tolerance
         complete = search.complete or is_closed
-        answers.append(Answer(designs, search.lower_bound, complete, len(search.solved), method, search.infeasible))
+        answers.append(
+            EvenStarResult(designs, search.lower_bound, complete, len(search.solved), method, search.infeasible)
+        )
     return merge_answers(answers, phasing.best)
 
 
-def merge_answers(answers: Sequence[Answer], count: int) -> Answer:
+def merge_answers(answers: Sequence[EvenStarResult], count: int) -> EvenStarResult:
     """Return the best `count` designs of several geometries, equal ones counted once."""
     best: list[EvenDesign] = []
     for design in sorted((d for answer in answers for d in answer.designs), key=lambda d: d.value):
@@ -184,7 +186,7 @@ def merge_answers(answers: Sequence[Answer], count: int) -> Answer:
             best.append(design)
         if len(best) == count:
             break
-    return Answer(
+    return EvenStarResult(
         tuple(best),
         min(answer.bound for answer in answers),
         all(answer.complete for answer in answers),

@@ -24,7 +24,7 @@ from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers.conclusion import quoted, result_under
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.even_irregularity import flywheel_measures, solve_alike_stars
-from laufruhe.solvers.stars.even_search import Answer, EvenDesign, search_even
+from laufruhe.solvers.stars.even_search import EvenDesign, EvenStarResult, search_even
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import ORDERS_LISTED, distinct_orders, ranked_orders, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
@@ -36,7 +36,7 @@ MOST_TIMES, ROUNDS = 16, 2
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 """A star, and its steps where it fires evenly."""
 Decide: TypeAlias = Callable[[Problem, float], Result]
-Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], Answer]
+Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResult]
 
 
 def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
@@ -137,7 +137,7 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
     return result
 
 
-def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
+def _best_of(problem: Problem, phasing: Phasing, answer: EvenStarResult) -> Result:
     """Solve the best even design once more as a problem of its own, with the bound of all designs (S17)."""
     entries = [design.ranked(phasing) for design in answer.designs]
     fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
@@ -154,12 +154,12 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     else:
         why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
-    shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
-    bound, nothing = max(answer.bound, shared), numerical_zero(problem)
-    result, doubt = result_under(result, bound, nothing)
+    shared = firing_bound(problem, result.final) if result.objective and not any(phasing.is_geometry_open) else 0.0
+    bound, zero_level = max(answer.bound, shared), numerical_zero(problem)
+    result, doubt = result_under(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
     certificate = certified(
-        value, bound, nothing, problem.tolerance, ProofStrength.WHOLE,
+        value, bound, zero_level, problem.tolerance, ProofStrength.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
@@ -175,11 +175,11 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
         return needed
     model = best.family.model(phasing)
     owners = shaft_owners(model)
-    nothing, tolerance = numerical_zero(problem), 0.5 * problem.tolerance
+    zero_level, tolerance = numerical_zero(problem), 0.5 * problem.tolerance
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in needed if j != k)
-        again, _ = solve_design(model, best.steps, fewer, owners, tolerance, nothing)
-        if again is not None and again.value <= best.value + room_of(best.value, tolerance, nothing):
+        again, _ = solve_design(model, best.steps, fewer, owners, tolerance, zero_level)
+        if again is not None and again.value <= best.value + room_of(best.value, tolerance, zero_level):
             needed = fewer
     return needed
 
@@ -234,10 +234,10 @@ def solve_every_order(
         why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
         status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
         return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())
-    nothing = numerical_zero(problem)
+    zero_level = numerical_zero(problem)
     best = solved[0]
     for design in solved[1:]:
-        if design.value < best.value - room_of(best.value, 0.5 * problem.tolerance, nothing):
+        if design.value < best.value - room_of(best.value, 0.5 * problem.tolerance, zero_level):
             best = design
     bound = min(design.bound for design in every) if complete else 0.0
     count = sum(map(len, orders.values()))
@@ -248,9 +248,9 @@ def solve_every_order(
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     reach = ProofStrength.WHOLE if maximum is None else ProofStrength.ASIDE
-    result, doubt = result_under(best.result, bound, nothing)
+    result, doubt = result_under(best.result, bound, zero_level)
     best = replace(best, result=result)
-    certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how, doubt)
+    certificate = certified(best.value, bound, zero_level, problem.tolerance, reach, residual, how, doubt)
     # the first design of every star, its own firing order before the others of the star
     firsts: dict[Candidate, StarDesign] = {}
     for design in [best, *sorted(solved, key=lambda one: one.value)]:

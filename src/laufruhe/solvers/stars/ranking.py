@@ -195,7 +195,7 @@ def why_no_order(phasing: Phasing, throws: Sequence[float]) -> str:
     if not orders:
         return f"throws [{angles}] deg let cylinders fire at once, and in a firing order each has its turn"
     nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
-    text = f"throws [{angles}] deg contradict the firing intervals allowed, {phasing.intervals.shown}"
+    text = f"throws [{angles}] deg contradict the firing intervals allowed, {phasing.intervals.text}"
     return f"{text}; the most even order of these throws has intervals {interval_range(nearest.intervals)}"
 
 

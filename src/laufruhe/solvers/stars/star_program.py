@@ -55,7 +55,7 @@ def solve_design(
     built: tuple[int, ...],
     owners: Sequence[int],
     tolerance: float,
-    nothing: float = 0.0,
+    zero_level: float = 0.0,
 ) -> tuple[Solved | None, Cut | None]:
     """Find the optimum of one star with one set of shafts, and its bound of all others.
 
@@ -101,11 +101,14 @@ def solve_design(
             if samples < full:
                 continue
         bound = best_bound(_without_fixed_limits(averaged, fixed), solution.x, solution.multipliers)
-        value, excess = fine_rows.objective(solution.x), _without_fixed_limits(fine_rows, fixed).excess(solution.x)
+        value, violation = (
+            fine_rows.objective(solution.x),
+            _without_fixed_limits(fine_rows, fixed).violation(solution.x),
+        )
         best = (Solved(star, built, value, bound.value), bound, solution.x)
         # what averages fall short by, no grid of this fidelity gains; a design alone is as good at few angles
-        is_close = gap_of(averaged.objective(solution.x), bound.value, nothing) <= 0.25 * tolerance or not proves
-        if is_close and excess <= FEASIBLE:
+        is_close = gap_of(averaged.objective(solution.x), bound.value, zero_level) <= 0.25 * tolerance or not proves
+        if is_close and violation <= FEASIBLE:
             break
     if best is None:
         return None, None

@@ -43,7 +43,7 @@ class StarDesign:
     @cached_property
     def is_met(self) -> bool:
         """True if it is a design within its limits."""
-        return self.result.status.has_design and self.result.final.excess(self.result.problem.limits) <= KEPT
+        return self.result.status.has_design and self.result.final.violation(self.result.problem.limits) <= KEPT
 
     @property
     def is_excluded(self) -> bool:
@@ -51,7 +51,7 @@ class StarDesign:
         result = self.result
         if not result.status.has_design:
             return result.status is Status.INFEASIBLE
-        return with_fine_sampling(result.final).excess(result.problem.limits) > KEPT
+        return with_fine_sampling(result.final).violation(result.problem.limits) > KEPT
 
     @property
     def value(self) -> float:

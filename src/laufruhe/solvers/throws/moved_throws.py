@@ -48,7 +48,7 @@ class _MovedCrank:
         """Return the drawing, or raise `ModelError` if the crank does not keep the firing intervals allowed."""
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
-            raise ModelError(f"these throws do not fire {self.phasing.intervals.shown} apart")
+            raise ModelError(f"these throws do not fire {self.phasing.intervals.text} apart")
         realised = self.phasing.realise(candidate)
         others = {path: value for path, value in changes.items() if path[0] != CRANK}
         if others:

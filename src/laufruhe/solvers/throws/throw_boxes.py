@@ -43,7 +43,7 @@ _FAINT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class ThrowProgram:
     """Norms of one firing window, rows affine in unbalances, waves of the throws, and the throws.
 
     Attributes
@@ -79,7 +79,7 @@ class ThrowBox:
         Distance of the mixture of every throw from standing at one angle, as it weighs.
     """
 
-    program: Program
+    program: ThrowProgram
     lower: Array
     upper: Array
     bound: float
@@ -135,7 +135,7 @@ class ThrowPrograms:
             by_order = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
             sizes += by_order / (float(by_order.max()) or 1.0)
         self._followed = int(np.flatnonzero(sizes > waves.followed * sizes.max()).max(initial=0)) + 1
-        self._by_laps: dict[tuple[int, ...], Program] = {}
+        self._by_laps: dict[tuple[int, ...], ThrowProgram] = {}
         self._proofs: list[Multipliers] = []
         self.conflict: set[str] = set()
 
@@ -144,7 +144,7 @@ class ThrowPrograms:
         """Share of the objective that the orders left out may have [SI]."""
         return sum(weight * norm.left_out for weight, norm in self._terms)
 
-    def program(self, window: FiringWindow) -> Program:
+    def program(self, window: FiringWindow) -> ThrowProgram:
         """Return the program of one order of firing."""
         if window.laps not in self._by_laps:
             self._by_laps[window.laps] = self._with_laps(window)
@@ -156,7 +156,7 @@ class ThrowPrograms:
         heavy = replace(program.heavy, limits=(*program.heavy.limits, (1.0, self._without_faint_orders(intervals))))
         return replace(program, window=window, rows=rows, heavy=heavy, names=(*program.names, ""))
 
-    def _with_laps(self, window: FiringWindow) -> Program:
+    def _with_laps(self, window: FiringWindow) -> ThrowProgram:
         """Return the program of all orders of firing with the same whole turns, without limits on intervals."""
         terms = tuple((weight, self._rows(norm, window.laps)) for weight, norm in self._terms)
         limits = tuple((limit.maximum + norm.left_out, self._rows(norm, window.laps)) for limit, norm in self._limits)
@@ -173,7 +173,7 @@ class ThrowPrograms:
             tuple((maximum, self._without_faint_orders(norm)) for maximum, norm in limits), (), 1,
         )  # fmt: skip
         names = tuple(limit.name for limit, _ in self._limits)
-        return Program(window, AffineProblem(terms, limits, (), 1), heavy, names, weights, pulls)
+        return ThrowProgram(window, AffineProblem(terms, limits, (), 1), heavy, names, weights, pulls)
 
     def _without_faint_orders(self, norm: AffineNorm) -> AffineNorm:
         count, followed = len(self.waves.orders), np.arange(self._followed)
@@ -218,7 +218,7 @@ class ThrowPrograms:
         )  # fmt: skip
 
     def box(
-        self, program: Program, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
     ) -> ThrowBox | Over:
         """Bound a box, cut down to where a design may be better than `cut`; `Over` where none is.
 
@@ -254,7 +254,7 @@ class ThrowPrograms:
             yield self.box(box.program, *half, box.bound, cut)
 
     def _bounded(
-        self, program: Program, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
     ) -> ThrowBox | Over:
         """Bound a box by one program."""
         columns = self._riders.columns(*self.waves.arcs(lower, upper))
@@ -304,7 +304,9 @@ class ThrowPrograms:
         arcs = arc_box.functions(by_throw[:, :count] - 1j * by_throw[:, count:-1], by_throw[:, -1], shared)
         return float(value + arcs.minimum), arcs
 
-    def _is_excluded(self, program: Program, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox) -> bool:
+    def _is_excluded(
+        self, program: ThrowProgram, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox
+    ) -> bool:
         limits = replace(program.rows, terms=())
         value, _ = self._bound(limits, columns, multipliers, arc_box)
         prices = [norm.dual_norm(z) for (_, norm), z in zip(limits.limits, multipliers.limits, strict=False)]
@@ -354,7 +356,7 @@ class Mixture:
         Number of columns of unbalances.
     """
 
-    def __init__(self, program: Program, columns: BoxColumns, lower: Array, upper: Array, orders: Array) -> None:
+    def __init__(self, program: ThrowProgram, columns: BoxColumns, lower: Array, upper: Array, orders: Array) -> None:
         self.unbalances, self._orders = columns.matrix.shape[1], orders
         throws, shared_count = len(program.weights), orders.shape[1] - 1
         rows, self._weights = program.heavy, program.weights[:, : len(orders)]

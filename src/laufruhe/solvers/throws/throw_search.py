@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import room_of
 from laufruhe.prove.witness import Known, thin
-from laufruhe.solvers.boxes.search import Search, divided
+from laufruhe.solvers.boxes.search import BoxSearch, divided
 from laufruhe.solvers.conclusion import FEASIBLE, read_under
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
@@ -202,8 +202,8 @@ def search_throws(
     improve
         Local search from throws that look good.
     """
-    nothing = numerical_zero(problem)
-    is_proven = best is not None and best.value - floor <= room_of(best.value, problem.tolerance, nothing)
+    zero_level = numerical_zero(problem)
+    is_proven = best is not None and best.value - floor <= room_of(best.value, problem.tolerance, zero_level)
     # gas beside a shaft of a ratio that is no whole number does not repeat after a working cycle
     repeats = not problem.feels_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
     if is_proven or not repeats or not problem.objective:
@@ -221,11 +221,13 @@ def search_throws(
     except ModelError:
         return None
     maximum = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
-    incumbent, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, maximum, search.what)
+    incumbent, bound, boxes = divided(
+        search, _Part(floor), _Best(best), zero_level, search.reached, maximum, search.what
+    )
     return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
 
 
-class ThrowSearch(Search[_Part, _Best]):
+class ThrowSearch(BoxSearch[_Part, _Best]):
     """Windows and boxes of the throws of a problem."""
 
     def __init__(
@@ -235,9 +237,9 @@ class ThrowSearch(Search[_Part, _Best]):
         self._problem, self._phasing, self._improve = problem, phasing, improve
         self._seen = self._tried = self._stood = 0
         self._best, self._not_met = _Best(best), set[str]()
-        self.what = "boxes of throws" + (" and angles" if any(phasing.opened) else "")
+        self.what = "boxes of throws" + (" and angles" if any(phasing.is_geometry_open) else "")
         throws = phasing.layout(*phasing.minimum_geometry).throw_positions
-        is_one_angle = sum(phasing.opened) == 1 and len(throws) == 1 and phasing.throw_bounds is None
+        is_one_angle = sum(phasing.is_geometry_open) == 1 and len(throws) == 1 and phasing.throw_bounds is None
         self._most_samples = MOST_OF_ONE_ANGLE if is_one_angle else MOST_SAMPLES
         tolerable = COST_OF_ONE_ANGLE if is_one_angle else STEPS_COST
         self._finest: Stage | None = None
@@ -311,13 +313,13 @@ class ThrowSearch(Search[_Part, _Best]):
     def _waves(self, problem: Problem, candidate: Candidate, rides: dict[str, int]) -> ThrowWaves:
         phasing = self._phasing
         layout = phasing.layout_of(candidate)
-        if not any(phasing.opened):
+        if not any(phasing.is_geometry_open):
             return ThrowWaves(problem, layout, rides)
         if not has_same_unbalances(phasing, candidate):
             raise ModelError("what rides on a throw knows how far pins are apart")
         # where nothing tells when the crank turns, its first throw stays where it is, and what rides on it
         stands = phasing.throw_bounds is not None or turns_freely(phasing, candidate, rides)
-        return ThrowWaves(problem, layout, rides, phasing.opened, 0.0 if stands else layout.side(0))
+        return ThrowWaves(problem, layout, rides, phasing.is_geometry_open, 0.0 if stands else layout.side(0))
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """Return a design with these throws, and with a firing order that they keep."""
@@ -338,14 +340,14 @@ class ThrowSearch(Search[_Part, _Best]):
     def known(self, incumbent: _Best) -> Known | None:
         """Return the best design as a witness of bounds; None where there is none."""
         best = incumbent.design
-        if best is None or best.result.final.excess(best.result.problem.limits) > FEASIBLE:
+        if best is None or best.result.final.violation(best.result.problem.limits) > FEASIBLE:
             return None
         return Known(np.array(best.candidate.throws), best.value, lambda: self._highest_objective(best))
 
     def _highest_objective(self, best: StarDesign) -> float:
-        nothing, result = numerical_zero(self._problem), best.result
-        read = read_under(result.problem, result.final, best.value, math.inf, nothing)
-        return read.value + read.doubt + nothing
+        zero_level, result = numerical_zero(self._problem), best.result
+        read = read_under(result.problem, result.final, best.value, math.inf, zero_level)
+        return read.value + read.doubt + zero_level
 
     def around(self, incumbent: _Best) -> _Part | Over | None:
         """Return a thin box of throws around a design, and its bound; None where it is an image of one that stays."""

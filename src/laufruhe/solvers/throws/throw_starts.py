@@ -75,7 +75,7 @@ def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> 
 
 def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
     """Return why no crank and firing order keeps the intervals allowed, and whether that is proven."""
-    allowed = phasing.intervals.shown
+    allowed = phasing.intervals.text
     if not phasing.intervals.holds([phasing.even_interval]):
         even = f"{math.degrees(phasing.even_interval):g}"
         return (
@@ -191,7 +191,7 @@ def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) ->
     free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
     allowed = phasing.intervals
 
-    def excess(intervals: Sequence[float]) -> float:
+    def violation(intervals: Sequence[float]) -> float:
         return round(sum(max(allowed.minimum - i, 0.0) + max(i - allowed.maximum, 0.0) for i in intervals), 9)
 
     low, high = np.array(phasing.throw_bounds).T
@@ -202,7 +202,7 @@ def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) ->
             orders = ranked_orders(free, Candidate(throws, None, bank, split))
             fired = [order for order in orders if min(order.intervals) > SOONEST]
             # the orders whose intervals are nearest to those allowed
-            fired.sort(key=lambda order: excess(order.intervals))
+            fired.sort(key=lambda order: violation(order.intervals))
             cranks += [Candidate(throws, order.order, bank, split) for order in fired[:2]]
         if cranks:
             break

@@ -67,9 +67,10 @@ def _has_images(problem: Problem, phasing: Phasing) -> bool:
 def firing_bounds(phasing: Phasing) -> FiringBounds:
     """Return the bounds that firing has to keep."""
     layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
+    pairs = zip((phasing.bank, phasing.split), phasing.is_geometry_open, strict=True)
     return FiringBounds(
         phasing.cycle, layout, max(allowed.minimum, 0.0), allowed.maximum, phasing.throw_bounds, phasing.firing_order,
-        tuple(p for p, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True) if p and is_open),
+        tuple(pair for pair, is_open in pairs if pair and is_open),
     )  # fmt: skip
 
 
@@ -80,7 +81,7 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
     shared = iter(angles[count:])
     geometry = [
         float(np.clip(next(shared), *pair)) if is_open and pair is not None else (None if pair is None else pair[0])
-        for pair, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True)
+        for pair, is_open in zip((phasing.bank, phasing.split), phasing.is_geometry_open, strict=True)
     ]
     # throws that are open are counted from cylinder 1 at its dead centre
     turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
@@ -94,7 +95,7 @@ def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Ar
         return None
     layout = phasing.layout(*phasing.minimum_geometry)
     geometry = (candidate.bank_angle, candidate.split_pin)
-    shared = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.opened, strict=True) if is_open]
+    shared = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.is_geometry_open, strict=True) if is_open]
     turned = layout.side(0) * sum(shared) if phasing.throw_bounds is None else 0.0
     low, high = window.box
     throws = np.array(candidate.throws) - turned

@@ -97,13 +97,13 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     if not designs:
         return _none(problem, phasing, bounded)
     trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
-    nothing = numerical_zero(problem)
-    result, doubt = result_under(designs[0].result, floor, nothing)
+    zero_level = numerical_zero(problem)
+    result, doubt = result_under(designs[0].result, floor, zero_level)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
     # no norm lies under zero: a design that reaches it is optimal
     certificate = certified(
-        best.value, floor, nothing, problem.tolerance, ProofStrength.NEAR, best.kkt_residual, method, doubt
+        best.value, floor, zero_level, problem.tolerance, ProofStrength.NEAR, best.kkt_residual, method, doubt
     )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
@@ -151,7 +151,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
         objective = amplitude_objective(first, phasing, families[0].layout)
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
-    if phasing.opened[0]:
+    if phasing.is_geometry_open[0]:
         # what stands still inside the crankcase leans with its bank
         outside = tuple(term for term in problem.objective if not term.measure.is_inside)
         problem = replace(problem, objective=outside)
@@ -208,16 +208,16 @@ def local_optimum(
         else:
             unit = max(best.value, SMALLEST_UNIT * best.result.objective.initial) or 1.0
         smooth = SmoothProgram(problem, unit, margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
-        least_excess = math.inf
+        minimum_violation = math.inf
         starts = _start_points(smooth, best)[: None if nudged else 1]
-        for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, enough=try_all):
+        for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=try_all):
             if not optimum.usable:
                 continue
             candidate = moves.candidate(smooth.turns(optimum.x))
             design = _evaluate(phasing, candidate, optimum.kkt_residual, moved=True)
             if design is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
                 continue
-            least_excess = min(least_excess, design.result.final.excess(design.result.problem.limits))
+            minimum_violation = min(minimum_violation, design.result.final.violation(design.result.problem.limits))
             if _if_allowed(phasing, intervals, design) is None:
                 continue
             if best is None or design.value < best.value * (1.0 - 1e-9):
@@ -225,9 +225,9 @@ def local_optimum(
             elif prices is None and design.value < best.value * (1.0 + SAME):
                 prices = smooth.prices(optimum)
         # the program knows a peak by fewer angles than the exact model, and a degree of irregularity by its work
-        if not FEASIBLE < least_excess < _MOST_TIGHTENED:
+        if not FEASIBLE < minimum_violation < _MOST_TIGHTENED:
             break
-        margin += _TIGHTENED * least_excess
+        margin += _TIGHTENED * minimum_violation
     if best is None:
         return None
     # limits cost less while throws may move than with fixed ones; unknown where the program has no price
@@ -259,7 +259,7 @@ def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, moved: bo
 def _if_allowed(phasing: Phasing, intervals: Intervals, design: StarDesign | None) -> StarDesign | None:
     if design is None or not math.isfinite(design.value):
         return None
-    if design.result.final.excess(design.result.problem.limits) > FEASIBLE:
+    if design.result.final.violation(design.result.problem.limits) > FEASIBLE:
         return None
     return design if intervals.holds(firing_intervals(phasing, design.candidate), 1e-7) else None
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.files.rotors import FACTORS
-from laufruhe.files.study_tables import Axis, at
+from laufruhe.files.study_tables import SweepAxis, at
 from laufruhe.present import picture as p
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, coordinates, dataset
@@ -51,7 +51,7 @@ class CounterweightFraction(SweptPart):
                 points += [Point(case, changes, self.metric) for changes in tried]
         return points
 
-    def _swept_fraction(self) -> Axis | None:
+    def _swept_fraction(self) -> SweepAxis | None:
         return next((axis for axis in self.axes() if axis.quantity.endswith(FACTORS)), None)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
@@ -96,7 +96,7 @@ class CounterweightFraction(SweptPart):
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
 
-def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
+def _left_open(point: Point, fraction: SweepAxis, scenes: Scenes) -> dict[str, Any]:
     entry = at(scenes.tables(point), fraction.quantity)
     numbers = fraction.numbers or ()
     return entry if isinstance(entry, dict) else {"between": [min(numbers), max(numbers)]}

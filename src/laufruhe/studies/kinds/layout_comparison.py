@@ -13,7 +13,7 @@ from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.measures import QuantityName, QuantityTable, Scene
+from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.physics.torque import swing_of
 from laufruhe.present.picture import Picture
@@ -63,7 +63,7 @@ class LayoutComparison(SweptPart):
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure | InputError]:
         """Return further quantities by name, or the error of an engine that lacks one."""
-        scene, measures = Scene(problem.engine, problem.points), dict[str, Measure | InputError]()
+        scene, measures = MeasureContext(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
             # an engine without weights has a mass of zero
             is_mass = name in MEASURES and MEASURES[name][0].is_mass

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import measured, nearest
-from laufruhe.files.measures import QuantityName, QuantityTable, Scene
+from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
@@ -68,7 +68,7 @@ class MeasureTable(QuantityTable):
     limit: str | None = f.optional("Limit that is drawn beside those of the problem.")
 
 
-class SpeedMap(Part):
+class SpeedMapStudy(Part):
     """Measures over crank speed, of designs as given and as decided at the file's own operating points."""
 
     kind: Literal["speed map"]
@@ -104,7 +104,7 @@ class SpeedMap(Part):
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
         # mapped measures, at any speed, with the limits of this part
-        scene, limits = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
+        scene, limits = MeasureContext(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
         with scenes.named(case):
             if self.measures:
                 limits = {}
