@@ -302,7 +302,7 @@ class TestForms:
         """Never over the norm, and under it by no more than the share of the unit (N3, E22)."""
         weights, v, _ = data
         grid, share, program = Grid((weights + 0.1) / (weights + 0.1).sum(), len(weights)), 1e-3, AtItsValues()
-        exact, smooth = norm.value(grid, v), float(norm.minimum(program, grid, ca.DM(v), unit, share))
+        exact, smooth = norm.value(grid, v), float(norm.smooth_expression(program, grid, ca.DM(v), unit, share))
         slack = ROUNDING * (exact + unit)
         assert exact - share * unit - slack <= smooth
         assert smooth <= exact + slack or program.has_free

@@ -55,7 +55,7 @@ def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start
     return put(tables, keys, {"between": [low, high], **({} if first is None else {"start": first})})
 
 
-def fixed(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
+def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
     """Return tables with a number fixed at a value, or at its start."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)

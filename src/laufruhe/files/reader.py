@@ -102,7 +102,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
                     stars = replace(phasing, realise=lambda star: finished(realise(star), star))
                     problem = replace(problem, phasing=stars)
             _check_decisions(problem)
-            return replace(problem, origin=Origin(tables, path, _edited))
+            return replace(problem, origin=Origin(tables, path, _apply_edit))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
@@ -130,7 +130,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     return open_phasing(file.engine, file.balancer_shafts, file.phasing, closed)
 
 
-def _edited(origin: Origin, edit: str, *arguments: Any) -> Problem:
+def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
     # problem of a file after one of the functions of `edits`
     with in_file(origin.path):
         tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))

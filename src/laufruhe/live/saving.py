@@ -58,7 +58,7 @@ def saved_file(problem: Problem, result: Result, moving: Problem, values: Mappin
     try:
         tables = _fixed(dict(tables), result, values)
         for mark, name, _ in marks:
-            tables = edits.fixed(tables, name, mark)
+            tables = edits.fix_number(tables, name, mark)
         text = toml_text({key: table for key, table in tables.items() if key not in SEARCHED})
         filled = _filled(text, marks, moving)
         read = load_tables(tables_and_path(filled)[0], path)
@@ -102,7 +102,7 @@ def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) 
         if not decision.is_affine:
             number = float(values[decision.name].real)
             text = number if decision.unit == "" else f"{number!r} {decision.unit}"
-            tables = edits.fixed(tables, decision.name, math.degrees(number) if decision.unit == "rad" else text)
+            tables = edits.fix_number(tables, decision.name, math.degrees(number) if decision.unit == "rad" else text)
     return tables if result.problem.phasing is None else _with_star(tables, result)
 
 

@@ -108,7 +108,7 @@ class Origin:
     tables, path
         Tables as they were read, and path of the file.
     edited
-        Function of this, an edit ("with_values", "opened" or "fixed") and its arguments, that returns the new problem.
+        Function of this, an edit ("with_values", "open_number" or "fix_number") and its arguments, that returns the new problem.
     """
 
     tables: Mapping[str, Any]
@@ -353,12 +353,12 @@ class Problem:
     def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
         """Return the problem with one more open number; it starts at its present value unless `start` is given."""
         _check_name(name)
-        return self._edited("opened", name, low, high, start)
+        return self._edited("open_number", name, low, high, start)
 
     def fix(self, name: str, value: Any = None) -> Problem:
         """Return the problem with one number fixed, at `value` or at its start."""
         _check_name(name)
-        return self._edited("fixed", name, value)
+        return self._edited("fix_number", name, value)
 
     def _edited(self, edit: str, *arguments: Any) -> Problem:
         if self.origin is None:

@@ -138,7 +138,7 @@ def _first(tables: Tables, _: str, value: Any) -> dict[str, Any]:
 
 _WAYS: Mapping[str, Callable[[Tables, str, Any], dict[str, Any]]] = {
     "set": edits.with_value,
-    "fix": edits.fixed,
+    "fix": edits.fix_number,
     "star": _star,
     "open crank": _open_crank,
     "first": _first,
