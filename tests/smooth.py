@@ -56,7 +56,7 @@ def smooth_value(model: UnevenModel, measure: Measure, at: UnevenSymbols, share:
     """What a program would minimise of a measure, softened by this much of one."""
     rows, grid = model.rows(measure, at)
     program = AtItsValues()
-    value = measure.norm.minimum(program, grid, rows, 1.0, share)
+    value = measure.norm.smooth_expression(program, grid, rows, 1.0, share)
     for expression in program.held:
         assert float(ca.mmax(expression)) <= 1e-9 * float(value)
     return value

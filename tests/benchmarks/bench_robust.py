@@ -34,7 +34,7 @@ def drawn(tolerances: Tolerances, random: np.random.Generator, count: int, how: 
 
 def of_law(tolerances: Tolerances, law: Law) -> list:
     """The tolerances, their errors of one law."""
-    return [replace(t, law=law) for t in tolerances.each]
+    return [replace(t, law=law) for t in tolerances.tolerances]
 
 
 def main() -> None:

@@ -53,8 +53,8 @@ def test_search_equals_solving_every_design(tmp_path, cylinders, name):
     problem = problem.at(replace(problem.fidelity, samples=4 * problem.fidelity.samples))
     model, stars = model_of(problem)
     nothing = numerical_zero(problem)
-    every = search_designs(model, stars, 10**9, 1e-4, nothing=nothing)
-    found = search_designs(model, stars, 1, 1e-4, nothing=nothing)
+    every = search_designs(model, stars, 10**9, 1e-4, zero_level=nothing)
+    found = search_designs(model, stars, 1, 1e-4, zero_level=nothing)
     assert len(every.solved) == every.designs
     assert found.solved[0].value == pytest.approx(every.solved[0].value, rel=2e-4, abs=nothing)
     assert found.lower_bound <= every.solved[0].value * (1.0 + 1e-9)

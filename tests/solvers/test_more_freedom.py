@@ -42,7 +42,7 @@ radius = "60 mm"
 mass = {mass}
 angle = {angle}
 """
-SIZE, TURN = '{{ between = ["0 kg", "{most:.3f} kg"] }}', "{{ between = [0, 360] }}"
+SIZE, TURN = '{{ between = ["0 kg", "{maximum:.3f} kg"] }}', "{{ between = [0, 360] }}"
 FRONT = ('"40 mm"', SIZE, TURN)
 # place, mass and angle of the weights; each has what those before it allow, and more
 FREEDOM = (

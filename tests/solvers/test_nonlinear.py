@@ -190,7 +190,7 @@ def waves(softness: float = 0.0) -> NonlinearProgram:
 def test_of_starts_with_one_end_one_goes_on_and_no_better_optimum_is_lost():
     """What stays in the first stage is worse there than the best at last, and is under what it would come to."""
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
-    found = solve_nonlinear(waves(0.3), starts, workers=1, cutoff=lambda optima: False)
+    found = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
     alone = [solve_nonlinear(waves(0.3), [start], workers=1)[0] for start in starts]
     apart = distinct(alone, 1.0, 1e-9)
     assert len(found) == len(apart)
@@ -214,7 +214,7 @@ def test_what_follows_from_the_rest_tells_no_ends_apart():
     )  # fmt: skip
     starts = [np.array([1.0, sign]) for sign in (1.5, -1.5)]
     apart, same = (
-        solve_nonlinear(replace(program, deciding=count), starts, workers=1, cutoff=lambda optima: False)
+        solve_nonlinear(replace(program, deciding=count), starts, workers=1, stop_when=lambda optima: False)
         for count in (None, 1)
     )
     assert [o.starts for o in apart] == [1, 1]
@@ -228,7 +228,7 @@ def test_a_search_ends_when_nothing_better_is_to_be_expected():
     bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 60)
     tried = [
-        solve_nonlinear(program, starts, workers=1, cutoff=lambda optima: is_explored(optima, 1.0))
+        solve_nonlinear(program, starts, workers=1, stop_when=lambda optima: is_explored(optima, 1.0))
         for program in (bowl, waves())
     ]
     assert sum(o.starts for o in tried[0]) == 7
@@ -248,7 +248,7 @@ def test_workers_at_hand_find_what_one_process_finds():
             with working_on(executor):
                 for program, maximum in ((bowl, 1), (bowl, 7), (waves(0.3), 13)):
                     ends = solve_nonlinear(
-                        program, starts, cutoff=lambda some, n=maximum: sum(o.starts for o in some) >= n
+                        program, starts, stop_when=lambda some, n=maximum: sum(o.starts for o in some) >= n
                     )
                     found.append([(o.start, o.starts, o.value, *o.x) for o in ends])
         assert len(own.pids) == 3

@@ -66,7 +66,7 @@ def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[
     edited = put(tables, keys, value)
     # an angle is open with its size only
     if keys[-1] in _SIZES and _is_open(at(edited, (*keys[:-1], "angle"))):
-        return fixed(edited, f"{name.rpartition('.')[0]}.angle")
+        return fix_number(edited, f"{name.rpartition('.')[0]}.angle")
     return edited
 
 

@@ -138,7 +138,7 @@ _OWN: tuple[Method, ...] = (
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart",
            dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.ASIDE,
-           ".methods:solve_each_apart", norms=lambda _: True, also=is_separable,
+           ".methods:solve_separable", norms=lambda _: True, also=is_separable,
            proves="what each of them proves"),
     Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE,
            ".mounts.stars:solve_star_mounts", False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,

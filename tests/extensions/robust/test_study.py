@@ -11,8 +11,8 @@ import xarray as xr
 from laufruhe import load
 from laufruhe.extensions.robust.study import (
     GRAVITY,
-    StudyTolerance,
     StudyTolerancesTable,
+    ToleranceStudy,
     _marks,
     built,
     mean_mount_forces,
@@ -85,7 +85,7 @@ def test_second_order_outweighs_the_worst_sum() -> None:
     six = load(PROBLEMS / "tractor-six.toml")
     cases = [{"name": name, "problem": "x.toml"} for name in ("four", "six")]
     told = {"kind": "tolerance", "name": "t", "title": "t", "tolerances": {"reciprocating_mass": "10 g"}}
-    part = StudyTolerance.model_validate({**told, "cases": cases})
+    part = ToleranceStudy.model_validate({**told, "cases": cases})
     data = part.dataset([Point(case) for case in part.cases], [spread(one, tolerances, 700) for one in (problem, six)])
     four = data.sel(case="four")
     worst, nominal = float(four["worst"]) / KILOPOND, float(four["nominal"]) / KILOPOND

@@ -45,7 +45,7 @@ def read(folder: Path, text: str) -> Problem:
     ],
 )
 def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) -> None:
-    (told,) = tolerances_of(read(tmp_path, TEXT.format(words) + MOUNTS)).each
+    (told,) = tolerances_of(read(tmp_path, TEXT.format(words) + MOUNTS)).tolerances
     assert told.size == pytest.approx(size)
     assert (told.law, told.scope, told.unit) == (law, scope, "kg")
     assert len(told.errors) == (1 if scope is Scope.BATCH else 4)
@@ -134,7 +134,7 @@ def test_grades(tmp_path: Path) -> None:
     assert permitted_unbalance(6.3e-3, 60.0, 100.0 * math.pi) == pytest.approx(60.0 * 20.05e-6, rel=1e-3)
     text = TEXT.format("") + MOUNTS + '[tolerances]\nresidual_unbalance = "G 6.3"\nrotor_mass = "60 kg"\n'
     problem = read(tmp_path, text)
-    (told,) = tolerances_of(problem).each
+    (told,) = tolerances_of(problem).tolerances
     assert told.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
     own = with_errors(problem, np.array([0.0, 1.0, -1.0, 0.0]))
     assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * told.size, -told.size])
