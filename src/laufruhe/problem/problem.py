@@ -108,7 +108,8 @@ class Origin:
     tables, path
         Tables as they were read, and path of the file.
     edited
-        Function of this, an edit ("with_values", "open_number" or "fix_number") and its arguments, that returns the new problem.
+        Function of this, an edit ("with_values", "open_number" or "fix_number") and its arguments, which returns the
+        new problem.
     """
 
     tables: Mapping[str, Any]
