@@ -11,7 +11,7 @@ from laufruhe.extensions.joint_mounts.mounted_loads import coarser
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread
-from laufruhe.solvers.cones.conic import rows_near, rows_of, solve_cones
+from laufruhe.solvers.cones.conic import restrict_rows, rows_near, solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
 ROWS, LEAST_SAMPLES = (1000, 3000), 24
@@ -102,7 +102,9 @@ def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Arra
             np.union1d(rows, rows_near(norm.value(x), norm, x, NEAR))
             for rows, (_, norm) in zip(selected, problem.terms, strict=True)
         ]
-        terms = [(weight, rows_of(norm, rows)) for rows, (weight, norm) in zip(selected, problem.terms, strict=True)]
+        terms = [
+            (weight, restrict_rows(norm, rows)) for rows, (weight, norm) in zip(selected, problem.terms, strict=True)
+        ]
         solution = solve_cones(replace(problem, terms=tuple(terms)))
         if solution.x is None:
             break

@@ -1,4 +1,4 @@
-"""Second-order cone program in sparse arrays: assembly, the call of Clarabel, and what its answer means (P1, P2)."""
+"""Assemble second-order cone programs in sparse arrays, solve them by Clarabel and read the solution (P1, P2)."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ from laufruhe.numerics.norms import Cones
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 
-SMALLEST_SHARE = 1e-7
-"""Share under which a sum is no part of the largest."""
-SHORTEST = 0.05
-"""Seconds that one attempt has where time is over."""
+MINIMUM_SHARE = 1e-7
+"""Weights of sums below this one are set to zero."""
+MINIMUM_SECONDS = 0.05
+"""Time of an attempt that starts after the time limit [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class ConicSolution:
-    """Answer of the cone solver; nothing in it is believed before it is evaluated.
+    """Solution of a cone program, before the exact model checks it.
 
     Attributes
     ----------
     x
-        Decision vector; None where the limits contradict each other.
+        Decision vector, shape (n,); None if the limits contradict each other.
     multipliers
         Dual rows of terms and limits.
     solver_seconds
         Time spent inside the cone solver [s].
     shares
-        Share of every sum of terms in the largest of them, adding up to one; empty where there is one sum.
+        Multiplier of every sum of terms, if the largest of several is minimised; they add up to one. Else empty.
     prices
-        Duals of the program's rows in the objective's unit, those of the equations first.
+        Dual values of the program's rows in the unit of the objective, those of the equations first.
     """
 
     x: Array | None
@@ -49,12 +49,12 @@ class ConicSolution:
 
 @dataclass(frozen=True, eq=False)
 class SparseMatrix:
-    """Matrix in compressed columns, as Clarabel takes it; importing `scipy.sparse` takes a tenth of a second.
+    """Matrix in compressed sparse columns, as Clarabel reads it; importing `scipy.sparse` takes 0.1 s.
 
     Attributes
     ----------
     data, indices, indptr, shape
-        As in `scipy.sparse.csc_array`; each place once, row after row.
+        Same as in `scipy.sparse.csc_array`, without duplicate entries, rows in ascending order.
     """
 
     data: Array
@@ -67,11 +67,11 @@ class SparseMatrix:
     def from_entries(
         cls, rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array, shape: tuple[int, int]
     ) -> SparseMatrix:
-        """Sort entries, and add up those of one place."""
-        used = values != 0.0
-        keys = (columns * shape[0] + rows)[used]
+        """Build the matrix from entries, adding those with the same row and column."""
+        nonzero = values != 0.0
+        keys = (columns * shape[0] + rows)[nonzero]
         order = np.argsort(keys, kind="stable")
-        keys, data = keys[order], values[used][order]
+        keys, data = keys[order], values[nonzero][order]
         first = np.flatnonzero(np.diff(keys, prepend=-1))
         if len(first) < len(keys):
             keys, data = keys[first], np.add.reduceat(data, first)
@@ -90,14 +90,22 @@ class ConeRows:
         self.count = 0
 
     def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
-        """Add entries of A, their rows counted from the block's first, and the block's part of b."""
-        at, across, numbers = np.broadcast_arrays(rows, columns, values)
-        self.entries.append((at.ravel() + self.count, across.ravel(), numbers.ravel()))
+        """Add a block of rows to A and b.
+
+        Parameters
+        ----------
+        rows, columns, values
+            Entries of A, which broadcast against each other; row 0 is the first row of the block.
+        right
+            Part of b, shape (rows of the block,).
+        """
+        rows, columns, values = np.broadcast_arrays(rows, columns, values)
+        self.entries.append((rows.ravel() + self.count, columns.ravel(), values.ravel()))
         self.right.append(right)
         self.count += len(right)
 
     def matrix(self) -> SparseMatrix:
-        """Return A."""
+        """Return A, shape (rows, columns)."""
         rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
         return SparseMatrix.from_entries(rows, columns, values, (self.count, self.columns))
 
@@ -108,10 +116,14 @@ class RowBlock:
 
     Attributes
     ----------
+    norm
+        The norm.
+    cones
+        Cones that represent the norm.
     unit
-        Size in which its rows are counted.
+        Unit of the rows [SI].
     first
-        First column of its heads.
+        First column of the epigraph variables.
     """
 
     norm: AffineNorm
@@ -121,12 +133,12 @@ class RowBlock:
 
     @property
     def heads(self) -> slice:
-        """Columns of the heads."""
+        """Columns of the epigraph variables, each the head of a cone."""
         return slice(self.first, self.first + len(self.cones.value))
 
     @property
     def centres(self) -> NDArray[np.int64]:
-        """Column of the free vector that each number of the rows is counted from, shape (k, d), or (0, 0) for none."""
+        """Column of the free centre that is subtracted from each number of the rows, shape (k, d); (0, 0) if none."""
         if not self.cones.centred:
             return np.zeros((0, 0), dtype=int)
         k, d = self.norm.constant.shape
@@ -141,12 +153,14 @@ def build_program(
 
     Parameters
     ----------
+    problem
+        Terms, limits and sets of the decisions.
     equations
-        A, shape (m, n), and b, shape (m,), of A x = b, which the decision vector is to keep as well.
+        A, shape (m, n), and b, shape (m,), of additional equations A x = b.
 
     Returns
     -------
-    Blocks of the norms, their first rows, all rows, and the cost of every column.
+    Blocks of the norms, the first row of each block, all rows, and the cost of every column.
     """
     import clarabel
 
@@ -171,9 +185,9 @@ def build_program(
         rows.cones.append(clarabel.NonnegativeConeT(1))
     for block in blocks:
         if block.cones.under is not None:
-            at, heads, factors = block.cones.under
-            rows.add(at, block.first + heads, factors, np.zeros(int(at.max()) + 1))
-            rows.cones.append(clarabel.NonnegativeConeT(int(at.max()) + 1))
+            row, heads, factors = block.cones.under
+            rows.add(row, block.first + heads, factors, np.zeros(int(row.max()) + 1))
+            rows.cones.append(clarabel.NonnegativeConeT(int(row.max()) + 1))
         if block.cones.squares is not None:
             # t_a^2 <= t_b t_c as |(t_b - t_c, 2 t_a)| <= t_b + t_c
             square, left_factor, right_factor = (block.first + heads for heads in block.cones.squares)
@@ -190,7 +204,7 @@ def build_program(
 
 
 def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows) -> Array:
-    """Return the cost of every column; of several sums it is one more column that none of them exceeds."""
+    """Return the cost of every column; for the largest of several sums, add one epigraph variable above all sums."""
     import clarabel
 
     sums = np.zeros((max(problem.groups, default=0) + 1, rows.columns))
@@ -199,9 +213,9 @@ def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows
     if not problem.groups:
         return np.asarray(sums[0])
     group, column = np.nonzero(sums)
-    last = np.arange(len(sums))
+    indices = np.arange(len(sums))
     rows.add(
-        np.concatenate([group, last]),
+        np.concatenate([group, indices]),
         np.concatenate([column, np.full(len(sums), rows.columns)]),
         np.concatenate([sums[group, column], np.full(len(sums), -1.0)]),
         np.zeros(len(sums)),
@@ -214,7 +228,7 @@ def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows
 
 
 def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
-    """Add the decision's own set, in units of a size (P4)."""
+    """Add the set of a decision, in the unit of its columns (P4)."""
     import clarabel
 
     upper, lower = domain.set.upper / unit, domain.set.lower / unit
@@ -224,33 +238,33 @@ def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
         return
     if len(domain.set.edges):
         (ax, ay), (bx, by) = domain.set.edges
-        across = np.array([domain.start, domain.start + 1])
-        rows.add([[0], [1]], across, [[ay, -ax], [-by, bx]], np.zeros(2))
+        columns = np.array([domain.start, domain.start + 1])
+        rows.add([[0], [1]], columns, [[ay, -ax], [-by, bx]], np.zeros(2))
         rows.cones.append(clarabel.NonnegativeConeT(2))
     rows.add([1, 2], [domain.start, domain.start + 1], -1.0, np.array([upper, 0.0, 0.0]))
     rows.cones.append(clarabel.SecondOrderConeT(3))
 
 
 def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
-    """Add V0 + B x in a cone a row, or in one cone for a root mean square; return the first row."""
+    """Add V0 + B x of a norm, one cone per row or one cone in all for a root mean square; return the first row."""
     import clarabel
 
     norm, cones, start = block.norm, block.cones, rows.count
     k, d = norm.constant.shape
     slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
     constant = norm.constant / block.unit * cones.factors[:, None]
-    # rows of the program in the order of its cones: a head, then what is under it
+    # rows of the program in the order of its cones: the head, then the numbers that it bounds
     width = k * d + 1 if cones.whole else d + 1
     heads = np.arange(len(cones.head)) * width
-    under = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
+    body = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
     right = np.zeros(width * len(heads))
-    right[under] = constant
-    places = np.broadcast_to(under[:, :, None], slope.shape)
-    across = np.broadcast_to(np.arange(problem.size), slope.shape)
+    right[body] = constant
+    positions = np.broadcast_to(body[:, :, None], slope.shape)
+    columns = np.broadcast_to(np.arange(problem.size), slope.shape)
     centres = block.centres.ravel()
     rows.add(
-        np.concatenate([heads, places.ravel(), under.ravel()[: len(centres)]]),
-        np.concatenate([block.first + cones.head, across.ravel(), centres]),
+        np.concatenate([heads, positions.ravel(), body.ravel()[: len(centres)]]),
+        np.concatenate([block.first + cones.head, columns.ravel(), centres]),
         np.concatenate([np.full(len(heads), -1.0), -slope.ravel(), np.ones(len(centres))]),
         right,
     )
@@ -259,23 +273,49 @@ def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
 
 
 def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadratic: Array | None = None) -> Any:
-    """Minimise cost . x + x' quadratic x / 2 under the rows, and return the solution object of Clarabel."""
+    """Minimise cost . x + x' quadratic x / 2 subject to rows, by Clarabel.
+
+    Parameters
+    ----------
+    rows
+        Rows A x + s = b with s in cones.
+    cost
+        Linear cost, shape (columns,).
+    options
+        Settings of Clarabel by name.
+    quadratic
+        Upper triangle of the quadratic cost, shape (columns, columns); zero if None.
+
+    Returns
+    -------
+    Solution object of Clarabel.
+    """
     import clarabel
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     for name, value in options.items():
         setattr(settings, name, value)
-    settings.time_limit = max(left(), SHORTEST)
-    squares = np.zeros((0, 0)) if quadratic is None else quadratic
-    at, across = np.nonzero(squares)
-    matrix = SparseMatrix.from_entries(at, across, squares[at, across], (rows.columns, rows.columns))
+    settings.time_limit = max(left(), MINIMUM_SECONDS)
+    hessian = np.zeros((0, 0)) if quadratic is None else quadratic
+    row, column = np.nonzero(hessian)
+    matrix = SparseMatrix.from_entries(row, column, hessian[row, column], (rows.columns, rows.columns))
     right = np.concatenate(rows.right)
     return clarabel.DefaultSolver(matrix, cost, rows.matrix(), right, rows.cones, settings).solve()
 
 
 def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[int], solution: Any) -> ConicSolution:
-    """Return decisions in their sets and dual rows [SI]; zeros where the solver has lost its numbers."""
+    """Read decisions, projected on their sets, and dual rows [SI] from a solution of Clarabel.
+
+    Values that are not finite count as zero.
+
+    Parameters
+    ----------
+    problem, blocks, starts
+        Problem, blocks of its norms, and the first row of each block.
+    solution
+        Solution object of Clarabel.
+    """
     primal, duals = (
         np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0) for values in (solution.x, solution.z)
     )
@@ -283,7 +323,7 @@ def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[i
     unit = blocks[0].unit if problem.terms else 1.0
     rows = []
     for block, start in zip(blocks, starts, strict=True):
-        # mu Z of the rows (P2), in the objective's own unit
+        # mu Z of the rows (P2), in the unit of the objective
         k, d = block.norm.constant.shape
         if block.cones.whole:
             z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
@@ -292,21 +332,21 @@ def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[i
         rows.append(np.asarray(z * block.cones.factors[:, None] * (unit / block.unit)))
     shares = np.zeros(0)
     if problem.groups:
-        # the last rows of the program are those of the sums
+        # the last rows of the program belong to the sums
         shares = np.maximum(duals[len(duals) - max(problem.groups) - 1 :], 0.0)
         shares = shares / shares.sum() if shares.any() else np.full(len(shares), 1.0 / len(shares))
-        shares = np.where(shares > SMALLEST_SHARE, shares, 0.0)
+        shares = np.where(shares > MINIMUM_SHARE, shares, 0.0)
         shares = shares / shares.sum()
-    by_term = [float(shares[group]) for group in problem.groups] or [1.0] * len(problem.terms)
+    term_shares = [float(shares[group]) for group in problem.groups] or [1.0] * len(problem.terms)
     terms = tuple(
-        z / (weight * share or 1.0) for z, (weight, _), share in zip(rows, problem.terms, by_term, strict=False)
+        z / (weight * share or 1.0) for z, (weight, _), share in zip(rows, problem.terms, term_shares, strict=False)
     )
     multipliers = Multipliers(terms, tuple(rows[len(terms) :]))
     return ConicSolution(x, multipliers, float(solution.solve_time), shares, unit * duals)
 
 
 def project_on_sets(problem: AffineProblem, x: Array) -> Array:
-    """Move every decision into its set, in place."""
+    """Project every decision onto its set, in place; return x, shape (n,)."""
     for domain in problem.domains:
         x[domain.columns] = domain.project(x)
     return x

@@ -1,9 +1,9 @@
-"""Least weighted sum of norms under limits, as a second-order cone program for Clarabel (P1).
+"""Minimise a weighted sum of norms under limits, as a second-order cone program for Clarabel (P1).
 
-Nothing is kept between two solves, so a result depends on its own problem alone. Terms that nothing
-open acts on, and limits that every design keeps, are no part of the program, and limits of zero are
-equations (P11). Where the solver stops without an answer, further settings are tried, and then the best
-point it had is taken: the exact model judges it, and bounds are taken from its dual rows anew.
+Every solve starts afresh, so a result depends on its problem alone. The program leaves out terms that no decision
+changes, and limits that every design satisfies. Limits of zero become equations (P11). If Clarabel stops without a
+solution, further settings are tried. If all fail, the best point that it reached is used: the exact model evaluates
+that point, and bounds are computed from its dual rows.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from laufruhe.solvers.cones.cone_program import (
 )
 from laufruhe.solvers.cones.equations import equations_of
 
-# flat optima need a small gap before their decisions are digits one can build
+# at flat optima, decisions are accurate only if the gap is small
 TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
 ATTEMPTS: tuple[Mapping[str, Any], ...] = (
     TIGHT,
-    # limits that all but contradict each other
+    # limits that nearly contradict each other
     {},
     {**TIGHT, "equilibrate_enable": False},
     {"tol_gap_abs": 1e-6, "tol_gap_rel": 1e-6, "tol_feas": 1e-7, "max_iter": 500, "max_step_fraction": 0.9},
 )
-"""Settings of the solver, in the order in which they are tried."""
+"""Settings of the solver, in the order of the attempts."""
 FEW_ROWS, ROUNDS, NEAR_LIMIT = 500, 6, 0.95
-"""Rows of a peak that are all taken, how often rows are added, and the share of a limit from which they are."""
+"""Rows of a peak up to which all enter the program, rounds that add rows, and share of a limit from which rows do."""
 
 
 def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = None) -> ConicSolution:
@@ -47,42 +47,44 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
 
     Parameters
     ----------
+    problem
+        Terms, limits and sets of the decisions.
     equations
-        A, shape (m, n), and b, shape (m,), of A x = b, which the decision vector is to keep as well.
+        A, shape (m, n), and b, shape (m,), of additional equations A x = b.
     """
-    # of several sums those that nothing acts on may still be the largest
-    acting = [k for k, (_, norm) in enumerate(problem.terms) if is_moved(norm) or problem.groups]
-    binding = [k for k, limit in enumerate(problem.limits) if _may_bind(problem, *limit)]
-    equal = [k for k in binding if problem.limits[k][0] == 0.0]
-    zeros = equations_of(problem, equal)
-    if zeros is not None:
-        binding = [k for k in binding if k not in equal]
-        equations = zeros.joined_with(equations)
-    # weights in units of the largest, for the tolerances of the solver are absolute
-    size = max((problem.terms[k][0] for k in acting), default=0.0) or 1.0
+    # a sum that no decision changes may still be the largest of several sums
+    term_indices = [k for k, (_, norm) in enumerate(problem.terms) if is_moved(norm) or problem.groups]
+    limit_indices = [k for k, limit in enumerate(problem.limits) if _may_bind(problem, *limit)]
+    zero_limits = [k for k in limit_indices if problem.limits[k][0] == 0.0]
+    zero_equations = equations_of(problem, zero_limits)
+    if zero_equations is not None:
+        limit_indices = [k for k in limit_indices if k not in zero_limits]
+        equations = zero_equations.joined_with(equations)
+    # weights in units of the largest weight, because the tolerances of the solver are absolute
+    weight_unit = max((problem.terms[k][0] for k in term_indices), default=0.0) or 1.0
     scaled = replace(
         problem,
-        terms=tuple((problem.terms[k][0] / size, problem.terms[k][1]) for k in acting),
-        limits=tuple(problem.limits[k] for k in binding),
+        terms=tuple((problem.terms[k][0] / weight_unit, problem.terms[k][1]) for k in term_indices),
+        limits=tuple(problem.limits[k] for k in limit_indices),
     )
     solution = _solve_with_few_rows(scaled, equations)
-    solution = replace(solution, prices=size * solution.prices)
-    # of a term that nothing acts on its own rows are the multipliers
+    solution = replace(solution, prices=weight_unit * solution.prices)
+    # multipliers of a term that no decision changes are its subgradient
     rows = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
     limits = [np.zeros_like(norm.constant) for _, norm in problem.limits]
-    for k, z in zip(acting, solution.multipliers.terms, strict=False):
+    for k, z in zip(term_indices, solution.multipliers.terms, strict=False):
         rows[k] = z
-    for k, z in zip(binding, solution.multipliers.limits, strict=False):
-        limits[k] = size * z
-    if zeros is not None and solution.x is not None:
-        solution = replace(solution, x=zeros.project(problem, solution.x))
-        for k, z in zip(equal, zeros.dual_rows(solution.prices), strict=True):
+    for k, z in zip(limit_indices, solution.multipliers.limits, strict=False):
+        limits[k] = weight_unit * z
+    if zero_equations is not None and solution.x is not None:
+        solution = replace(solution, x=zero_equations.project(problem, solution.x))
+        for k, z in zip(zero_limits, zero_equations.dual_rows(solution.prices), strict=True):
             limits[k] = z
     return replace(solution, multipliers=Multipliers(tuple(rows), tuple(limits)))
 
 
 def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
-    # by the triangle inequality
+    # triangle inequality
     largest = norm.norm.value(norm.grid, norm.constant)
     for column, scale in enumerate(problem.scales):
         if largest > maximum * (1.0 + FEASIBLE):
@@ -92,75 +94,89 @@ def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
 
 
 def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
-    """Solve with those rows of limited peaks alone that come near their limit, and add rows that break it.
+    """Solve with only the rows of limited peaks that are near their limit; add violated rows and repeat.
 
-    A peak is a few angles of a thousand. Rows left out have no price, so what is proven holds for all rows.
+    A peak involves few of a thousand angles. Rows left out have zero multipliers, so bounds hold for all rows.
     """
-    peaks = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
-    chosen = [
+    is_peak = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
+    row_sets = [
         np.union1d(0, rows_near(maximum, norm, problem.start, NEAR_LIMIT))
         if peak
         else np.arange(len(norm.grid.weights))
-        for peak, (maximum, norm) in zip(peaks, problem.limits, strict=True)
+        for peak, (maximum, norm) in zip(is_peak, problem.limits, strict=True)
     ]
-    for _ in range(ROUNDS if any(peaks) else 0):
-        limits = [(maximum, rows_of(norm, rows)) for (maximum, norm), rows in zip(problem.limits, chosen, strict=True)]
+    for _ in range(ROUNDS if any(is_peak) else 0):
+        limits = [
+            (maximum, restrict_rows(norm, rows)) for (maximum, norm), rows in zip(problem.limits, row_sets, strict=True)
+        ]
         solution = _solve(replace(problem, limits=tuple(limits)), equations)
         limit_rows = [np.zeros_like(norm.constant) for _, norm in problem.limits]
-        for z, rows, chosen_rows in zip(limit_rows, chosen, solution.multipliers.limits, strict=False):
-            z[rows] = chosen_rows
+        for z, rows, duals in zip(limit_rows, row_sets, solution.multipliers.limits, strict=False):
+            z[rows] = duals
         solution = replace(solution, multipliers=replace(solution.multipliers, limits=tuple(limit_rows)))
         if solution.x is None:
             return solution
-        broken = [rows_near(maximum, norm, solution.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
-        if all(np.isin(over, rows).all() for over, rows in zip(broken, chosen, strict=True)):
+        violated = [rows_near(maximum, norm, solution.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
+        if all(np.isin(indices, rows).all() for indices, rows in zip(violated, row_sets, strict=True)):
             return solution
         near = [rows_near(maximum, norm, solution.x, NEAR_LIMIT) for maximum, norm in problem.limits]
-        chosen = [
-            np.union1d(rows, more) if peak else rows for peak, rows, more in zip(peaks, chosen, near, strict=True)
+        row_sets = [
+            np.union1d(rows, more) if peak else rows for peak, rows, more in zip(is_peak, row_sets, near, strict=True)
         ]
     return _solve(problem, equations)
 
 
 def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Return the numbers of rows that are longer at x than a share of a limit."""
+    """Return the indices of rows whose length at x exceeds `share` times a limit.
+
+    Parameters
+    ----------
+    maximum
+        The limit [SI].
+    norm
+        The limited norm.
+    x
+        Decision vector, shape (n,).
+    share
+        Factor of the limit.
+    """
     return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
 
 
-def rows_of(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
-    """Return the norm of some of its rows."""
+def restrict_rows(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
+    """Restrict a norm to the rows with these indices."""
     return replace(
         norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))
     )
 
 
 def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
-    """Return the first answer that the solver stands by, else the best point at which it stopped."""
+    """Return the first solution that Clarabel confirms, else the best point at which it stopped."""
     blocks, starts, rows, cost = build_program(problem, equations)
     if not rows.right:
-        # nothing is open, and nothing forbids that
+        # no decision, and no limit that could be violated
         return ConicSolution(problem.start, Multipliers((), ()), 0.0)
-    stopped: list[ConicSolution] = []
+    unconfirmed: list[ConicSolution] = []
     for settings in ATTEMPTS:
         raw = run_clarabel(rows, cost, settings)
         status = str(raw.status)
-        answer = read_solution(problem, blocks, starts, raw)
-        if "Infeasible" in status and excludes(problem, answer.multipliers.limits):
-            return replace(answer, x=None)
+        solution = read_solution(problem, blocks, starts, raw)
+        if "Infeasible" in status and excludes(problem, solution.multipliers.limits):
+            return replace(solution, x=None)
         if "Solved" in status:
-            return answer
-        stopped.append(replace(answer, x=None) if "Infeasible" in status else answer)
+            return solution
+        unconfirmed.append(replace(solution, x=None) if "Infeasible" in status else solution)
 
-    def rank(answer: ConicSolution) -> tuple[float, float]:
-        assert answer.x is not None
-        violation = problem.violation(answer.x)
-        return violation if violation > FEASIBLE else 0.0, problem.objective(answer.x)
+    def rank(solution: ConicSolution) -> tuple[float, float]:
+        assert solution.x is not None
+        violation = problem.violation(solution.x)
+        return violation if violation > FEASIBLE else 0.0, problem.objective(solution.x)
 
-    points = [answer for answer in stopped if answer.x is not None]
-    points.append(replace(stopped[0], x=project_on_sets(problem, problem.start)))
+    points = [solution for solution in unconfirmed if solution.x is not None]
+    points.append(replace(unconfirmed[0], x=project_on_sets(problem, problem.start)))
     best = min(points, key=rank)
-    contradiction = len(points) <= len(stopped) and rank(best)[0] > 0.0
-    return replace(best, x=None) if contradiction else best
+    is_contradiction = len(points) <= len(unconfirmed) and rank(best)[0] > 0.0
+    return replace(best, x=None) if is_contradiction else best
 
 
 def solve_quadratic(
@@ -170,18 +186,20 @@ def solve_quadratic(
 
     Parameters
     ----------
+    problem
+        Problem with the sets and limits.
     gradient, curvature, x
         Shapes (n,), (n, n) and (n,).
     damping
-        Share of the curvature in all directions that is added in each.
+        Share of the trace of the curvature that is added to each diagonal element.
 
     Returns
     -------
-    y and the dual rows of the limits, or None where the solver does not stand by its answer.
+    y, shape (n,), and the dual rows of the limits; None if Clarabel does not confirm a solution.
     """
-    part = replace(problem, terms=(), groups=())
-    blocks, starts, rows, _ = build_program(part, None)
-    units, n = part.units, part.size
+    limited = replace(problem, terms=(), groups=())
+    blocks, starts, rows, _ = build_program(limited, None)
+    units, n = limited.units, limited.size
     size = float(np.abs(gradient * units).max(initial=0.0)) or 1.0
     scaled = curvature * np.outer(units, units) / size
     scaled = scaled + damping * float(np.trace(scaled)) * np.eye(n)
@@ -190,5 +208,5 @@ def solve_quadratic(
     raw = run_clarabel(rows, cost, {}, quadratic)
     if str(raw.status) != "Solved":
         return None
-    answer = read_solution(part, blocks, starts, raw)
-    return None if answer.x is None else (answer.x, tuple(size * z for z in answer.multipliers.limits))
+    solution = read_solution(limited, blocks, starts, raw)
+    return None if solution.x is None else (solution.x, tuple(size * z for z in solution.multipliers.limits))

@@ -1,4 +1,4 @@
-"""Designs that an objective does not tell apart: ranges of unbalances that leave it at its optimum (P12, P17)."""
+"""Ranges of unbalances over which an objective stays at its optimum (P12, P17)."""
 
 from __future__ import annotations
 
@@ -26,35 +26,43 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionRange
 
 MOST_OPEN = 16
-"""Decisions whose ranges are sought: each takes two programs, or some more where its angle is open."""
+"""Largest number of decisions; each takes two cone programs, or more if its angle is open."""
 DIRECTIONS = 8
-COARSE, ROOM = 180, 1e-7
-"""Angles at which designs are compared, and the share by which a limit is wider there for a solver to find them."""
-COARSEST, FAINT, WEAK, FAR, NEGLIGIBLE = 48, 1e-8, 1e-7, 10.0, 1e-2
-"""Angles at which other designs are looked for at all; shares of the objective that a decision's whole size is worth
-there, and where ends are sought; sizes by which both aim away; share of a size that is none."""
+"""Directions in which the largest size of an unbalance with open angle is computed."""
+COARSE, SLACK = 180, 1e-7
+"""Samples per cycle for the ranges, and relative increase of limits so that the solver finds an interior."""
+COARSEST = 48
+"""Samples per cycle of the first test for other optimal designs."""
+FAINT, WEAK = 1e-8, 1e-7
+"""Weight of the distance term in that test and for the ends of ranges, relative to the objective."""
+FAR = 10.0
+"""Distance of the target points from the optimum, in units of the decisions."""
+NEGLIGIBLE = 1e-2
+"""Size of a decision that counts as zero, in its unit."""
 SHARES = (1.0, 0.99, 0.9, 0.5)
-"""Shares of the way to an end at which a design is tried: what a program knows of a peak is not its last digit."""
+"""Shares of the distance to an end of a range that the exact model tests, because programs sample peaks coarsely."""
 FREE = 0.2
-"""Least share of the largest decision, and least turn of an angle [rad], by which one is free."""
+"""Smallest change of a free decision: relative to the largest size, or of its angle [rad]."""
 
 
 def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
-    """Return the range of every unbalance among designs within the limits and one more; none unless all are affine.
+    """Return the range of every unbalance over all designs that keep the limits and stay optimal.
+
+    Empty unless all decisions are affine, and there are few.
 
     Parameters
     ----------
     result
-        The best design of an objective.
+        Optimum of the objective.
     limit
-        That objective at its least value.
+        Limit that keeps the objective at its optimum.
     """
     problem = result.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]
     kinds = {decision.kind for decision in affine}
-    moved = [bound for bound in (*problem.limits, limit) if depends(bound.measure.channel, kinds, problem)]
-    problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
-    has_numbers = any(_has_no_cones(bound.measure) for bound in moved)
+    limits = [x for x in (*problem.limits, limit) if depends(x.measure.channel, kinds, problem)]
+    problem = replace(problem, phasing=None, objective=(), limits=tuple(limits))
+    has_numbers = any(_has_no_cones(x.measure) for x in limits)
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or passed():
         return ()
     model = AffineModel(problem)
@@ -63,7 +71,7 @@ def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     ranges = []
     for domain in model.domains:
         bounds = domain.set
-        # the least and the largest size; of an open angle the largest along some directions
+        # smallest and largest size; with an open angle, the largest along several directions
         if domain.width == 1:
             targets = [np.array([bounds.lower]), np.array([bounds.upper])]
         else:
@@ -77,10 +85,14 @@ def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
 
 
 def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
-    """Return decisions that an optimum leaves free, and values between which each may lie at no loss (P17).
+    """Return decisions that an optimum leaves free, each with a range of equally good values (P17).
 
-    Both values are of designs that the exact model shows to be as good within the tolerance, and so are all between
-    two of them, for objective and limits are convex. There may be designs beyond. None where it is not looked at.
+    The exact model confirms the designs at both ends within the tolerance. Designs between them are as good, because
+    objective and limits are convex. Wider ranges may exist.
+
+    Returns
+    -------
+    One range per free decision; None if the method does not apply or no time is left.
     """
     problem = replace(result.problem, phasing=None)
     is_plain = not problem.extras and not problem.ranks and not any(map(_has_no_cones, problem.measures))
@@ -90,25 +102,25 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
     model = AffineModel(problem)
     x = columns_of(model.domains, unbalances_of(problem, result))
     rows = _widen_limits(model.at(min(model.full_samples, COARSEST)), x)
-    others = [] if rows.groups else _ends(rows, x, FAINT)
-    if not others:
+    ends = [] if rows.groups else _ends(rows, x, FAINT)
+    if not ends:
         return None
-    if not _moving(rows, [x, *others]):
+    if not _free_domains(rows, [x, *ends]):
         return ()
     rows = _widen_limits(model.at(min(model.full_samples, COARSE)), x)
-    highest = objective_value(problem, result.final) * (1.0 + problem.tolerance)
-    highest += numerical_zero(problem, result.final.engine)
+    maximum = objective_value(problem, result.final) * (1.0 + problem.tolerance)
+    maximum += numerical_zero(problem, result.final.engine)
     designs = [x]
     for end in _ends(rows, x, WEAK):
-        # the farthest design towards the end that the exact model shows to be as good
+        # the farthest design towards the end that the exact model confirms
         for share in SHARES:
-            there = x + share * (end - x)
-            values = [domain.complex_value(there) for domain in model.domains]
+            candidate = x + share * (end - x)
+            values = [domain.complex_value(candidate) for domain in model.domains]
             design = evaluate_design(problem, values, result.final.samples)
-            if design.value <= highest and design.violation <= KEPT:
-                designs.append(there)
+            if design.value <= maximum and design.violation <= KEPT:
+                designs.append(candidate)
                 break
-    return tuple(entry for domain in _moving(rows, designs) for entry in ranges_of(domain, designs))
+    return tuple(entry for domain in _free_domains(rows, designs) for entry in ranges_of(domain, designs))
 
 
 def _has_no_cones(measure: Measure) -> bool:
@@ -116,20 +128,20 @@ def _has_no_cones(measure: Measure) -> bool:
 
 
 def _widen_limits(rows: AffineProblem, x: Array) -> AffineProblem:
-    # at few angles a mean is another one
+    # a mean over few samples may exceed a limit that the full mean keeps
     limits = tuple(
-        (max(maximum, norm.value(x) * (1.0 + ROOM)) if maximum else 0.0, norm) for maximum, norm in rows.limits
+        (max(maximum, norm.value(x) * (1.0 + SLACK)) if maximum else 0.0, norm) for maximum, norm in rows.limits
     )
     return replace(rows, limits=limits)
 
 
 def _ends(rows: AffineProblem, x: Array, share: float) -> list[Array]:
-    aim = np.random.default_rng(1964).standard_normal(rows.size)
+    direction = np.random.default_rng(1964).standard_normal(rows.size)
     slope = np.diag(1.0 / rows.units)[None]
-    targets = (x / rows.units + sign * FAR * aim for sign in (-1.0, 1.0))
-    far = (AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1)) for target in targets)
+    targets = (x / rows.units + sign * FAR * direction for sign in (-1.0, 1.0))
+    norms = (AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1)) for target in targets)
     weight = share * (rows.objective(x) or 1.0)
-    return [end for norm in far for end in _approach(rows, norm, weight)]
+    return [end for norm in norms for end in _approach(rows, norm, weight)]
 
 
 def _approach(rows: AffineProblem, goal: AffineNorm, weight: float) -> list[Array]:
@@ -137,7 +149,7 @@ def _approach(rows: AffineProblem, goal: AffineNorm, weight: float) -> list[Arra
     return [] if x is None or rows.violation(x) > 10.0 * FEASIBLE else [x]
 
 
-def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
+def _free_domains(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
     spans = np.ptp(designs, axis=0)
     maximum = {d.decision.unit: 0.0 for d in rows.domains}
     for domain in rows.domains:
@@ -149,7 +161,15 @@ def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
 
 
 def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
-    """Return the range of a decision's size among designs, and of its angle where that is open and turns."""
+    """Return the range of a decision's size over designs, and of its angle [rad], if these vary.
+
+    Parameters
+    ----------
+    domain
+        The decision and its columns.
+    designs
+        Decision vectors, shape (n,) each.
+    """
     sizes = [_size(domain, design) for design in designs]
     smallest, largest = min(sizes), max(sizes)
     decision = domain.decision
@@ -160,8 +180,8 @@ def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
         first = domain.complex_value(designs[0])
         turns = [cmath.phase(domain.complex_value(design) / first) for design in designs]
         if max(turns) - min(turns) > FREE:
-            at = cmath.phase(first)
-            ranges.append(DecisionRange(angle_name(decision), "rad", at + min(turns), at + max(turns)))
+            angle = cmath.phase(first)
+            ranges.append(DecisionRange(angle_name(decision), "rad", angle + min(turns), angle + max(turns)))
     return ranges
 
 

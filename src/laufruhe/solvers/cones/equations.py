@@ -1,8 +1,7 @@
-"""Limits of zero as equations between the decisions, kept to the last digit (P11).
+"""Limits of zero as linear equations between the decisions, satisfied to rounding (P11).
 
-Where the sum of all loads of a kind is to vanish, V0 + B x = 0, no cone has an interior that a solver could go
-through. The rows of such limits are reduced to as many equations as there are directions in which they act. Dual rows
-of a limit of zero cost nothing, so a bound may take those that level it.
+If a norm must be zero, V0 + B x = 0, and its cone has no interior for the solver. The rows of such limits are reduced
+to independent equations. Dual rows of a limit of zero cost nothing, so a bound may use those that improve it.
 """
 
 from __future__ import annotations
@@ -18,18 +17,22 @@ from laufruhe.prove.certificate import Multipliers
 from laufruhe.solvers.cones.cone_program import project_on_sets
 
 SAME = 1e-10
-"""Share of what the decisions do, or of what is to vanish, under which there is nothing."""
+"""Relative size under which singular values, and the residual of contradicting equations, count as zero."""
 MOST_PROJECTIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """matrix x = right, with rows that are orthonormal in units of the decisions.
+    """Equations matrix x = right, with rows that are orthonormal in units of the decisions.
 
     Attributes
     ----------
+    matrix, right
+        Shapes (m, n) and (m,).
+    units
+        Unit of every column of the decision vector, shape (n,).
     dual
-        Matrix of every limit that makes its dual rows from multipliers of the equations, shape (k d, equations).
+        For every limit, the matrix from multipliers of the equations to its dual rows, shape (k d, m).
     shapes
         Shapes (k, d) of the rows of every limit.
     """
@@ -40,31 +43,31 @@ class Equations:
     dual: tuple[Array, ...]
     shapes: tuple[tuple[int, ...], ...]
 
-    def joined_with(self, others: tuple[Array, Array] | None) -> tuple[Array, Array]:
-        """Return matrix and right side of these equations, followed by others."""
-        if others is None:
+    def joined_with(self, equations: tuple[Array, Array] | None) -> tuple[Array, Array]:
+        """Return matrix and right side of these equations, followed by additional ones."""
+        if equations is None:
             return self.matrix, self.right
-        return np.concatenate([self.matrix, others[0]]), np.concatenate([self.right, others[1]])
+        return np.concatenate([self.matrix, equations[0]]), np.concatenate([self.right, equations[1]])
 
     def project(self, problem: AffineProblem, x: Array) -> Array:
-        """Return decisions near x that keep the equations and lie in their sets."""
+        """Project x, shape (n,), on the equations and on the sets of the decisions, alternately."""
         for _ in range(MOST_PROJECTIONS):
-            missing = self.right - self.matrix @ x
-            x = x + self.units**2 * (missing @ self.matrix)
-            inside = project_on_sets(problem, x.copy())
-            if np.array_equal(inside, x):
+            residual = self.right - self.matrix @ x
+            x = x + self.units**2 * (residual @ self.matrix)
+            projection = project_on_sets(problem, x.copy())
+            if np.array_equal(projection, x):
                 break
-            x = inside
+            x = projection
         return x
 
     def dual_rows(self, prices: Array) -> list[Array]:
-        """Return dual rows of every limit from the multipliers of the equations."""
+        """Return dual rows of every limit, shape (k, d), from dual values of the program, equations first."""
         multipliers = prices[: len(self.right)]
         return [(matrix @ multipliers).reshape(shape) for matrix, shape in zip(self.dual, self.shapes, strict=True)]
 
 
 def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | None:
-    """Return the equations of limits of zero, given by number; None if there are none, or they contradict."""
+    """Return the equations of the limits with these indices, all of zero; None if there are none or they contradict."""
     norms = [problem.limits[k][1] for k in limits]
     if not norms:
         return None
@@ -75,27 +78,35 @@ def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | N
     stacked = np.concatenate([slope / size for slope, size in zip(slopes, sizes, strict=True)])
     constant = np.concatenate([norm.constant.ravel() / size for norm, size in zip(norms, sizes, strict=True)])
     left, values, right = np.linalg.svd(stacked, full_matrices=False)
-    acting = values > SAME * values[0]
-    left, values, right = left[:, acting], values[acting], right[acting]
-    along = left.T @ constant
-    if np.linalg.norm(constant - left @ along) > SAME * np.linalg.norm(constant):
+    is_significant = values > SAME * values[0]
+    left, values, right = left[:, is_significant], values[is_significant], right[is_significant]
+    reduced = left.T @ constant
+    if np.linalg.norm(constant - left @ reduced) > SAME * np.linalg.norm(constant):
         return None
     dual = np.split(left / values, np.cumsum([len(slope) for slope in slopes])[:-1])
     return Equations(
-        right / units, -along / values, units, tuple(matrix / size for matrix, size in zip(dual, sizes, strict=True)),
+        right / units, -reduced / values, units, tuple(matrix / size for matrix, size in zip(dual, sizes, strict=True)),
         tuple(norm.constant.shape for norm in norms),
     )  # fmt: skip
 
 
 def refine_multipliers(coarse: AffineProblem, fine: AffineProblem, multipliers: Multipliers) -> Multipliers:
-    """Replace dual rows of limits of zero by those of a finer grid that have the same slope."""
-    equal = [k for k, (maximum, _) in enumerate(coarse.limits) if maximum == 0.0]
-    equations = equations_of(fine, equal)
+    """Replace dual rows of limits of zero by rows on a finer grid with the same slope in the decisions.
+
+    Parameters
+    ----------
+    coarse, fine
+        One problem at few and at many samples.
+    multipliers
+        Dual rows on the coarse grid.
+    """
+    zero_limits = [k for k, (maximum, _) in enumerate(coarse.limits) if maximum == 0.0]
+    equations = equations_of(fine, zero_limits)
     if equations is None:
         return multipliers
-    slope = sum((coarse.limits[k][1].pulled(multipliers.limits[k]) for k in equal), np.zeros(coarse.size))
+    slope = sum((coarse.limits[k][1].pulled(multipliers.limits[k]) for k in zero_limits), np.zeros(coarse.size))
     rows = equations.dual_rows(equations.matrix @ (equations.units**2 * slope))
     limits = list(multipliers.limits)
-    for k, z in zip(equal, rows, strict=True):
+    for k, z in zip(zero_limits, rows, strict=True):
         limits[k] = z
     return Multipliers(multipliers.terms, tuple(limits))

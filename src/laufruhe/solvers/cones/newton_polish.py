@@ -1,8 +1,8 @@
-"""Newton steps from the optimum at some angles of the cycle to that of the whole cycle (P10).
+"""Newton steps from the optimum at few samples per cycle to the optimum at many (P10).
 
-A cone program holds as many angles as its time allows, and its dual rows between them are guessed. Where the objective
-is smooth, a few steps from its answer find the optimum at many times as many angles. There every row of the design
-is its own dual row.
+A cone program has as many samples as its time allows, and its dual rows between them are guesses. If the objective is
+smooth, a few Newton steps from its solution reach the optimum at many more samples. There, the subgradient of the
+design gives the dual rows.
 """
 
 from __future__ import annotations
@@ -17,33 +17,41 @@ from laufruhe.prove.certificate import ROUNDING, Bound, Multipliers, gap_of, lev
 from laufruhe.solvers.cones.conic import solve_quadratic
 
 TARGET_GAP = 1e-6
-TIMES = 16
-"""Times as many angles as the cone program had."""
+REFINEMENT = 16
+"""Factor of samples over the cone program."""
 MOST_STEPS = 5
 DAMPING = (1e-10, 1e-7, 1e-4)
-"""Share of the curvature in all directions that is added in each; where nothing changes the objective, x stays."""
+"""Shares of the trace of the curvature on its diagonal; x stays in directions that do not change the objective."""
 CONVERGED = 1e-5
-"""Step in a decision's scale whose square is negligible."""
+"""Step relative to a decision's scale whose square is negligible."""
 NO_STEP = 1e-9
-"""Share of a decision's scale that is no step for a decision of zero."""
+"""Step relative to a decision's scale that counts as zero if the decision is zero."""
 FEW_ROWS = 64
 MOST_NUMBERS = 8_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
-    """A design, the bound that meets it, and its violation of limits.
+    """A design with its lower bound and its violation of limits.
 
     Attributes
     ----------
+    x
+        Decision vector, shape (n,).
+    bound
+        Lower bound of all designs, with its multipliers.
     problem
-        Rows on the grid that the bound holds on.
+        Rows on the grid of the bound.
+    gap
+        Gap between objective and bound, relative to the objective.
     violation
-        Largest relative excess over a limit, between the angles too.
+        Largest relative excess over a limit, between the samples too.
+    samples
+        Samples per period of the cone program.
     zero_level
-        Objective that counts as zero.
-    then
-        Method that followed the cones, in words.
+        Objective that counts as zero [SI].
+    refinement
+        Method after the cones, in words for the certificate.
     """
 
     x: Array
@@ -53,44 +61,44 @@ class Optimum:
     violation: float
     samples: int
     zero_level: float
-    then: str = ""
+    refinement: str = ""
 
 
-def polish(model: AffineModel, rough: Optimum) -> Optimum:
-    """Return the optimum at many times as many angles, or the rough one where that is no better."""
-    if rough.gap <= TARGET_GAP or not _is_smooth(rough.problem):
-        return rough
-    samples = TIMES * rough.samples
+def polish(model: AffineModel, coarse: Optimum) -> Optimum:
+    """Return the optimum at `REFINEMENT` times as many samples, or the coarse optimum if that is no better."""
+    if coarse.gap <= TARGET_GAP or not _is_smooth(coarse.problem):
+        return coarse
+    samples = REFINEMENT * coarse.samples
     fine = model.at(samples)
-    steps = _newton_steps(fine, rough.x)
+    steps = _newton_steps(fine, coarse.x)
     if steps is None:
-        return rough
+        return coarse
     x, limits = steps
     rows = [norm.subgradient(x) for _, norm in fine.terms]
     averaged = model.at(samples, averaged=True)
     bound = lower_bound(averaged, Multipliers(tuple(rows), limits))
     value = fine.objective(x)
-    if gap_of(value, bound.value, rough.zero_level) > TARGET_GAP:
-        bound = max(bound, lower_bound(averaged, levelled(averaged, x, bound)), key=lambda each: each.value)
-    gap, violation = gap_of(value, bound.value, rough.zero_level), fine.violation(x)
-    if gap >= rough.gap or violation > max(rough.violation, FEASIBLE):
-        return rough
-    then = " and Newton's method"
-    return replace(rough, x=x, bound=bound, problem=fine, gap=gap, violation=violation, then=then)
+    if gap_of(value, bound.value, coarse.zero_level) > TARGET_GAP:
+        bound = max(bound, lower_bound(averaged, levelled(averaged, x, bound)), key=lambda proven: proven.value)
+    gap, violation = gap_of(value, bound.value, coarse.zero_level), fine.violation(x)
+    if gap >= coarse.gap or violation > max(coarse.violation, FEASIBLE):
+        return coarse
+    refinement = " and Newton's method"
+    return replace(coarse, x=x, bound=bound, problem=fine, gap=gap, violation=violation, refinement=refinement)
 
 
 def _is_smooth(problem: AffineProblem) -> bool:
     if problem.groups or not problem.terms:
         return False
-    if TIMES // 2 * sum(norm.slope.size for _, norm in problem.terms) > MOST_NUMBERS:
+    if REFINEMENT // 2 * sum(norm.slope.size for _, norm in problem.terms) > MOST_NUMBERS:
         return False
     has_curvature = all(norm.norm.across(norm.grid, norm.constant) is not None for _, norm in problem.terms)
     return has_curvature and all(len(norm.grid.weights) <= FEW_ROWS for _, norm in problem.limits)
 
 
 def _newton_steps(problem: AffineProblem, x: Array) -> tuple[Array, tuple[Array, ...]] | None:
-    """Return where steps from x end, and the dual rows of the limits there; None where the first step is no better."""
-    end, zero = None, x == 0.0
+    """Return the end of Newton steps from x and the dual rows of its limits; None if the first step is no better."""
+    end, is_zero = None, x == 0.0
     for _ in range(MOST_STEPS):
         gradient, curvature = derivatives(problem, x)
         maximum = problem.objective(x) * (1.0 + ROUNDING)
@@ -98,10 +106,10 @@ def _newton_steps(problem: AffineProblem, x: Array) -> tuple[Array, tuple[Array,
         step = next((step for step in steps if step is not None and problem.objective(step[0]) <= maximum), None)
         if step is None:
             break
-        y = np.where(zero & (np.abs(step[0]) <= NO_STEP * problem.scales), 0.0, step[0])
-        moved = float((np.abs(y - x) / problem.scales).max(initial=0.0))
+        y = np.where(is_zero & (np.abs(step[0]) <= NO_STEP * problem.scales), 0.0, step[0])
+        change = float((np.abs(y - x) / problem.scales).max(initial=0.0))
         x, end = y, (y, step[1])
-        if moved <= CONVERGED:
+        if change <= CONVERGED:
             break
     return end
 
@@ -110,12 +118,12 @@ def derivatives(problem: AffineProblem, x: Array) -> tuple[Array, Array]:
     """Return gradient and curvature of the objective at x, shapes (n,) and (n, n) (P10)."""
     gradient, curvature = np.zeros(problem.size), np.zeros((problem.size, problem.size))
     for weight, norm in problem.terms:
-        along, across = norm.subgradient(x), norm.norm.across(norm.grid, norm.rows(x))
-        assert across is not None
-        gradient += weight * np.einsum("kd,kdn->n", along, norm.slope)
-        unit = along / norm.grid.weights[:, None]
-        root = np.sqrt(weight * across)
-        rows = (norm.slope * root[:, None, None]).reshape(-1, problem.size)
-        radial = np.einsum("kd,kdn->kn", unit, norm.slope) * root[:, None]
+        duals, curvatures = norm.subgradient(x), norm.norm.across(norm.grid, norm.rows(x))
+        assert curvatures is not None
+        gradient += weight * np.einsum("kd,kdn->n", duals, norm.slope)
+        directions = duals / norm.grid.weights[:, None]
+        factors = np.sqrt(weight * curvatures)
+        rows = (norm.slope * factors[:, None, None]).reshape(-1, problem.size)
+        radial = np.einsum("kd,kdn->kn", directions, norm.slope) * factors[:, None]
         curvature += rows.T @ rows - radial.T @ radial
     return gradient, curvature

@@ -1,4 +1,4 @@
-"""Choice among designs that are equally good: the lightest one, without decisions that do next to nothing."""
+"""Choose the lightest of equally good designs, with negligible decisions set to zero."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from laufruhe.solvers.cones.cone_program import project_on_sets
 from laufruhe.solvers.cones.conic import solve_cones
 
 SAME_LOAD = 1e-10
-"""Share of what a load changes by all decisions, under which a direction does not move it."""
+"""Relative change of a load that counts as none."""
 NEGLIGIBLE = 1e-6
 
 
@@ -24,6 +24,8 @@ def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
 
     Parameters
     ----------
+    problem
+        The problem, whose rotors and measures define mass.
     affine
         Rows of the problem's loads and limits.
     x
@@ -36,7 +38,7 @@ def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
 
 
 def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
-    """Return directions in which no load of the problem changes, shape (n, m); none if a mass is minimised."""
+    """Return directions in which no load of the problem changes, shape (n, m); m = 0 if a mass is minimised."""
     if not affine.size or any(term.measure.is_mass for term in problem.objective):
         return np.zeros((affine.size, 0))
     loads = [norm for _, norm in affine.terms]
@@ -44,10 +46,10 @@ def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
         norm for limit, (_, norm) in zip(problem.load_limits, affine.limits, strict=True)
         if not limit.measure.is_mass
     ]  # fmt: skip
-    # each decision in the size of what it loads: bounds may be far apart, and far from what is needed
+    # unit of each decision by its effect on loads, because bounds may differ by orders of magnitude
     sizes = np.sqrt(np.sum([np.sum(norm.slope**2, axis=(0, 1)) for norm in loads], axis=0))
     units = np.where(sizes > 0.0, 1.0 / np.where(sizes > 0.0, sizes, 1.0), affine.scales)
-    # R of each norm's QR factorisation: the same directions in as few rows as there are columns
+    # factor R of each norm's QR factorisation: the same null space in at most n rows
     triangles = [np.asarray(np.linalg.qr((norm.slope * units).reshape(-1, affine.size), mode="r")) for norm in loads]
     stacked = np.concatenate([triangle / (float(np.abs(triangle).max()) or 1.0) for triangle in triangles])
     _, values, rows = np.linalg.svd(stacked, full_matrices=True)
@@ -58,14 +60,14 @@ def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
 
 
 def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
-    """Minimise the weighted size of x + directions z within the sets and under mass limits."""
+    """Minimise the total mass of x + directions z within the sets and limits."""
     domains = affine.domains
     weights = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in domains]
     sizes = [float(np.hypot.reduce(x[domain.columns])) for domain in domains]
     total = sum(w * size for w, size in zip(weights, sizes, strict=True))
     if total == 0.0:
         return x
-    # nothing lighter is larger than all of this together, whatever the bounds
+    # in a lighter design, no decision can exceed the total mass
     domains = tuple(
         replace(d, decision=replace(d.decision, set=d.set.within(total / w if w else size)))
         for d, w, size in zip(domains, weights, sizes, strict=True)
@@ -75,10 +77,10 @@ def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
     )
     terms = tuple((w, distance(d, np.zeros(d.width), affine.size)) for w, d in zip(weights, domains, strict=True) if w)
     scales = np.concatenate([np.full(d.width, d.scale) for d in domains])
-    # across the directions, in units of the sizes, nothing moves
+    # equations fix the design in all directions orthogonal to the free ones
     base, values, _ = np.linalg.svd(directions / scales[:, None], full_matrices=True)
-    across = base[:, len(values) :].T / scales
-    solution = solve_cones(AffineProblem(terms, limits, domains, affine.samples), (across, across @ x))
+    normals = base[:, len(values) :].T / scales
+    solution = solve_cones(AffineProblem(terms, limits, domains, affine.samples), (normals, normals @ x))
     if solution.x is None:
         return x
     steps, *_ = np.linalg.lstsq(directions / scales[:, None], (solution.x - x) / scales)
@@ -86,29 +88,39 @@ def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
 
 
 def is_moved_along(norm: AffineNorm, directions: Array) -> bool:
-    """Return True if some of the directions, shape (n, m), move a norm by more than a rounding."""
-    moved = np.abs(np.einsum("kdn,nm->kdm", norm.slope, directions)).max(initial=0.0)
-    return bool(moved > SAME_LOAD * np.abs(norm.slope * np.abs(directions).max(axis=1)).max(initial=0.0))
+    """Return True if a direction, shape (n, m), changes a norm by more than rounding."""
+    change = np.abs(np.einsum("kdn,nm->kdm", norm.slope, directions)).max(initial=0.0)
+    return bool(change > SAME_LOAD * np.abs(norm.slope * np.abs(directions).max(axis=1)).max(initial=0.0))
 
 
 def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
-    """Return the distance of a decision from a point of its own columns, as a norm of a vector of so many columns."""
+    """Return the distance of a decision from a target as an affine norm.
+
+    Parameters
+    ----------
+    domain
+        The decision and its columns.
+    target
+        Point in the columns of the decision, shape (width,).
+    columns
+        Length of the decision vector.
+    """
     slope = np.zeros((1, domain.width, columns))
     slope[0, :, domain.columns] = np.eye(domain.width)
     return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))
 
 
 def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
-    """Set decisions to zero that hardly load anything, or whose absence makes nothing worse.
+    """Set decisions to zero whose loads are negligible, or whose absence does not increase the objective.
 
-    Their loads count and not their bounds, which may be a million times what is needed.
+    The test compares loads and not bounds, which may be a million times too wide.
     """
     x = x.copy()
     zero = np.zeros_like(x)
     may_vanish = all(domain.set.lower <= 0.0 for domain in affine.domains)
-    if may_vanish and affine.objective(zero) <= affine.objective(x) and _breaks_no_more(affine, x, zero):
+    if may_vanish and affine.objective(zero) <= affine.objective(x) and _violates_no_more(affine, x, zero):
         return zero
-    # without their constants: what decisions alone make
+    # loads of the decisions alone, without constants
     norms = [
         (replace(norm, constant=np.zeros_like(norm.constant)), max(norm.value(x), norm.value(zero)))
         for _, norm in affine.terms
@@ -116,11 +128,11 @@ def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
     for domain in affine.domains:
         if domain.set.lower > 0.0 or not x[domain.columns].any():
             continue
-        alone, without = zero.copy(), x.copy()
-        alone[domain.columns] = x[domain.columns]
+        single, without = zero.copy(), x.copy()
+        single[domain.columns] = x[domain.columns]
         without[domain.columns] = 0.0
-        is_faint = all(norm.value(alone) <= NEGLIGIBLE * size for norm, size in norms)
-        if (is_faint or affine.objective(without) <= affine.objective(x)) and _breaks_no_more(affine, x, without):
+        is_faint = all(norm.value(single) <= NEGLIGIBLE * size for norm, size in norms)
+        if (is_faint or affine.objective(without) <= affine.objective(x)) and _violates_no_more(affine, x, without):
             x = without
     return x
 
@@ -131,14 +143,14 @@ def _cancel_exactly(affine: AffineProblem, x: Array) -> Array:
     if not 0.0 < affine.objective(x) <= NEGLIGIBLE * parts:
         return x
     slope = np.concatenate([norm.slope.reshape(-1, affine.size) * affine.units for norm in norms])
-    rest = np.concatenate([norm.rows(x).reshape(-1) for norm in norms])
-    # decisions of zero stay there
-    exact = project_on_sets(affine, x - affine.units * np.linalg.lstsq(slope * (x != 0.0), rest)[0])
-    is_better = affine.objective(exact) < affine.objective(x) and _breaks_no_more(affine, x, exact)
+    residual = np.concatenate([norm.rows(x).reshape(-1) for norm in norms])
+    # decisions at zero stay zero
+    exact = project_on_sets(affine, x - affine.units * np.linalg.lstsq(slope * (x != 0.0), residual)[0])
+    is_better = affine.objective(exact) < affine.objective(x) and _violates_no_more(affine, x, exact)
     return exact if is_better else x
 
 
-def _breaks_no_more(affine: AffineProblem, x: Array, other: Array) -> bool:
+def _violates_no_more(affine: AffineProblem, x: Array, candidate: Array) -> bool:
     return all(
-        norm.value(other) <= (1.0 + 0.1 * FEASIBLE) * max(maximum, norm.value(x)) for maximum, norm in affine.limits
+        norm.value(candidate) <= (1.0 + 0.1 * FEASIBLE) * max(maximum, norm.value(x)) for maximum, norm in affine.limits
     )

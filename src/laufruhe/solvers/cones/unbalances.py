@@ -1,4 +1,4 @@
-"""Unbalances of counterweights and balancer shafts at a proven optimum (P1-P6)."""
+"""Solve for unbalances of counterweights and balancer shafts, with proven optimality (P1-P6)."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MOST_ROWS = 60_000
 
 
 def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
-    """Return limits that no unbalances keep together, whatever the open mounts are."""
+    """Return names of limits that contradict each other for every choice of unbalances and mounts; empty if none."""
     limits = tuple(limit for limit in problem.load_limits if not depends(limit.measure.channel, OF_MOUNTS, problem))
     if not limits:
         return ()
@@ -58,7 +58,7 @@ def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
 
 
 def solve_polished(problem: Problem) -> Result:
-    """Solve as `solve_unbalances`, to a gap of a millionth where that is requested and the optimum is smooth (P10)."""
+    """Solve for unbalances, to a gap of 1e-6 if the problem requests that and the optimum is smooth (P10)."""
     return solve_unbalances(problem, problem.sharply)
 
 
@@ -67,37 +67,38 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
 
     Parameters
     ----------
+    problem
+        The problem.
     polished
-        Whether Newton's method narrows the gap that cones leave.
+        True to narrow the gap of the cone program by Newton's method.
     angles
-        Angles of a cycle at which the first program stands at least: as many as problems like it needed.
+        Smallest number of samples per cycle of the first program, for example of a similar problem.
 
     Returns
     -------
-    Result with a certificate computed from the exact model, or with the limits that
-    cannot be met together.
+    Result with a certificate computed from the exact model, or with the limits that contradict each other.
     """
     started = time.perf_counter()
     model = AffineModel(problem)
-    # most designs are given with what is open at zero, and that one is known
+    # the model has already evaluated the design with all decisions at zero
     initial = evaluate(problem) if any(problem.start) else model.bare
-    modelled = time.perf_counter()
-    fixed, hopeless = _fixed_limits(problem, model)
-    if hopeless:
-        return infeasible_result(problem, initial, hopeless, {"model": modelled - started})
+    model_time = time.perf_counter()
+    fixed, violated = _fixed_limits(problem, model)
+    if violated:
+        return infeasible_result(problem, initial, violated, {"model": model_time - started})
     model = model.with_limits([limit for limit in problem.limits if limit not in fixed])
-    begin = int(angles * float(problem.engine.cycle.base_order / model.base))
-    optimum, samples = _refine(model.problem, model, numerical_zero(problem), begin)
+    start_samples = int(angles * float(problem.engine.cycle.base_order / model.base))
+    optimum, samples = _refine(model.problem, model, numerical_zero(problem), start_samples)
     solved = time.perf_counter()
-    timing = {"model": modelled - started, "solve": solved - modelled}
+    timing = {"model": model_time - started, "solve": solved - model_time}
     limits = model.problem.load_limits
     if optimum is None:
-        # means averaged, as what was proven of all limits together was (P7)
-        sound = model.at(samples, averaged=True)
+        # sample averages of means, as in the proof of infeasibility (P7)
+        relaxed = model.at(samples, averaged=True)
         names = [limit.name for limit in limits]
-        if not is_infeasible(sound):
+        if not is_infeasible(relaxed):
             return failed_result(problem, initial, names, timing)
-        return infeasible_result(problem, initial, smallest_conflict(sound, names), timing)
+        return infeasible_result(problem, initial, smallest_conflict(relaxed, names), timing)
     if polished:
         optimum = polish(model, optimum)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
@@ -114,7 +115,10 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         bound=bound.value,
         reach=ProofStrength.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
-        method=f"second-order cones at {optimum.samples} angles{optimum.then}, dual bound at {optimum.problem.samples}",
+        method=(
+            f"second-order cones at {optimum.samples} angles{optimum.refinement}, "
+            f"dual bound at {optimum.problem.samples}"
+        ),
         prices=dict.fromkeys([(limit, "at most") for limit in fixed], Price(0.0, math.inf)) | prices,
         bounds=bounds,
     )
@@ -122,46 +126,50 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
 
 
 def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str, ...]]:
-    # limits without open decisions are checked directly: in a program, rounding would give them an infinite price
+    # check limits that no decision changes directly: in a program, rounding would give them an infinite price
     fixed = [limit for limit in problem.load_limits if not model.norm(limit.measure, model.full_samples).slope.any()]
-    # a whole number of times as fine
+    # integer refinement of the samples
     samples = model.full_samples * max(2, math.ceil(FINE_SAMPLES / model.full_samples))
     zero = np.zeros(sum(domain.width for domain in model.domains))
     values = [(limit, model.norm(limit.measure, samples).value(zero)) for limit in fixed]
-    broken = [limit.name for limit, value in values if value > limit.maximum * (1.0 + KEPT)]
-    return fixed, tuple(broken[:1])
+    violated = [limit.name for limit, value in values if value > limit.maximum * (1.0 + KEPT)]
+    return fixed, tuple(violated[:1])
 
 
-def _refine(problem: Problem, model: AffineModel, zero_level: float, begin: int) -> tuple[Optimum | None, int]:
-    """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
+def _refine(problem: Problem, model: AffineModel, zero_level: float, start_samples: int) -> tuple[Optimum | None, int]:
+    """Double the samples until the bound on a grid twice as fine closes the gap (P6).
 
     Parameters
     ----------
-    begin
-        Angles of a period of the loads at which it begins, at least.
+    problem, model
+        The problem and its affine model.
+    zero_level
+        Objective that counts as zero [SI].
+    start_samples
+        Smallest number of samples per period of the first program.
 
     Returns
     -------
-    The optimum, None where the limits cannot be met, and the angles that showed it.
+    The optimum, or None if the limits contradict each other, and the last number of samples.
     """
-    # of many angles half: the first program is judged at twice as many, and these are all of a cycle
+    # with many rows, start at half the samples: the bound is computed at twice as many
     half = model.full_samples // 2
     has_many_rows = any(len(norm.grid.weights) > MANY_ROWS for _, norm in model.at(half).terms)
     first = half if model.full_samples % 2 == 0 and has_many_rows else model.full_samples
-    samples, best = max(first, begin), None
-    # a limit that is nearly the least mean possible needs many angles
+    samples, best = max(first, start_samples), None
+    # a limit close to the smallest possible mean needs many samples
     maximum = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in in_time(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
-            if best is not None and best.violation <= KEPT and _keeps_limits_finely(problem, best):
+            if best is not None and best.violation <= KEPT and _keeps_limits_with_fine_sampling(problem, best):
                 return best, samples
-            # means averaged, for at a few angles alone one may be more than over the whole cycle (P7)
+            # sample averages of means: at few samples, a mean may exceed its value over the whole cycle (P7)
             if is_infeasible(model.at(samples, averaged=True)):
                 return None, samples
-            # a limit that is nearly the least value possible is met within the tolerance of limits
+            # a limit close to the smallest possible value is met within the tolerance of limits
             optimum = _attempt(problem, model, samples, zero_level, FEASIBLE - KEPT)
-            if optimum is not None and optimum.violation <= KEPT and _keeps_limits_finely(problem, optimum):
+            if optimum is not None and optimum.violation <= KEPT and _keeps_limits_with_fine_sampling(problem, optimum):
                 best = optimum
             samples *= 2
             continue
@@ -170,14 +178,14 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, begin: int)
         is_close = best.gap <= problem.tolerance or not problem.search.proves
         is_allowed = best.violation <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
         is_fathomed = is_allowed and (is_close or k >= MOST_DOUBLINGS)
-        if rows > MOST_ROWS or (is_fathomed and _keeps_limits_finely(problem, optimum)):
+        if rows > MOST_ROWS or (is_fathomed and _keeps_limits_with_fine_sampling(problem, optimum)):
             break
         samples *= 2
     return best, samples
 
 
-def _keeps_limits_finely(problem: Problem, optimum: Optimum) -> bool:
-    # a mean at few angles may be less than over the cycle (P7)
+def _keeps_limits_with_fine_sampling(problem: Problem, optimum: Optimum) -> bool:
+    # a mean at few samples may be smaller than over the cycle (P7)
     if not any(limit.measure.is_load for limit in problem.load_limits):
         return True
     values = [domain.complex_value(optimum.x) for domain in optimum.problem.domains]
@@ -185,10 +193,18 @@ def _keeps_limits_finely(problem: Problem, optimum: Optimum) -> bool:
 
 
 def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_level: float) -> Optimum | None:
-    """Return an optimum at `samples` angles that keeps its limits between them too; None where there is none.
+    """Return an optimum at `samples` samples that keeps its limits between them too; None if no design does.
 
-    A peak between the angles breaks its limit by a little. The next attempt lowers the limit at the angles
-    by that little.
+    A peak between samples exceeds its limit slightly. The next attempt lowers all limits by that excess.
+
+    Parameters
+    ----------
+    problem, model
+        The problem and its affine model.
+    samples
+        Samples per period of the loads.
+    zero_level
+        Objective that counts as zero [SI].
     """
     optimum = _attempt(problem, model, samples, zero_level, 0.0)
     margin = 0.0
@@ -206,35 +222,46 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: flo
     if solution.x is None:
         return None
     x = break_ties(problem, fine, solution.x)
-    averaged = model.at(fine.samples, averaged=True)
-    bound = best_bound(averaged, x, refine_multipliers(coarse, averaged, solution.multipliers))
+    relaxed = model.at(fine.samples, averaged=True)
+    bound = best_bound(relaxed, x, refine_multipliers(coarse, relaxed, solution.multipliers))
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
-    judge = model.at(fine.samples, finer=True) if has_peaks else fine
+    peak_model = model.at(fine.samples, finer=True) if has_peaks else fine
     return Optimum(
-        x, bound, fine, gap_of(judge.objective(x), bound.value, zero_level), judge.violation(x), samples, zero_level
+        x,
+        bound,
+        fine,
+        gap_of(peak_model.objective(x), bound.value, zero_level),
+        peak_model.violation(x),
+        samples,
+        zero_level,
     )
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:
-    """Lower all limits by a share, or raise them where it is negative."""
+    """Lower all limits by the relative margin; raise them if it is negative."""
     return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
 
 def is_infeasible(affine: AffineProblem) -> bool:
-    """Return True if no design keeps the limits; proven where means are averaged, and so never overestimated."""
+    """Return True if no design keeps the limits.
+
+    This is a proof if the rows are sample averages, which never overestimate a mean.
+    """
     return solve_cones(replace(affine, terms=())).x is None
 
 
 def smallest_conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of a smallest set of limits that no design keeps together.
+    """Return the names of a minimal set of limits that contradict each other.
 
     Parameters
     ----------
+    affine
+        Rows of the problem.
     names
         Name of every limit of the problem.
     """
 
-    def excluded(chosen: Sequence[int]) -> bool:
-        return is_infeasible(replace(affine, limits=tuple(affine.limits[k] for k in chosen)))
+    def excluded(indices: Sequence[int]) -> bool:
+        return is_infeasible(replace(affine, limits=tuple(affine.limits[k] for k in indices)))
 
     return tuple(names[k] for k in smallest(range(len(affine.limits)), excluded))
