@@ -128,13 +128,13 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     for number in (0, 2):
         own: SdpProgram = replace(program, objective=np.eye(program.numbers + 10)[number])
         told: Solution = stated.solve(own)
-        side = mounts.straight[number]
+        side = mounts.single_decisions[number]
         assert side is not None
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
         assert -1.01 <= proven_bound(own, told.multipliers) <= smallest
         # by the solver of the aim before, as exactly as it is worth
-        proven, stands = stated.minimum(np.eye(program.numbers + 10)[number])
-        assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
+        proven, spring_mounts = stated.minimum(np.eye(program.numbers + 10)[number])
+        assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, spring_mounts[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
             assert proven_bound(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
 

@@ -113,7 +113,7 @@ def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
     for _ in range(400):
         drawn = random.uniform(-1.0, 1.0, start)
         x = np.concatenate([domain.project(drawn) for domain in domains])
-        u = np.linalg.solve(columns.of_domains, x - middles)
+        u = np.linalg.solve(columns.domain_map, x - middles)
         farthest = np.maximum(farthest, np.abs(u))
         lifted = np.concatenate([[1.0], u])
         assert all(lifted @ matrix @ lifted <= 1e-12 for matrix in columns.sets)

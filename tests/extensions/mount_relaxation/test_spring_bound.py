@@ -137,7 +137,7 @@ def truth(
         products.append(times * added @ spring.axes.T @ travel[m])
     for place in mounts.places:
         s = numbers[place.number]
-        products += [s * place.aside @ mounts.turns @ motion]
+        products += [s * place.turn_axes @ mounts.turns @ motion]
         for felt in (elastic, viscous)[: 1 + place.is_damped]:
             times = [(mounts.times[k] * h, felt[mounts.members[k][0]]) for k, h in place.mounts]
             products += [s * sum(h * place.arms @ force for h, force in times)]
@@ -239,7 +239,7 @@ DAMPED_TRACTORS = ["dampers that follow", "dampers of their own", "dampers that 
 def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
     moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
-    monkeypatch.setattr(orders_, "ASIDE", -1.0)
+    monkeypatch.setattr(orders_, "OMITTED_SYMMETRY", -1.0)
     plain = asked_for(tmp_path, ASKED["narrowed"], mounts=TURNED) if name == "stiffness" else None
     (tmp_path / "four.toml").write_text(tractor(name), encoding="utf-8")
     problem = plain or load(tmp_path / "four.toml")
@@ -584,7 +584,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
 def test_sums_over_samples_are_those_of_the_cycle_with_more_than_two_of_every_order(tmp_path: Path) -> None:
     boxes = asked_of(asked_for(tmp_path, MEANS))
     ((weight, own),) = boxes._terms
-    places = {order.place for order in own.orders}
+    places = {order.index for order in own.orders}
     assert len(places) == 2
     fine, coarse = replace(own, samples=2 * max(places) + 1), replace(own, samples=2 * max(places))
     assert fine.is_sampled_fully

@@ -1,4 +1,4 @@
-"""Lower bounds of mounts that are open together with unbalances and throws, by boxes of all of them (E68-E72).
+"""Lower bounds for mounts that are open together with unbalances and throws, by boxes of all these numbers (E68-E72).
 
 Without this extension the bound is that of `mount_relaxation`.
 """

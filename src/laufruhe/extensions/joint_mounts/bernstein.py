@@ -1,4 +1,4 @@
-"""Polynomials over a box by Bernstein coefficients, the least of which is a lower bound (N6)."""
+"""Lower bounds of polynomials over a box: the smallest Bernstein coefficient is a lower bound (N6)."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ def corners_of(count: int) -> Array:
 
 @lru_cache(maxsize=8)
 def mixed(count: int) -> Array:
-    """Return the map from quadratics at vertices to coefficients of their multilinear mix.
+    """Return the map from quadratics at vertices to Bernstein coefficients of their multilinear mixture.
 
     Returns
     -------
     Shape (4^n, 2^n, 1 + n + n^2), for quadratics by (1, s, s s').
     """
     unit = np.eye(count, dtype=int)
-    powers = [np.zeros(count, dtype=int), *unit, *(one + other for one in unit for other in unit)]
-    out = np.ones((4,) * count + (2,) * count + (len(powers),))
+    powers = [np.zeros(count, dtype=int), *unit, *(first + second for first in unit for second in unit)]
+    weights = np.ones((4,) * count + (2,) * count + (len(powers),))
     for j in range(count):
         shape = np.ones(2 * count + 1, dtype=int)
         shape[j], shape[count + j], shape[-1] = 4, 2, len(powers)
-        out = out * np.stack([_TIMES[:, :, power[j]] for power in powers], axis=-1).reshape(shape)
-    return out.reshape(4**count, 2**count, len(powers))
+        weights = weights * np.stack([_TIMES[:, :, power[j]] for power in powers], axis=-1).reshape(shape)
+    return weights.reshape(4**count, 2**count, len(powers))
 
 
 @lru_cache(maxsize=8)
 def coefficients(count: int) -> Array:
-    """Return the map from one quadratic by (1, s, s s') to its coefficients, shape (4^n, 1 + n + n^2)."""
+    """Return the map from one quadratic by (1, s, s s') to Bernstein coefficients, shape (4^n, 1 + n + n^2)."""
     return np.asarray(mixed(count).sum(axis=1))

@@ -44,29 +44,29 @@ MOST_CORNERS, ROWS = 1200, 7e6
 BOXES = 4
 """Boxes for each vertex, with up to three numbers."""
 WORTH = 0.7
-"""Gain under which the series of an order converges fast enough for useful bounds."""
+"""Gain below which the series of an order converges fast enough for useful bounds."""
 FEW = 2
-"""Least budget of vertices, as a multiple of those of a box."""
+"""Smallest budget of vertices, as a multiple of those of a box."""
 NO_PRICE = 1e-8
 """Price of a limit, in objectives, that counts as zero."""
 ROUNDS, STEPS = 2, 40
 """Passes over the limits to find their prices, and steps of each golden section search."""
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
-Judge: TypeAlias = Callable[[Array, Array], float]
-"""Objective of mounts and columns of unbalances by the exact model; infinite if a limit is violated."""
+ExactObjective: TypeAlias = Callable[[Array, Array], float]
+"""Exact objective [SI] of mounts and columns of unbalances; infinite if a limit is violated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """Unbalances and multipliers on the mounts of a vertex.
+    """Optimal unbalances and multipliers for the mounts at a vertex.
 
     Attributes
     ----------
     columns
-        Optimal unbalances, or those with the least violation of limits.
+        Optimal unbalances, or those with the smallest violation of limits, shape (columns,).
     pairing
-        Lower bound on all mounts by the multipliers; None on an undamped resonance.
+        Lower bound for any mounts by the multipliers; None on an undamped resonance.
     """
 
     columns: Array
@@ -74,7 +74,7 @@ class Corner:
 
 
 def mixes_corners(problem: Problem) -> bool:
-    """Return whether vertices bound a problem: few mixed decisions, and only loads in the objective.
+    """Return True if vertices can bound a problem: several decisions, few mounts, and loads alone in the objective.
 
     One open number, or stiffness alone, needs no vertices.
     """
@@ -89,21 +89,28 @@ def mixes_corners(problem: Problem) -> bool:
 
 
 class DesignBoxes:
-    """Bounds of boxes of mounts by multipliers at vertices.
+    """Lower bounds of boxes of mounts by multipliers at vertices.
 
     Attributes
     ----------
     value
         Objective of the incumbent [SI].
     best
-        Mounts and columns of the incumbent if it was found at a vertex.
+        Mounts and columns of the incumbent if a vertex improved it.
+    lower, upper
+        Bounds of the open numbers of the mounts, shape (n,).
+
+    Parameters
+    ----------
+    exact_objective
+        Exact objective of a design; infinite if it violates a limit.
     """
 
     what, at_once = "boxes of mounts, with unbalances", 2
 
-    def __init__(self, problem: Problem, value: float, judge: Judge) -> None:
+    def __init__(self, problem: Problem, value: float, exact_objective: ExactObjective) -> None:
         problem = with_default_sampling(problem)
-        self.loads, self.value, self._judge = MountedLoads(problem), value, judge
+        self.loads, self.value, self._exact_objective = MountedLoads(problem), value, exact_objective
         self.lower, self.upper = sides_of(problem.mount_decisions)
         self._rest = RestLimits(problem)
         self._corners: dict[tuple[float, ...], Corner] = {}
@@ -128,7 +135,7 @@ class DesignBoxes:
         return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes, and the sides to halve.
+        """Return lower bounds of boxes, shape (boxes,), and the index of the side of each to halve.
 
         Parameters
         ----------
@@ -140,7 +147,7 @@ class DesignBoxes:
         return np.array([bound for bound, _ in pairs]), np.array([side for _, side in pairs], dtype=np.intp)
 
     def corner(self, mounts: Array) -> Corner:
-        """Return unbalances and multipliers on mounts, shape (n,), computed once."""
+        """Return unbalances and multipliers at mounts of shape (n,); each vertex is computed once."""
         key = tuple(mounts.tolist())
         if key not in self._corners:
             self._corners[key] = self._new_corner(mounts)
@@ -152,59 +159,65 @@ class DesignBoxes:
             return Corner(problem.start, None)
         columns, multipliers = best_at(problem)
         value = problem.objective(columns)
-        # a price by rounding would add the remainder of its limit
+        # a price that is only rounding would add the remainder of its limit
         limits = tuple(
             z if norm.dual_norm(z) * maximum > NO_PRICE * value else np.zeros_like(z)
             for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True)
         )
         pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, limits))
         if value < self.value and problem.violation(columns) <= FEASIBLE:
-            evaluate_design = self._judge(mounts, columns)
-            if evaluate_design < self.value:
-                self.value, self.best = evaluate_design, (mounts, columns)
+            exact_value = self._exact_objective(mounts, columns)
+            if exact_value < self.value:
+                self.value, self.best = exact_value, (mounts, columns)
         return Corner(columns, pairing)
 
     def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
-        over = self._rest.over(lower, upper)
-        if any(each.min() > 0.0 for each in over):
+        violations = self._rest.over(lower, upper)
+        if any(corner.min() > 0.0 for corner in violations):
             return math.inf, 0
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
-        even = _BalancedLoop.from_loop(loop, len(lower))
-        if not (even.maximum[self._counted] < WORTH).all():
+        balanced_loop = _BalancedLoop.from_loop(loop, len(lower))
+        if not (balanced_loop.maximum[self._counted] < WORTH).all():
             # halve until the series of all orders converge
-            return 0.0, int(np.argmax(even.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower)))
-        places = [np.where(end < 0.0, lower, upper) for end in corners_of(len(lower))]
-        known = [self._corners.get(tuple(place.tolist())) for place in places]
-        rough, is_over = None, len(self._corners) >= self.max_corners
-        if is_over and not any(known):
+            return 0.0, int(
+                np.argmax(balanced_loop.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower))
+            )
+        places = [np.where(vertex < 0.0, lower, upper) for vertex in corners_of(len(lower))]
+        known_corners = [self._corners.get(tuple(place.tolist())) for place in places]
+        rough_result, is_budget_spent = None, len(self._corners) >= self.max_corners
+        if is_budget_spent and not any(known_corners):
             return 0.0, int(np.argmax((upper - lower) / (self.upper - self.lower)))
-        if any(known) and not all(known):
+        if any(known_corners) and not all(known_corners):
             # multipliers of adjacent vertices suffice if all designs of the box are worse by far
-            rough = self._mixed(even, over, [each or _adjacent(places, known, k) for k, each in enumerate(known)])
-            if rough[0] >= self.value or is_over:
-                return rough
-        bound, side = self._mixed(even, over, [self.corner(place) for place in places])
-        return (bound, side) if rough is None or bound >= rough[0] else (rough[0], side)
+            rough_result = self._mixed(
+                balanced_loop,
+                violations,
+                [corner or _adjacent(places, known_corners, k) for k, corner in enumerate(known_corners)],
+            )
+            if rough_result[0] >= self.value or is_budget_spent:
+                return rough_result
+        bound, side = self._mixed(balanced_loop, violations, [self.corner(place) for place in places])
+        return (bound, side) if rough_result is None or bound >= rough_result[0] else (rough_result[0], side)
 
-    def _mixed(self, loop: _BalancedLoop, over: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
-        """Return the bound by multipliers of all vertices, and the side to halve."""
+    def _mixed(self, loop: _BalancedLoop, violations: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
+        """Return the bound by multipliers of all vertices, and the index of the side to halve."""
         near = np.mean([corner.columns for corner in corners], axis=0)
-        loaded = self._loaded(loop, near)
-        ends = np.array([d.ends for d in self.loads.domains for _ in range(d.width)]).reshape(-1, 2)
+        loaded_loop = self._loaded(loop, near)
+        ends = np.array([domain.ends for domain in self.loads.domains for _ in range(domain.width)]).reshape(-1, 2)
         reach = np.append(1.0, np.abs(ends - near[:, None]).max(axis=1))
-        quadratics, rests = zip(*(self._expanded(corner.pairing, loaded, near) for corner in corners), strict=True)
+        quadratics, rests = zip(*(self._expanded(corner.pairing, loaded_loop, near) for corner in corners), strict=True)
         rest = np.array(rests) @ reach
         if not (np.isfinite(rest).all() and np.isfinite(quadratics).all()):
             return 0.0, int(np.argmax(loop.scores(np.ones_like(self._counted))))
         mixes = np.einsum("vkp,kcp->vc", mixed(loop.count), np.array(quadratics), optimize=True)
         minimum = np.array([line[0] + self.minimum(line[1:], near) for line in mixes])
-        # weights of vertices have sum one, so the remainder is at most that of the worst vertex
-        minimum = priced(minimum, over) - rest.sum(axis=1).max()
+        # weights of vertices add up to one, so the remainder is at most that of the worst vertex
+        minimum = priced(minimum, violations) - rest.sum(axis=1).max()
         scores = _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ rest[rest.sum(axis=1).argmax()]
         return max(float(minimum.min()), 0.0), int(np.argmax(scores))
 
     def expanded(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-        """Return the unbalances at the lower vertex of a box, and a bound about these as in `_expanded`."""
+        """Return the unbalances at the lower vertex of a box, and the bound about these as `_expanded` does."""
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
         near = self.corner(lower).columns
         return near, *self._expanded(pairing, self._loaded(_BalancedLoop.from_loop(loop, len(lower)), near), near)
@@ -214,16 +227,19 @@ class DesignBoxes:
         fixed = loads[:, :1] + np.einsum("q,wqi->wi", near, loads[:, 1:])[:, None]
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
-    def _expanded(self, pairing: Pairing | None, loaded: _LoadedLoop, near: Array) -> tuple[Array, Array]:
+    def _expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, near: Array) -> tuple[Array, Array]:
         # bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)
-        powers, rest = np.zeros((1 + len(near), 1 + loaded.count + loaded.count**2)), np.zeros(loaded.loads.shape[:2])
+        powers, rest = (
+            np.zeros((1 + len(near), 1 + loaded_loop.count + loaded_loop.count**2)),
+            np.zeros(loaded_loop.loads.shape[:2]),
+        )
         if pairing is None:
             return powers, rest
         powers[0, 0], powers[1:, 0] = pairing.constant + pairing.slopes @ near, pairing.slopes
-        for duals, maps in ((pairing.forces, loaded.loop.forces), (pairing.travels, loaded.loop.travels)):
+        for duals, maps in ((pairing.forces, loaded_loop.loop.forces), (pairing.travels, loaded_loop.loop.travels)):
             if duals.any():
-                more, further = loaded.paired(duals.conj(), maps)
-                powers, rest = powers + more, rest + further
+                added_powers, added_rest = loaded_loop.paired(duals.conj(), maps)
+                powers, rest = powers + added_powers, rest + added_rest
         return powers, rest
 
     def minimum(self, slopes: Array, near: Array) -> float:
@@ -233,12 +249,12 @@ class DesignBoxes:
 
 @dataclass(frozen=True, eq=False)
 class _BalancedLoop:
-    """A loop with scaled channels (E37).
+    """Feedback loop with scaled channels (E37).
 
     Attributes
     ----------
     count
-        Number of open numbers n.
+        Number n of open numbers.
     balance
         Diagonal of the scaling T, shape (w, m).
     gain
@@ -260,7 +276,7 @@ class _BalancedLoop:
 
     @property
     def incidence(self) -> Array:
-        """Return the incidence of channels on numbers, 1 or 0, shape (m, n)."""
+        """Incidence of channels on numbers, 1 or 0, shape (m, n)."""
         return np.asarray((self.loop.numbers[:, None] == np.arange(self.count)).astype(float))
 
     @property
@@ -281,19 +297,19 @@ class _BalancedLoop:
 
 
 class _LoadedLoop:
-    """A loop under loads: z0 of every column, and the remainder of its series (E68)."""
+    """Feedback loop under loads: z0 of each column, and the remainder of its series (E68)."""
 
-    def __init__(self, even: _BalancedLoop, loads: ComplexArray) -> None:
-        self.loop, self.loads, self.count = even.loop, loads, even.count
-        self._incidence, self._balance = even.incidence, even.balance
+    def __init__(self, balanced_loop: _BalancedLoop, loads: ComplexArray) -> None:
+        self.loop, self.loads, self.count = balanced_loop.loop, loads, balanced_loop.count
+        self._incidence, self._balance = balanced_loop.incidence, balanced_loop.balance
         self._inputs = np.einsum("wmi,wci->wcm", self.loop.inputs, loads, optimize=True)
         size = np.abs(self._inputs) * self._balance[:, None]
         # a column without loads has no motion
-        rest = rest_of(even.gain[:, None], even.maximum[:, None], size)
+        rest = rest_of(balanced_loop.gain[:, None], balanced_loop.maximum[:, None], size)
         self._rest = np.where(size.any(axis=-1), rest, 0.0)
 
     def paired(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
-        """Return sums over orders of Z* f by (1, s, s s') and columns, and remainders of orders and columns."""
+        """Return sums over orders of Z* f by columns and (1, s, s s'), and remainders, shape (w, 1 + columns)."""
         rigid = np.einsum("wr,wri->wi", duals, maps[0], optimize=True)
         weights = np.einsum("wr,wrm->wm", duals, maps[1], optimize=True)
         constant = np.einsum("wi,wci->c", rigid, self.loads, optimize=True).real
@@ -305,72 +321,72 @@ class _LoadedLoop:
         return np.column_stack([constant, first, second.reshape(len(constant), -1)]), np.asarray(rest)
 
 
-def _adjacent(places: Sequence[Array], known: Sequence[Corner | None], k: int) -> Corner:
+def _adjacent(places: Sequence[Array], corners: Sequence[Corner | None], k: int) -> Corner:
     # known vertex with the most coordinates of vertex k
-    pairs = [(corner, place) for corner, place in zip(known, places, strict=True) if corner is not None]
+    pairs = [(corner, place) for corner, place in zip(corners, places, strict=True) if corner is not None]
     return max(pairs, key=lambda pair: int(np.sum(pair[1] == places[k])))[0]
 
 
 def _concavity(values: Array) -> Array:
     # largest distance of coefficients below the chord along every side, shape (n,)
-    shares, out = np.arange(4) / 3.0, []
+    shares, distances = np.arange(4) / 3.0, []
     for side in range(values.ndim):
-        along = np.moveaxis(values, side, -1)
-        straight = along[..., :1] * (1.0 - shares) + along[..., -1:] * shares
-        out.append(float((straight - along).max()))
-    return np.array(out)
+        values_of_side = np.moveaxis(values, side, -1)
+        chord = values_of_side[..., :1] * (1.0 - shares) + values_of_side[..., -1:] * shares
+        distances.append(float((chord - values_of_side).max()))
+    return np.array(distances)
 
 
 class _VertexBranching(BoundedBoxes):
     """Branch and bound with designs at vertices as incumbents."""
 
-    def __init__(self, search: DesignBoxes, room: float, known: Known | None = None) -> None:
-        super().__init__(search, search.value, room, known)
+    def __init__(self, search: DesignBoxes, gap_tolerance: float, known: Known | None = None) -> None:
+        super().__init__(search, search.value, gap_tolerance, known)
         self._boxes = search
 
     def look(self, _: Box) -> None:
-        """Lower the value to that of the best vertex."""
+        """Lower the objective of the incumbent to that of the best vertex."""
         self.value = min(self.value, self._boxes.value)
 
 
-def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> BoxResult:
-    """Bound a problem that `mixes_corners`, until no design is more than `room` better than the incumbent."""
-    division = _VertexBranching(boxes, room, known)
+def designed_bound(boxes: DesignBoxes, gap_tolerance: float, known: Known | None = None) -> BoxResult:
+    """Return the bound of a problem that `mixes_corners`, by boxes until the gap tolerance or the budget is reached."""
+    branching = _VertexBranching(boxes, gap_tolerance, known)
     maximum = boxes.max_boxes
     if not maximum:
         return BoxResult(0.0, 0)
-    divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], maximum)
+    result = branching.run(branching.bounded([(boxes.lower, boxes.upper)])[0], maximum)
     if known is not None:
         check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)
-    return divided
+    return result
 
 
-def priced(values: Array, over: list[Array]) -> Array:
-    """Add limits with prices that maximise the least value, shape (v,); infinite if a limit is violated."""
-    if any(float(each.min()) > 0.0 for each in over):
+def priced(values: Array, violations: list[Array]) -> Array:
+    """Return values plus limits at prices that maximise the minimum, shape (v,); infinite if a limit is violated."""
+    if any(float(violation.min()) > 0.0 for violation in violations):
         return np.full_like(values, math.inf)
-    for _ in range(ROUNDS if len(over) > 1 else 1):
-        for each in over:
-            values = values + _price(values, each) * each
+    for _ in range(ROUNDS if len(violations) > 1 else 1):
+        for violation in violations:
+            values = values + _price(values, violation) * violation
     return values
 
 
-def _price(values: Array, over: Array) -> float:
-    """Return the price with the largest minimum of values + price over, by golden section (P4)."""
+def _price(values: Array, violation: Array) -> float:
+    """Return the price with the largest minimum of values + price * violation, by golden section (P4)."""
 
     def minimum(price: float) -> float:
-        return float((values + price * over).min())
+        return float((values + price * violation).min())
 
     worst = int(np.argmin(values))
-    if over[worst] <= 0.0:
+    if violation[worst] <= 0.0:
         return 0.0
-    high = float(values.max() - values[worst]) / float(over[worst])
+    high = float(values.max() - values[worst]) / float(violation[worst])
     low, best = 0.0, 0.0
     for _ in range(STEPS):
-        one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        if minimum(one) >= minimum(two):
-            high = two
+        lower_trial, upper_trial = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        if minimum(lower_trial) >= minimum(upper_trial):
+            high = upper_trial
         else:
-            low = one
-        best = max(best, one, two, key=minimum)
+            low = lower_trial
+        best = max(best, lower_trial, upper_trial, key=minimum)
     return best

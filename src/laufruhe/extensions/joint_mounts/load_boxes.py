@@ -5,8 +5,8 @@ unbalances, u = u_c + h t with t from -1 to 1:
 
     f(s, t) = f(s; r_c) + sum_q t_q h_q f(s; r_q)
 
-With the products s_j t_q as further numbers, f is affine up to a remainder. A norm of it lies above its tangent at any
-values of these numbers. The tangent at the minimum of the norm in the box has its minimum there too.
+With the products s_j t_q as further numbers, f is affine up to a remainder. A norm of f lies above its tangent at any
+point. The tangent at the minimum of the norm in the box has its minimum over the box there too.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ WORK, MOST_BOXES = 8e6, 10_000
 """Work of all boxes together, and largest number of boxes."""
 ROUND_WORK = 4e4
 """Work of the boxes of one round."""
-LEFT_OUT = 0.05
-"""Share of the gap tolerance for ignored small orders."""
+OMITTED_SHARE = 0.05
+"""Share of the gap tolerance that omitted small orders may add up to."""
 SWEEPS = 12
 """Sweeps of the coordinate descent for least squares."""
 EVEN = 1e-9
@@ -58,25 +58,27 @@ FORCE = Measure(channels.MOUNT_FORCE, NORMS["rms"])
 
 
 def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
-    """Return whether boxes cover all open numbers: a few unbalances, throws and numbers of mounts."""
+    """Return True if boxes cover all open numbers: a few unbalances, throws and numbers of mounts."""
     if problem.engine.block is None or problem.known_rows or not problem.decisions:
         return False
-    affine = all(decision.is_affine for decision in problem.decisions)
-    known = is_looped(problem) if problem.mount_decisions else affine
+    is_all_affine = all(decision.is_affine for decision in problem.decisions)
+    is_covered = is_looped(problem) if problem.mount_decisions else is_all_affine
     count = len(problem.mount_decisions) + sum(d.set.width for d in problem.unbalances)
     count, turns = count + (len(throws.open) if throws else 0), throws is not None
-    return known and count <= MOST_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
+    return (
+        is_covered and count <= MOST_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
+    )
 
 
 def load_bounds(
-    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None,
+    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], known: Known | None = None,
     throws: OpenThrows | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes, until no design is more than `room` better than `value`.
+    """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance`.
 
     Parameters
     ----------
-    value, room
+    value, gap_tolerance
         Objective of the incumbent, and absolute gap tolerance [SI].
     shares
         Shares of the box budget, one bound after each.
@@ -87,15 +89,15 @@ def load_bounds(
     """
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return
-    boxes = LoadBoxes(problem, LEFT_OUT * room, throws)
+    boxes = LoadBoxes(problem, OMITTED_SHARE * gap_tolerance, throws)
     maximum = boxes.max_boxes
     if maximum and boxes.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
-        yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, room, counts, known)
+        yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, known)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
-    # rows are constant or affine in all open numbers
+    # True if rows are constant or affine in all open numbers
     kinds = {decision.kind for decision in problem.decisions}
     dependences = {dependence(measure.channel, kind, problem) for kind in kinds}
     return not measure.channel.is_number and dependences <= {Dependence.NONE, Dependence.AFFINE}
@@ -118,7 +120,7 @@ class LoadBoxes:
     Parameters
     ----------
     left_out
-        Share of the objective for ignored small orders [SI].
+        Part of the objective that omitted small orders may add up to [SI].
     throws
         Open throws.
     """
@@ -143,14 +145,14 @@ class LoadBoxes:
         return _Boxes(self.loads, self._orders, self._numbers, lower, upper, self._ratios)
 
     def _drop_small_orders(self, budget: float) -> dict[Measure, float]:
-        """Drop orders that add less than a budget together, and return their effect on measures (E41)."""
+        """Omit orders that add up to less than a budget, and return their largest effect on each measure (E41)."""
         budgets = {measure: budget / weight for weight, measure in self._terms if measure.on_mounts}
         budgets |= {measure: SLACK * maximum for maximum, measure in self._limits if measure.on_mounts}
         if not budgets or self._ratios:
             return {}
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             box = self._box(self.lower[None], self.upper[None])
-            size = np.array([np.nan_to_num(box.answer(measure).maximum[0], nan=np.inf) for measure in budgets])
+            size = np.array([np.nan_to_num(box.response(measure).maximum[0], nan=np.inf) for measure in budgets])
             share = np.max(size / np.array([*budgets.values()])[:, None], axis=0)
         order = np.argsort(share, kind="stable")
         small = order[np.cumsum(share[order]) <= 1.0]
@@ -160,7 +162,7 @@ class LoadBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Return True if sums of squares over orders equal those over samples, as remainders suppose."""
+        """True if sums of squares over orders equal those over samples, as remainders assume."""
         return self._orders.is_full
 
     @property
@@ -177,7 +179,7 @@ class LoadBoxes:
 
     @property
     def at_once(self) -> int:
-        """Number of boxes in one round."""
+        """Count of boxes in one round."""
         return int(np.clip(ROUND_WORK / self._cost, 2, 32))
 
     @property
@@ -186,7 +188,7 @@ class LoadBoxes:
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes, infinite without a feasible design, and the sides to halve.
+        """Return lower bounds of boxes, infinite without a feasible design, and the index of the side of each to halve.
 
         Parameters
         ----------
@@ -216,51 +218,56 @@ class LoadBoxes:
 
     def _violated(self, lower: Array, upper: Array) -> Mask:
         # boxes outside of the sets of unbalances, or whose mounts violate a static limit, shape (boxes,)
-        out = np.zeros(len(lower), dtype=bool)
+        violated = np.zeros(len(lower), dtype=bool)
         for domain in self.loads.domains:
             if domain.width == 2:
                 columns = slice(self._numbers + domain.start, self._numbers + domain.start + 2)
                 nearest = np.clip(0.0, lower[:, columns], upper[:, columns])
-                out |= np.linalg.norm(nearest, axis=1) > domain.scale * (1.0 + SLACK)
+                violated |= np.linalg.norm(nearest, axis=1) > domain.scale * (1.0 + SLACK)
         if self._rest is not None:
             for k, (low, high) in enumerate(zip(lower[:, : self._numbers], upper[:, : self._numbers], strict=True)):
-                out[k] |= any(float(each.min()) > 0.0 for each in self._rest.over(low, high))
-        return out
+                violated[k] |= any(float(violation.min()) > 0.0 for violation in self._rest.over(low, high))
+        return violated
 
     def _nearest(self, box: _Boxes) -> Array:
-        """Return the minimum of the sum of squares of the objective in each box, shape (boxes, numbers)."""
-        gram, pull = np.zeros((len(box.lower), box.count, box.count)), np.zeros((len(box.lower), box.count))
+        """Return the minimum of the objective's sum of squares in each box, shape (boxes, numbers)."""
+        gram, gradient = np.zeros((len(box.lower), box.count, box.count)), np.zeros((len(box.lower), box.count))
         for weight, measure in self._terms:
             if _is_affine(measure, self.problem):
                 continue
-            answer = box.answer(FORCE if is_ratio(measure) else measure)
+            response = box.response(FORCE if is_ratio(measure) else measure)
             share = np.sqrt(weight * line_weights(self.problem, measure, self._orders))
             share = share * measure.counted(self._orders.orders)
-            known = np.isfinite(answer.rest)[..., None] * share[:, None]
-            value = np.where(known > 0.0, answer.value * known, 0.0).reshape(len(gram), -1)
-            slopes = np.where(known[:, :, None] > 0.0, answer.slopes * known[:, :, None], 0.0)
+            is_known = np.isfinite(response.rest)[..., None] * share[:, None]
+            value = np.where(is_known > 0.0, response.value * is_known, 0.0).reshape(len(gram), -1)
+            slopes = np.where(is_known[:, :, None] > 0.0, response.slopes * is_known[:, :, None], 0.0)
             slopes = np.moveaxis(slopes, 2, -1).reshape(len(gram), -1, box.count)
             gram = gram + np.matmul(slopes.conj().swapaxes(1, 2), slopes).real
-            pull = pull + np.matmul(slopes.conj().swapaxes(1, 2), value[..., None])[..., 0].real
-        return _least_squares(gram, pull)
+            gradient = gradient + np.matmul(slopes.conj().swapaxes(1, 2), value[..., None])[..., 0].real
+        return _least_squares(gram, gradient)
 
     def _under(self, box: _Boxes, measure: Measure, near: Array, averaged: bool) -> LinearBound:
-        """Return the tangent of a measure at numbers, shape (boxes, numbers), as a lower bound."""
+        """Return the tangent of a measure at a point of each box, shape (boxes, numbers), as a lower bound."""
         if _is_affine(measure, self.problem):
             return box.affine_under(measure, near, averaged and measure.norm.averages)
         if is_ratio(measure):
-            over, firm = (box.answer(FORCE, still) for still in (False, True))
+            running, resting = (box.response(FORCE, still) for still in (False, True))
             groups = groups_of(measure, self.problem.points, self._orders)
-            ratio, scores = ratio_under(over, firm, groups)
+            ratio, scores = ratio_under(running, resting, groups)
             return LinearBound(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
-        answer = _counted(box.answer(measure), measure.counted(self._orders.orders))
+        response = _counted(box.response(measure), measure.counted(self._orders.orders))
         if averaged and measure.norm.averages:
             # averages are lower bounds of means by few samples (P7)
             factors = np.sinc(self._orders.places / self.loads.samples) ** 2
-            one, two = factors[:, None], factors[:, None, None]
-            answer = LinearResponse(answer.value * one, answer.slopes * two, answer.rest * factors, answer.bends * one)
-        value = answer.value + np.einsum("bwkr,bk->bwr", answer.slopes, near)
-        bound = norm_under(self.problem, measure, replace(answer, value=value), self._orders)
+            row_factors, slope_factors = factors[:, None], factors[:, None, None]
+            response = LinearResponse(
+                response.value * row_factors,
+                response.slopes * slope_factors,
+                response.rest * factors,
+                response.bends * row_factors,
+            )
+        value = response.value + np.einsum("bwkr,bk->bwr", response.slopes, near)
+        bound = norm_under(self.problem, measure, replace(response, value=value), self._orders)
         return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, near))
 
 
@@ -269,8 +276,10 @@ class _Boxes:
 
     Attributes
     ----------
+    columns
+        Count of columns of unbalances and open throws.
     count
-        Number of numbers of the linear functions; products of mounts and unbalances come last.
+        Count of numbers of the linear functions; products of mounts and columns come last.
     """
 
     def __init__(
@@ -286,21 +295,23 @@ class _Boxes:
         columns, throws = np.split(orders.loads[:, 1:], [unbalances], axis=1)
         fixed = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", centres[0], columns)[:, :, None]
         moved = centres[1][:, None, :, None] * columns
-        at, reach = halves[0], halves[1]
-        turned = throws * np.exp(1j * orders.orders[:, None] * at[:, None])[..., None]
-        middle, slope, rest = (each[..., None] for each in along_arcs(orders.orders[:, None] * reach[:, None]))
+        middles, half_angles = halves[0], halves[1]
+        turned = throws * np.exp(1j * orders.orders[:, None] * middles[:, None])[..., None]
+        middle, slope, rest = (part[..., None] for part in along_arcs(orders.orders[:, None] * half_angles[:, None]))
         fixed = fixed + (middle * turned).sum(axis=2, keepdims=True)
         self._columns: ComplexArray = np.concatenate([fixed, moved, 1j * slope * turned, rest * turned], axis=2)
         sides = list(zip(lower[:, :numbers], upper[:, :numbers], strict=True))
         self._running = self._expanded([mount_loop(loads.problem, orders.omegas, *box) for box in sides])
-        still = np.zeros_like(orders.omegas)
-        self._static = self._expanded([mount_loop(loads.problem, still, *box) for box in sides]) if ratios else None
+        zero_speeds = np.zeros_like(orders.omegas)
+        self._static = (
+            self._expanded([mount_loop(loads.problem, zero_speeds, *box) for box in sides]) if ratios else None
+        )
         self._cache: dict[tuple[bool, tuple[int, ...], tuple[float, ...], bool], LinearResponse] = {}
 
     def _expanded(self, loops: list[Loop]) -> tuple[list[Loop], list[Expansion]]:
-        """Return one expansion for the fixed loads, and one for each column."""
+        """Return the loops, and one expansion for the fixed loads and for each column."""
         gain, inputs = np.array([loop.gain for loop in loops]), np.array([loop.inputs for loop in loops])
-        balance, even, maximum = balanced(gain)
+        balance, balanced_gain, maximum = balanced(gain)
         numbers = loops[0].numbers
         sides = Sides(np.zeros((6, len(numbers))), numbers, self._numbers)
         still = np.zeros((*gain.shape[:2], 6, len(numbers)), dtype=complex)
@@ -309,81 +320,88 @@ class _Boxes:
             channels_in = np.einsum("bwmi,bwi->bwm", inputs, column)
             size = np.abs(channels_in) * balance
             # a column without loads has no motion
-            rest = np.where(size.any(axis=-1), rest_of(even, maximum, size), 0.0)
+            rest = np.where(size.any(axis=-1), rest_of(balanced_gain, maximum, size), 0.0)
             ones = np.ones((len(gain), self._numbers))
             expansions.append(Expansion(ones, ones, sides, column, still, gain, channels_in, balance, rest))
         return loops, expansions
 
-    def answer(self, measure: Measure, still: bool = False) -> LinearResponse:
-        """Return forces or travel that a measure counts, times its factors; static forces if `still`."""
+    def response(self, measure: Measure, still: bool = False) -> LinearResponse:
+        """Return forces or travel of a measure times its direction weights; static forces if `still`."""
         rows, factors = counted_rows(self._loads.problem, measure)
         key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), still)
         if key not in self._cache:
             loops, expansions = self._static if still and self._static is not None else self._running
             parts = ((loop.travels if key[0] else loop.forces) for loop in loops)
-            value, turned = (np.array(each)[:, :, rows] * factors[:, None] for each in zip(*parts, strict=True))
-            self._cache[key] = self._together([_shared(at, mapped(at, value, turned)) for at in expansions])
+            value, slope_maps = (
+                np.array(matrices)[:, :, rows] * factors[:, None] for matrices in zip(*parts, strict=True)
+            )
+            self._cache[key] = self._together(
+                [_shared(expansion, mapped(expansion, value, slope_maps)) for expansion in expansions]
+            )
         return self._cache[key]
 
-    def _together(self, answers: list[LinearResponse]) -> LinearResponse:
-        """Join the responses to fixed loads, columns, and remainders of throws to one linear function."""
-        fixed, moved, beyond = answers[0], answers[1 : 1 + self.columns], answers[1 + self.columns :]
-        value, (boxes, lines, rows) = fixed.value, fixed.value.shape
-        by_column = np.array([each.value for each in moved]).reshape(self.columns, boxes, lines, rows)
-        crossed = [each.slopes for each in moved]
-        slopes = np.concatenate([fixed.slopes, np.moveaxis(by_column, 0, 2), *crossed], axis=2)
-        rests = np.array([each.rest for each in moved]).reshape(self.columns, boxes, lines)
-        for k, each in enumerate(beyond):
-            rests[self._unbalances + k] += each.maximum
-        bends = fixed.bends + sum((each.bends for each in moved), np.zeros_like(fixed.bends))
-        # smaller sides of unbalances do not make a series converge
+    def _together(self, responses: list[LinearResponse]) -> LinearResponse:
+        """Return the sum of responses to fixed loads, columns, and remainders of throws, as one linear function."""
+        fixed, moved, throw_remainders = responses[0], responses[1 : 1 + self.columns], responses[1 + self.columns :]
+        value, (boxes, orders, rows) = fixed.value, fixed.value.shape
+        by_column = np.array([response.value for response in moved]).reshape(self.columns, boxes, orders, rows)
+        products = [response.slopes for response in moved]
+        slopes = np.concatenate([fixed.slopes, np.moveaxis(by_column, 0, 2), *products], axis=2)
+        rests = np.array([response.rest for response in moved]).reshape(self.columns, boxes, orders)
+        for k, response in enumerate(throw_remainders):
+            rests[self._unbalances + k] += response.maximum
+        bends = fixed.bends + sum((response.bends for response in moved), np.zeros_like(fixed.bends))
+        # halving unbalances cannot make a diverging series converge
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)
         return LinearResponse(value, slopes, fixed.rest + rests.sum(axis=0), bends)
 
     def scores(self, bound: LinearBound) -> Array:
         """Return branching scores, shape (boxes, open numbers)."""
-        crossed = np.abs(bound.slopes[:, self._numbers + self.columns :]).reshape(
+        products = np.abs(bound.slopes[:, self._numbers + self.columns :]).reshape(
             len(self.lower), self.columns, self._numbers
         )
-        shared = np.concatenate([crossed.sum(axis=1), crossed.sum(axis=2)], axis=1)
+        shared = np.concatenate([products.sum(axis=1), products.sum(axis=2)], axis=1)
         return np.asarray(np.nan_to_num(bound.bends, posinf=1e300) + 0.5 * shared)
 
     def affine_under(self, measure: Measure, near: Array, averaged: bool) -> LinearBound:
-        """Return the tangent of a norm that does not depend on mounts."""
+        """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
         norm, columns = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self._unbalances)
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]
         value, slopes = np.zeros(len(near)), np.zeros((len(near), self.count))
         for k, t in enumerate(near[:, columns]):
             z = norm.dual_feasible(norm.subgradient(centres[k] + halves[k] * t))
-            by = norm.pulled(z)
-            value[k] = float(np.vdot(z, norm.constant)) + by @ centres[k]
-            slopes[k, columns] = by * halves[k]
+            gradient = norm.pulled(z)
+            value[k] = float(np.vdot(z, norm.constant)) + gradient @ centres[k]
+            slopes[k, columns] = gradient * halves[k]
         return LinearBound(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))
 
 
-def _shared(at: Expansion, answer: LinearResponse) -> LinearResponse:
-    # branching scores take in the whole remainder, by the gain of each side
-    beyond = np.where(np.isfinite(answer.rest), answer.rest - answer.bends.sum(axis=-1), 0.0)
-    pull = at.pull / np.maximum(at.pull.sum(axis=-1, keepdims=True), 1e-300)
-    return replace(answer, bends=answer.bends + np.maximum(beyond, 0.0)[..., None] * pull)
+def _shared(expansion: Expansion, response: LinearResponse) -> LinearResponse:
+    # add the rest of the remainder to the branching scores, in proportion to the gain of each side
+    excess = np.where(np.isfinite(response.rest), response.rest - response.bends.sum(axis=-1), 0.0)
+    pull = expansion.pull / np.maximum(expansion.pull.sum(axis=-1, keepdims=True), 1e-300)
+    return replace(response, bends=response.bends + np.maximum(excess, 0.0)[..., None] * pull)
 
 
-def _counted(answer: LinearResponse, which: Mask) -> LinearResponse:
-    # zero for all other orders
-    if which.all():
-        return answer
+def _counted(response: LinearResponse, is_counted: Mask) -> LinearResponse:
+    # set all other orders to zero
+    if is_counted.all():
+        return response
     value, slopes = (
-        np.where(which.reshape(-1, *(1,) * n), each, 0.0) for n, each in ((1, answer.value), (2, answer.slopes))
+        np.where(is_counted.reshape(-1, *(1,) * n), coefficients, 0.0)
+        for n, coefficients in ((1, response.value), (2, response.slopes))
     )
-    return LinearResponse(value, slopes, np.where(which, answer.rest, 0.0), np.where(which[:, None], answer.bends, 0.0))
+    return LinearResponse(
+        value, slopes, np.where(is_counted, response.rest, 0.0), np.where(is_counted[:, None], response.bends, 0.0)
+    )
 
 
-def _least_squares(gram: Array, pull: Array) -> Array:
-    # minimises x' gram x / 2 + pull . x over numbers from -1 to 1 by coordinate descent
-    x, curvature = np.zeros_like(pull), np.einsum("bkk->bk", gram)
+def _least_squares(gram: Array, gradient: Array) -> Array:
+    # minimise x' gram x / 2 + gradient . x over numbers from -1 to 1 by coordinate descent
+    x, curvature = np.zeros_like(gradient), np.einsum("bkk->bk", gram)
     for _ in range(SWEEPS):
-        for k in range(pull.shape[1]):
-            slope = pull[:, k] + np.einsum("bk,bk->b", gram[:, k], x)
+        for k in range(gradient.shape[1]):
+            slope = gradient[:, k] + np.einsum("bk,bk->b", gram[:, k], x)
             step = np.where(curvature[:, k] > 0.0, slope / np.where(curvature[:, k] > 0.0, curvature[:, k], 1.0), 0.0)
             x[:, k] = np.clip(x[:, k] - np.nan_to_num(step), -1.0, 1.0)
     return x

@@ -1,7 +1,7 @@
-"""A block on mounts as a feedback loop through its open numbers: exact, and linear except for the numbers (E68).
+"""Block on mounts as a feedback loop through its open numbers: exact, and linear except for these numbers (E68).
 
-About the middle of a box the open numbers are s from -1 to 1. Every product with an open number is a channel z with
-the feedback w = s z:
+The open numbers are s from -1 to 1 about the middle of a box. Each product with an open number is a channel z with the
+feedback w = s z:
 
     D y + M w = r,    z = C y + F w,    f = V y + E w,    w_i = s_j(i) z_i
 
@@ -38,14 +38,14 @@ _PLANES, _QUARTER = ([1, 2], [2, 0], [0, 1]), np.array([[0.0, -1.0], [1.0, 0.0]]
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """A feedback loop about the middle of a box at w frequencies.
+    """Feedback loop about the middle of a box at w frequencies.
 
     Attributes
     ----------
     numbers
-        Index of the open number of every channel, shape (m,).
+        Index of the open number of each channel, shape (m,).
     forces, travels
-        V D^-1 and P of every mount, shapes (w, 3 mounts, 6) and (w, 3 mounts, m) each.
+        V D^-1, shape (w, 3 mounts, 6), and P, shape (w, 3 mounts, m).
     inputs, gain
         Map from r to z0, shape (w, m, 6), and G, shape (w, m, m).
     """
@@ -58,32 +58,32 @@ class Loop:
 
 
 class _Signals:
-    """A growing list of channels; a signal has coefficients of motion and feedback, (w, rows, 6 + channels)."""
+    """Growing list of channels; a signal has coefficients of motion and feedback, shape (w, rows, 6 + channels)."""
 
     def __init__(self, frequencies: int, maximum: int) -> None:
         self.size, self.owners = (frequencies, 6 + maximum), list[int]()
         self._inputs: list[ComplexArray] = []
 
     def motion(self, rows: Array) -> ComplexArray:
-        """Return a signal of the motion alone, from rows (r, 6)."""
-        out = np.zeros((self.size[0], len(rows), self.size[1]), dtype=complex)
-        out[:, :, :6] = rows
-        return out
+        """Return a signal that depends on the motion alone, from rows of shape (r, 6)."""
+        signal = np.zeros((self.size[0], len(rows), self.size[1]), dtype=complex)
+        signal[:, :, :6] = rows
+        return signal
 
-    def channel(self, signal: ComplexArray, number: int, again: Array | None = None) -> ComplexArray:
-        """Return the product of a number and a signal, with direct feedback (r, r) of the product if any."""
+    def channel(self, signal: ComplexArray, number: int, self_feedback: Array | None = None) -> ComplexArray:
+        """Return the product of an open number and a signal; `self_feedback`, shape (r, r), adds the product itself."""
         first, count = 6 + len(self.owners), signal.shape[1]
         self.owners += [number] * count
         self._inputs.append(signal.copy())
-        if again is not None:
-            self._inputs[-1][:, :, first : first + count] += again
-        out = np.zeros_like(signal)
-        out[:, np.arange(count), first + np.arange(count)] = 1.0
-        return out
+        if self_feedback is not None:
+            self._inputs[-1][:, :, first : first + count] += self_feedback
+        product = np.zeros_like(signal)
+        product[:, np.arange(count), first + np.arange(count)] = 1.0
+        return product
 
     @property
     def numbers(self) -> Indices:
-        """Index of the open number of every channel, shape (m,)."""
+        """Index of the open number of each channel, shape (m,)."""
         return np.array(self.owners, dtype=np.intp)
 
     @property
@@ -95,12 +95,12 @@ class _Signals:
 
 @dataclass(frozen=True, eq=False)
 class OpenStiffness:
-    """Static stiffness over a box: middle + outputs S (1 - feedback S)^-1 inputs.
+    """Static stiffness over a box: A = middle + outputs S (1 - feedback S)^-1 inputs.
 
     Attributes
     ----------
     numbers
-        Index of the open number of every channel, shape (m,).
+        Index of the open number of each channel, shape (m,).
     middle, outputs, inputs, feedback
         Shapes (6, 6), (6, m), (m, 6) and (m, m).
     """
@@ -112,19 +112,21 @@ class OpenStiffness:
     feedback: Array
 
     def form(self, y: Array, count: int) -> tuple[Array, float]:
-        """Return y' A y by (1, s, s s') of n = `count` numbers, shape (1 + n + n^2,), and a bound of the remainder."""
-        out, back, loop = y @ self.outputs, self.inputs @ y, np.abs(self.feedback)
+        """Return y' A y by (1, s, s s') of n = `count` numbers, shape (1 + n + n^2,), and a bound of its remainder."""
+        out, inputs, loop = y @ self.outputs, self.inputs @ y, np.abs(self.feedback)
         incidence = (self.numbers[:, None] == np.arange(count)).astype(float)
-        second = incidence.T @ (out[:, None] * self.feedback * back) @ incidence
+        second = incidence.T @ (out[:, None] * self.feedback * inputs) @ incidence
         converges = not loop.any() or float(np.abs(np.linalg.eigvals(loop)).max()) < 1.0
         # sum of all powers of the feedback
-        total = np.linalg.solve(np.eye(len(loop)) - loop, np.abs(back)) if converges else np.full_like(back, math.inf)
-        rest = np.abs(out) @ loop @ loop @ total
-        return np.concatenate([[y @ self.middle @ y], (out * back) @ incidence, second.ravel()]), float(rest)
+        power_sum = (
+            np.linalg.solve(np.eye(len(loop)) - loop, np.abs(inputs)) if converges else np.full_like(inputs, math.inf)
+        )
+        remainder = np.abs(out) @ loop @ loop @ power_sum
+        return np.concatenate([[y @ self.middle @ y], (out * inputs) @ incidence, second.ravel()]), float(remainder)
 
 
 def open_stiffness(problem: Problem, lower: Array, upper: Array) -> OpenStiffness:
-    """Return the static stiffness of a problem over a box of open numbers of mounts."""
+    """Return the static stiffness of a problem over a box of open numbers of mounts, shape (n,) each."""
     equations = _BlockOnMounts(problem, np.zeros(1), lower, upper)
     body, inputs = equations.body[0].real, equations.signals.inputs[0].real
     return OpenStiffness(equations.signals.numbers, body[:, :6], body[:, 6:], inputs[:, :6], inputs[:, 6:])
@@ -157,8 +159,10 @@ class _BlockOnMounts:
 
     Attributes
     ----------
-    body, forces, travels
-        Restoring wrench, and forces and travel of the mounts, shapes (w, 6, 6 + m) and (w, 3 mounts, 6 + m).
+    body
+        Restoring wrench, shape (w, 6, 6 + m).
+    forces, travels
+        Forces and travel of the mounts, shape (w, 3 mounts, 6 + m).
     """
 
     def __init__(self, problem: Problem, omegas: Array, lower: Array, upper: Array) -> None:
@@ -166,7 +170,9 @@ class _BlockOnMounts:
         low, high = number_ranges(problem, lower, upper)
         middles, drives = 0.5 * (low + high), _drives(problem, 0.5 * (upper - lower))
         root, centre = mass_root(mounting.block), np.array(mounting.block.centre_of_gravity)
-        self.signals = signals = _Signals(len(omegas), sum(4 * sum(map(len, each.values())) for each in drives))
+        self.signals = signals = _Signals(
+            len(omegas), sum(4 * sum(map(len, spring_drives.values())) for spring_drives in drives)
+        )
         shape = len(omegas), 3 * len(mounting.mounts), signals.size[1]
         forces, travels = np.zeros(shape, dtype=complex), np.zeros(shape, dtype=complex)
         body = np.zeros((len(omegas), 6, signals.size[1]), dtype=complex)
@@ -184,7 +190,7 @@ class _BlockOnMounts:
 
 
 def is_looped(problem: Problem) -> bool:
-    """Return whether a loop represents all open numbers: affine ones, and numbers of mounts."""
+    """Return True if the loop has all open numbers: those affine in loads, and numbers of mounts."""
     mounts = problem.mount_decisions
     if not mounts or any(d not in mounts and not d.is_affine for d in problem.decisions):
         return False
@@ -192,7 +198,7 @@ def is_looped(problem: Problem) -> bool:
     if np.any(low[:, STIFFNESS] < 0.0) or np.any(low[:, LAG] < high[:, LAG]):
         return False
     moves = np.any((low < high)[:, POSITION], axis=1) | np.any((low < high)[:, TURNED], axis=1)
-    # springs with frequency-dependent stiffness do not move
+    # springs with frequency-dependent stiffness must not move
     dynamic = [bool(spring.dynamic) for _, spring in every_spring(mounting_in(problem.engine).mounts)]
     for decision in mounts:
         # the tangent of half an angle has to be one number for all mounts that a decision turns
@@ -212,7 +218,7 @@ def _drives(problem: Problem, halves: Array) -> list[dict[int, list[tuple[int, f
 
 
 class _Spring:
-    """Spring: numbers at the middle of a box, further static stiffness, and drives of open numbers."""
+    """Spring with its numbers at the middle of a box, further static stiffness, and drives of open numbers."""
 
     def __init__(
         self, numbers: Array, static: Array, drives: dict[int, list[tuple[int, float]]], omegas: Array
@@ -225,11 +231,11 @@ class _Spring:
 
     def _across(self) -> list[tuple[int, Array, Array]]:
         # for every open direction of the position: its number, the axes across, and their arms
-        out = []
+        directions = []
         for axis, j, h in self._open(POSITION):
             across = np.delete(np.eye(3), axis, axis=0)
-            out.append((j, across, h * np.cross(across, np.eye(3)[axis])))
-        return out
+            directions.append((j, across, h * np.cross(across, np.eye(3)[axis])))
+        return directions
 
     def _motion(self, centre: Array) -> Array:
         return np.asarray(point_motion(NUMBERS, (self._numbers[POSITION] - centre).tolist()))
@@ -242,7 +248,7 @@ class _Spring:
         return travel
 
     def force(self, signals: _Signals, travel: ComplexArray) -> ComplexArray:
-        """Return the force on the mount, shape (w, 3, 6 + channels)."""
+        """Return the force of the spring, shape (w, 3, 6 + channels)."""
         along = self._turned(signals, travel, -1.0)
         moving, omegas = (self._omegas > 0.0)[:, None, None], self._omegas[:, None, None]
         elastic = self._numbers[STIFFNESS, None] * along
@@ -259,7 +265,7 @@ class _Spring:
         return self._turned(signals, force, 1.0)
 
     def _turned(self, signals: _Signals, vectors: ComplexArray, sign: float) -> ComplexArray:
-        """Turn vectors to the axes of the mount (sign -1) or back, about x, y and z with open angles (E2)."""
+        """Return vectors rotated to the axes of the mount (sign -1) or back, with channels for open angles (E2)."""
         axes = range(3) if sign > 0.0 else range(2, -1, -1)
         for k in axes:
             angles = np.zeros(3)

@@ -1,4 +1,4 @@
-"""Loads of a problem with open unbalances and numbers of mounts, order by order (E69)."""
+"""Loads of a problem with open unbalances and open mounts, order by order (E69)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Pairing:
     forces, travels
         Multipliers Z of forces and travel of all mounts, shape (w, 3 mounts).
     constant, slopes
-        Part that does not depend on mounts, with prices of limits; slopes of shape (columns,).
+        Part without forces and travel, less the prices of limits; slopes of shape (columns,).
     """
 
     forces: ComplexArray
@@ -43,17 +43,21 @@ class Pairing:
 
 
 class MountedLoads:
-    """Loads of a problem with open unbalances and numbers of mounts.
+    """Loads of a problem with open unbalances and open mounts.
 
     Attributes
     ----------
     samples
         Samples of the rows over their period.
+    domains
+        Domains of the open unbalances.
+    root
+        Map to coordinates with unit mass, transposed, shape (6, 6).
 
     Parameters
     ----------
     throws
-        Open throws, whose loads are then not among the fixed ones.
+        Open throws; their loads are then separate from the fixed ones.
     """
 
     def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
@@ -70,14 +74,14 @@ class MountedLoads:
 
     @cached_property
     def orders(self) -> LoadedOrders:
-        """Loaded orders with wrenches of fixed loads, a unit of every column, and every open throw at zero."""
+        """Orders with loads: wrenches of fixed loads, of each unit column, and of each open throw at angle zero."""
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
-        at = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
-        for p, (point, (bare, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
-            base, series = in_one_base([bare, *slopes, *(self._throws.wrenches(p) if self._throws else ())])
+        angles = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
+        for p, (point, (constant, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
+            base, series = in_one_base([constant, *slopes, *(self._throws.wrenches(p) if self._throws else ())])
             loads = series @ moved
-            waves = np.exp(1j * float(base) * np.outer(at, np.arange(loads.shape[1])))
+            waves = np.exp(1j * float(base) * np.outer(angles, np.arange(loads.shape[1])))
             loads[0] -= np.einsum("pk,pki->ki", waves, loads[1 + len(slopes) :])
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
@@ -87,19 +91,19 @@ class MountedLoads:
         return LoadedOrders(points, places, numbers, omegas, wrenches, self.samples)
 
     def still(self, measure: Measure, averaged: bool) -> AffineNorm:
-        """Return a norm that does not depend on mounts."""
+        """Return the norm of a measure that does not depend on mounts."""
         if (measure, averaged) not in self._still:
             self._still[measure, averaged] = self._model.norm(measure, self.samples, averaged)
         return self._still[measure, averaged]
 
     @property
     def columns(self) -> int:
-        """Number of columns of the rows: unbalances and fixed loads, in three directions."""
+        """Count of columns of the rows: fixed loads and unbalances, in three directions."""
         return 3 * (1 + sum(domain.width for domain in self.domains))
 
     @property
     def rows(self) -> int:
-        """Number of rows of all measures on mounts."""
+        """Count of rows of all measures on mounts."""
         problem = self.problem
         measures = [*(t.measure for t in problem.load_terms), *(limit.measure for limit in problem.load_limits)]
         places = [mount.name for mount in problem.engine.mounts]
@@ -110,7 +114,7 @@ class MountedLoads:
         )
 
     def at(self, mounts: Array) -> AffineProblem:
-        """Return norms as functions of the unbalances on mounts, shape (n,); infinite on an undamped resonance."""
+        """Return norms as functions of the unbalances, for mounts of shape (n,); infinite on an undamped resonance."""
         loop, orders = mount_loop(self.problem, self.orders.omegas, mounts, mounts), self.orders
         responses = [
             np.einsum("wri,wci->cwr", maps[0], orders.loads, optimize=True) for maps in (loop.forces, loop.travels)
@@ -130,40 +134,42 @@ class MountedLoads:
         return AffineProblem(terms, limits, self.domains, self.samples)
 
     def _norm(self, measure: Measure, averaged: bool, responses: ComplexArray) -> AffineNorm:
-        none = [np.zeros(0)] * len(self.problem.points)
+        no_kinks = [np.zeros(0)] * len(self.problem.points)
         rows = [
-            load_rows(measure, self.problem.points, signals, self.problem.engine, self.samples, none)
-            for signals in (self._signals(each, averaged) for each in responses)
+            load_rows(measure, self.problem.points, signals, self.problem.engine, self.samples, no_kinks)
+            for signals in (self._signals(response, averaged) for response in responses)
         ]
-        slopes = [each.vectors for each in rows[1:]]
+        slopes = [column_rows.vectors for column_rows in rows[1:]]
         slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*rows[0].vectors.shape, 0))
         return AffineNorm(measure.norm, rows[0].vectors, slope, rows[0].grid)
 
     def _signals(self, response: ComplexArray, averaged: bool) -> list[Spectrum]:
-        # signals of all operating points from orders, shape (w, 3 mounts)
+        # signals of all operating points from responses to orders, shape (w, 3 mounts)
         signals, mounts = [], response.shape[1] // 3
         for p in range(len(self.problem.points)):
-            at = self.orders.points == p
+            is_at_point = self.orders.points == p
             coefficients = np.zeros((1 + int(self.orders.places.max(initial=0)), mounts, 3), dtype=complex)
-            coefficients[self.orders.places[at]] = response[at].reshape(-1, mounts, 3)
+            coefficients[self.orders.places[is_at_point]] = response[is_at_point].reshape(-1, mounts, 3)
             signal = Spectrum(self._model.base, coefficients)
             signals.append(signal.averaged(signal.period / self.samples) if averaged else signal)
         return signals
 
     def pairing(self, problem: AffineProblem, multipliers: Multipliers) -> Pairing:
-        """Return the lower bound on all mounts by multipliers of the unbalances on some mounts.
+        """Return the lower bound for any mounts, by multipliers of the unbalances for some mounts.
 
         Parameters
         ----------
         problem
-            Norms on these mounts, from `at`.
+            Norms for these mounts, from `at`.
+        multipliers
+            Multipliers of its terms and limits.
         """
-        used = minorant(problem, multipliers).multipliers
-        terms = zip(self.problem.load_terms, problem.terms, used.terms, strict=True)
-        limits = zip(self.problem.load_limits, problem.limits, used.limits, strict=True)
+        scaled = minorant(problem, multipliers).multipliers
+        terms = zip(self.problem.load_terms, problem.terms, scaled.terms, strict=True)
+        limits = zip(self.problem.load_limits, problem.limits, scaled.limits, strict=True)
         rows = [(term.weight, term.measure, False, norm, z) for term, (_, norm), z in terms]
         rows += [(1.0, limit.measure, limit.measure.norm.averages, norm, z) for limit, (_, norm), z in limits]
-        prices = [norm.dual_norm(z) * maximum for (maximum, norm), z in zip(problem.limits, used.limits, strict=True)]
+        prices = [norm.dual_norm(z) * maximum for (maximum, norm), z in zip(problem.limits, scaled.limits, strict=True)]
         constant, slopes = -sum(prices), np.zeros(problem.size)
         width = 3 * len(self.problem.engine.mounts)
         sums = [np.zeros((len(self.orders.omegas), width), dtype=complex) for _ in range(2)]
@@ -176,34 +182,38 @@ class MountedLoads:
         return Pairing(sums[0], sums[1], constant, slopes)
 
     def _sums(self, measure: Measure, z: Array, averaged: bool) -> ComplexArray:
-        """Return Z of all orders from dual rows z of samples: <z, rows> = Re sum of conj(Z) f."""
+        """Return Z of all orders, shape (w, 3 mounts), from multipliers z of samples: <z, rows> = Re sum conj(Z) f."""
         problem, orders = self.problem, self.orders
         chosen, shares = measure.places([mount.name for mount in problem.engine.mounts]), measure.shares(problem.points)
         points = [p for p in range(len(problem.points)) if shares[p] > 0.0]
         rows = z.reshape(len(points), len(chosen), self.samples, 3) * np.array(measure.direction_weights or (1.0,) * 3)
         # sum of z exp(-i k t) over samples
         waves = np.fft.fft(rows, axis=2)
-        out = np.zeros((len(orders.omegas), len(problem.engine.mounts), 3), dtype=complex)
-        counted = measure.counted(orders.orders)
+        sums = np.zeros((len(orders.omegas), len(problem.engine.mounts), 3), dtype=complex)
+        is_counted = measure.counted(orders.orders)
         for k, p in enumerate(points):
-            at = np.flatnonzero((orders.points == p) & counted)
-            out[np.ix_(at, np.array(chosen))] = waves[k][:, orders.places[at] % self.samples].transpose(1, 0, 2)
+            indices = np.flatnonzero((orders.points == p) & is_counted)
+            sums[np.ix_(indices, np.array(chosen))] = waves[k][:, orders.places[indices] % self.samples].transpose(
+                1, 0, 2
+            )
         if averaged:
             step = 1.0 / self.samples
-            out *= (np.sinc(orders.places * step) ** 2)[:, None, None]
-        return out.reshape(len(out), -1)
+            sums *= (np.sinc(orders.places * step) ** 2)[:, None, None]
+        return sums.reshape(len(sums), -1)
 
 
-def coarser(problem: AffineProblem, times: int) -> AffineProblem:
-    """Return a program with a factor fewer samples."""
+def coarser(problem: AffineProblem, factor: int) -> AffineProblem:
+    """Return a program with every `factor`-th sample."""
 
-    def fewer(norm: AffineNorm) -> AffineNorm:
+    def coarser_norm(norm: AffineNorm) -> AffineNorm:
         # masses have no samples
-        if norm.grid.steps != problem.samples or problem.samples % times:
+        if norm.grid.steps != problem.samples or problem.samples % factor:
             return norm
-        rows = slice(0, None, times)
-        grid = replace(norm.grid, weights=norm.grid.weights[rows] * times, steps=norm.grid.steps // times)
+        rows = slice(0, None, factor)
+        grid = replace(norm.grid, weights=norm.grid.weights[rows] * factor, steps=norm.grid.steps // factor)
         return replace(norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=grid)
 
-    terms, limits = (tuple((number, fewer(norm)) for number, norm in each) for each in (problem.terms, problem.limits))
-    return replace(problem, terms=terms, limits=limits, samples=problem.samples // times)
+    terms, limits = (
+        tuple((number, coarser_norm(norm)) for number, norm in pairs) for pairs in (problem.terms, problem.limits)
+    )
+    return replace(problem, terms=terms, limits=limits, samples=problem.samples // factor)

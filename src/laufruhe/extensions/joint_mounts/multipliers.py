@@ -1,4 +1,4 @@
-"""Optimal unbalances on fixed mounts, and multipliers that prove it (P1, P6, E69)."""
+"""Optimal unbalances for fixed mounts, and the multipliers that prove them optimal (P1, P6, E69)."""
 
 from __future__ import annotations
 
@@ -15,26 +15,26 @@ from laufruhe.solvers.cones.conic import restrict_rows, rows_near, solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
 ROWS, LEAST_SAMPLES = (1000, 3000), 24
-"""Rows of coarse programs in the order of trials, and the least number of samples."""
+"""Most rows of coarse programs in the order of trials, and fewest samples."""
 GAP = 1e-5
 """Relative gap at which multipliers are accepted."""
 ROOM, STEEPEST = 0.02, 20.0
-"""Relative slack of widened limits, and largest price of limits that contradict each other, in objectives."""
+"""Relative slack of widened limits; largest price of contradicting limits, as a multiple of the objective."""
 NEAR, ROUNDS = 0.98, 3
-"""Share of a peak from which rows are included, and iterations of this selection."""
+"""Share of a peak above which rows are included, and rounds of this selection."""
 
 
 def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
-    """Return optimal unbalances and multipliers; if the limits contradict each other, those of wider limits."""
+    """Return optimal unbalances, shape (columns,), and multipliers; limits that contradict each other are widened."""
     x, best = _solve(problem)
     if x is not None:
         return x, best.multipliers
-    against = best.multipliers.limits
+    contradicting = best.multipliers.limits
     if all(maximum > 0.0 for maximum, _ in problem.limits):
         x, best = _solve(replace(problem, limits=_wider(problem)))
     if x is None:
         return problem.start, best.multipliers
-    return x, _with_contradiction(problem, best.multipliers, against, problem.objective(x))
+    return x, _with_contradiction(problem, best.multipliers, contradicting, problem.objective(x))
 
 
 def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
@@ -42,16 +42,16 @@ def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
     shares = tuple((1.0 / maximum, norm) for maximum, norm in problem.limits)
     coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), _times(problem)[0])
     x = solve_cones(coarse).x
-    times = ROOM + max(weight * norm.value(problem.start if x is None else x) for weight, norm in shares)
-    return tuple((times * maximum, norm) for maximum, norm in problem.limits)
+    scale = ROOM + max(weight * norm.value(problem.start if x is None else x) for weight, norm in shares)
+    return tuple((scale * maximum, norm) for maximum, norm in problem.limits)
 
 
 def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
     """Return optimal unbalances, or None if the limits contradict each other, and their bound."""
-    zero = (tuple(np.zeros_like(norm.constant) for _, norm in each) for each in (problem.terms, problem.limits))
+    zero = (tuple(np.zeros_like(norm.constant) for _, norm in parts) for parts in (problem.terms, problem.limits))
     x, best = None, lower_bound(problem, Multipliers(*zero))
-    for times in _times(problem):
-        coarse = coarser(problem, times)
+    for factor in _times(problem):
+        coarse = coarser(problem, factor)
         solution = solve_cones(coarse)
         if solution.x is None:
             limits = spread(
@@ -59,7 +59,7 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
             ).limits
             return None, replace(best, multipliers=replace(best.multipliers, limits=limits))
         x, best = solution.x, best_bound(problem, solution.x, refine_multipliers(coarse, problem, solution.multipliers))
-        if times > 1 and _depends_on_few_rows(problem):
+        if factor > 1 and _depends_on_few_rows(problem):
             x, best = _solve_by_peaks(problem, x, best)
         if problem.objective(x) - best.value <= GAP * best.value:
             break
@@ -67,17 +67,17 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
 
 
 def _with_contradiction(
-    problem: AffineProblem, multipliers: Multipliers, against: Sequence[Array], value: float
+    problem: AffineProblem, multipliers: Multipliers, contradicting: Sequence[Array], value: float
 ) -> Multipliers:  # fmt: skip
     # scaled so that the bound of mounts with contradicting limits exceeds `value`
-    proof = lower_bound(replace(problem, terms=()), Multipliers((), tuple(against)))
+    proof = lower_bound(replace(problem, terms=()), Multipliers((), tuple(contradicting)))
     prices = proof.multipliers.shadow_prices(problem)
     size = sum(price * maximum for price, (maximum, _) in zip(prices, problem.limits, strict=True))
     if not proof.value > 0.0:
         return multipliers
-    times = min(value / proof.value, STEEPEST * value / size)
+    factor = min(value / proof.value, STEEPEST * value / size)
     rows = zip(multipliers.limits, proof.multipliers.limits, strict=True)
-    return replace(multipliers, limits=tuple(z + times * other for z, other in rows))
+    return replace(multipliers, limits=tuple(z + factor * price_row for z, price_row in rows))
 
 
 def _times(problem: AffineProblem) -> list[int]:
@@ -95,7 +95,7 @@ def _depends_on_few_rows(problem: AffineProblem) -> bool:
 
 
 def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:
-    """Solve with all samples by the rows close to peaks alone (P10)."""
+    """Improve a coarse solution with all samples, from the rows near peaks alone (P10)."""
     selected = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
     for _ in range(ROUNDS):
         selected = [
@@ -112,7 +112,7 @@ def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Arra
         for z, rows, dual in zip(duals, selected, solution.multipliers.terms, strict=True):
             z[rows] = dual
         bound = lower_bound(problem, replace(solution.multipliers, terms=tuple(duals)))
-        best = max(best, bound, key=lambda each: each.value)
+        best = max(best, bound, key=lambda candidate: candidate.value)
         x = min(x, solution.x, key=problem.objective)
         if problem.objective(x) - best.value <= GAP * best.value:
             break

@@ -29,14 +29,14 @@ _NONE = Spectrum(Fraction(1), np.zeros((1, 6), dtype=complex))
 
 @dataclass(frozen=True, eq=False)
 class OpenThrows:
-    """Throws of a crank without gas, some of them between bounds, and without open unbalances on them.
+    """Throws of a crank without gas loads, some with open angles, and without open unbalances on them.
 
     Attributes
     ----------
     waves
         Loads of the throws.
     given, lower, upper
-        Angle of every throw, and its bounds [rad].
+        Initial angle and bounds of each throw [rad], shape (throws,).
     """
 
     waves: ThrowWaves
@@ -55,7 +55,7 @@ class OpenThrows:
         return self.lower[self.open], self.upper[self.open]
 
     def wrenches(self, point: int) -> list[Spectrum]:
-        """Return the wrench of every open throw at an angle of zero, for an operating point."""
+        """Return the wrench of each open throw at an angle of zero, at an operating point."""
 
         def turned(part: Moving) -> Spectrum:
             wrench = part.found[0].loads[point].wrench.series
@@ -66,30 +66,30 @@ class OpenThrows:
 
 
 def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenThrows | None:
-    """Return the throws of a design, in the turn closest to their bounds, or None if a bound cannot cover them.
+    """Return the throws of a design, turned as a whole towards their bounds, or None if boxes cannot cover them.
 
-    Gas loads depend on throws nonlinearly, and open bank angles, pins or shafts are no throws.
+    Gas loads are nonlinear in the throws, and open bank angles, pins or shafts are not throws.
     """
-    unknown = (
+    is_unsupported = (
         problem.feels_gas or problem.fidelity.is_uneven or any(phasing.is_geometry_open) or phasing.shafts.optional
     )
-    if phasing.throw_bounds is None or unknown:
+    if phasing.throw_bounds is None or is_unsupported:
         return None
-    realised, rides = (
+    realised, weights_on_throws = (
         with_default_sampling(replace(phasing.realise(candidate), phasing=None)),
         rides_of(phasing, candidate),
     )
-    if any(drive.rotor in rides for decision in realised.decisions for drive in decision.rotor_drives):
+    if any(drive.rotor in weights_on_throws for decision in realised.decisions for drive in decision.rotor_drives):
         return None
     lower, upper = np.transpose(phasing.throw_bounds)
-    at = np.array(candidate.throws)
-    at = np.clip(at + math.tau * np.round((0.5 * (lower + upper) - at) / math.tau), lower, upper)
-    return OpenThrows(ThrowWaves(realised, phasing.layout_of(candidate), rides), at, lower, upper)
+    angles = np.array(candidate.throws)
+    angles = np.clip(angles + math.tau * np.round((0.5 * (lower + upper) - angles) / math.tau), lower, upper)
+    return OpenThrows(ThrowWaves(realised, phasing.layout_of(candidate), weights_on_throws), angles, lower, upper)
 
 
 def along_arcs(halves: Array) -> tuple[Array, Array, Array]:
-    """Return the middle, the slope along i and the remainder of e^{i a t}, t from -1 to 1 (E72)."""
-    rest = np.hypot(0.5 * (1.0 - np.cos(halves)), halves**3 / (9.0 * math.sqrt(3.0)))
-    near = (halves <= math.pi) & (rest < 1.0)
-    middle, slope = np.where(near, 0.5 * (1.0 + np.cos(halves)), 0.0), np.where(near, np.sin(halves), 0.0)
-    return middle, slope, np.where(near, rest, 1.0)
+    """Return middle, slope along i, and remainder of e^{i a t} over t from -1 to 1, shape of `halves` each (E72)."""
+    remainder = np.hypot(0.5 * (1.0 - np.cos(halves)), halves**3 / (9.0 * math.sqrt(3.0)))
+    is_expanded = (halves <= math.pi) & (remainder < 1.0)
+    middle, slope = np.where(is_expanded, 0.5 * (1.0 + np.cos(halves)), 0.0), np.where(is_expanded, np.sin(halves), 0.0)
+    return middle, slope, np.where(is_expanded, remainder, 1.0)

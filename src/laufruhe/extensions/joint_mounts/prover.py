@@ -1,4 +1,4 @@
-"""Provers of open mounts, unbalances and throws: multipliers at vertices of boxes first, then boxes of all numbers."""
+"""Provers of open mounts, unbalances and throws: multipliers at vertices of boxes, and boxes of all numbers."""
 
 from __future__ import annotations
 
@@ -21,37 +21,37 @@ from laufruhe.solvers.mounts.places import started_at
 from laufruhe.solvers.sampling_refinement import over_read
 
 EARLY = 0.1
-"""Share of the boxes before other provers have their turn."""
+"""Share of the box budget after which other provers run."""
 
 
 def corner_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one bound, with the best design at a vertex if it improves the value of the question."""
+    """Yield one bound by vertices; a better design at a vertex lowers the value of the question."""
     problem = question.problem
     if question.of_many or question.value == math.inf:
         return
 
-    def judge(mounts: Array, columns: Array) -> float:
+    def exact_value(mounts: Array, columns: Array) -> float:
         design = started_at(problem, (mounts.tolist(), columns))
         if design is None or design.violation > 0.0:
             return math.inf
         return design.value - over_read(problem, design.evaluation)
 
-    boxes = DesignBoxes(problem, question.value, judge)
-    divided = designed_bound(boxes, question.room, question.known)
+    boxes = DesignBoxes(problem, question.value, exact_value)
+    result = designed_bound(boxes, question.room, question.known)
     question.value = boxes.value
-    yield replace(divided, places=() if boxes.best is None else (np.concatenate(boxes.best),))
+    yield replace(result, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
 def load_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield bounds by boxes of mounts and unbalances; end early if another prover is better after a share of them."""
+    """Yield bounds by boxes of mounts and unbalances; stop early if another prover has the better bound."""
     if question.of_many:
         return
     problem, known = question.problem, _known(question)
     # a problem of one number needs few boxes
     shares = (1.0,) if len(problem.decisions) == 1 else (EARLY, 1.0)
-    for divided in load_bounds(problem, question.value, question.room, shares, known):
-        yield replace(divided, places=())
-        if divided.bound < question.bound:
+    for result in load_bounds(problem, question.value, question.room, shares, known):
+        yield replace(result, places=())
+        if result.bound < question.bound:
             return
 
 
@@ -66,7 +66,7 @@ def throw_answers(question: Question) -> Iterator[BoxResult]:
 
 
 def _known(question: Question) -> Known | None:
-    # known design by its numbers of the mounts and columns of unbalances
+    # place of the known design: numbers of mounts, then columns of unbalances
     known, problem = question.known, question.problem
     if known is None:
         return None

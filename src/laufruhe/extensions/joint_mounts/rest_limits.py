@@ -1,11 +1,11 @@
-"""Limits on sag, frequencies and stiffness over a box of mounts, as polynomials with a multiplier (E70).
+"""Limits on sag, frequencies and stiffness over a box of mounts, as polynomials that multipliers can add (E70).
 
-For all open numbers of mounts, a quadratic form y' A y is a quadratic in s and a remainder (E68). The Rayleigh quotient
-of any y lies between the squares of the lowest and the highest frequency, and for every y
+For all open numbers of mounts, a quadratic form y' A y is a quadratic in s plus a remainder (E68). The Rayleigh
+quotient of any y lies between the squares of the lowest and the highest frequency, and for any y
 
     p' A^-1 p >= 2 p' y - y' A y,
 
-so each limit has a function of s nowhere above its violation.
+so each limit has a polynomial in s that is nowhere above its violation.
 """
 
 from __future__ import annotations
@@ -32,18 +32,18 @@ from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
-    """A block at rest over a box of mounts.
+    """Block at rest over a box of mounts.
 
     Attributes
     ----------
     count
-        Number of open numbers n.
+        Number n of open numbers.
     at
         Stiffness matrix over the box.
     pull, weight
-        Weight of the block in coordinates with unit mass, and its size [N].
+        Weight of the block in coordinates with unit mass, shape (6,), and its size [N].
     stiffness
-        Total stiffness by (1, s, s s') [N/m].
+        Coefficients of the total stiffness by (1, s, s s'), shape (1 + n + n^2,) [N/m].
     """
 
     count: int
@@ -53,13 +53,13 @@ class _Rest:
     stiffness: Array
 
     def form(self, y: Array) -> tuple[Array, float]:
-        """Return Bernstein coefficients of y' A y, (4^n,), and its remainder."""
-        powers, rest = self.at.form(y, self.count)
-        return coefficients(self.count) @ powers, rest
+        """Return Bernstein coefficients of y' A y, shape (4^n,), and a bound of its remainder."""
+        powers, remainder = self.at.form(y, self.count)
+        return coefficients(self.count) @ powers, remainder
 
     @cached_property
     def motions(self) -> Array:
-        """Modes of the middle by rising frequency, shape (6, 6)."""
+        """Modes at the middle by rising frequency, as columns, shape (6, 6)."""
         return np.asarray(np.linalg.eigh(0.5 * (self.at.middle + self.at.middle.T))[1], dtype=np.float64)
 
 
@@ -68,18 +68,18 @@ def _sag(limit: Limit, rest: _Rest) -> list[Array]:
     if not 0.0 < maximum < math.inf:
         return []
     y = np.asarray(np.linalg.solve(rest.at.middle, rest.pull), dtype=np.float64)
-    form, off = rest.form(y)
-    return [(2.0 * float(rest.pull @ y) - form - off - maximum) / maximum]
+    form, remainder = rest.form(y)
+    return [(2.0 * float(rest.pull @ y) - form - remainder - maximum) / maximum]
 
 
 def _frequencies(limit: Limit, rest: _Rest) -> list[Array]:
     violations = []
     if limit.minimum > 0.0:
-        minimum, (form, off) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
-        violations.append((minimum - form - off) / minimum)
+        minimum, (form, remainder) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
+        violations.append((minimum - form - remainder) / minimum)
     if limit.maximum < math.inf:
-        maximum, (form, off) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
-        violations.append((form - off - maximum) / maximum)
+        maximum, (form, remainder) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
+        violations.append((form - remainder - maximum) / maximum)
     return violations
 
 
@@ -93,11 +93,11 @@ OVER: Mapping[Channel, Callable[[Limit, _Rest], list[Array]]] = {
     channels.FREQUENCIES: _frequencies,
     channels.TOTAL_STIFFNESS: _stiffness,
 }
-"""Bernstein coefficients of lower bounds of the relative violation of a limit."""
+"""By channel: Bernstein coefficients of lower bounds of the relative violation of a limit."""
 
 
 class RestLimits:
-    """Limits of a problem on the block at rest, as far as the table `OVER` has them."""
+    """Limits of a problem on the block at rest, for channels of the table `OVER`."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
@@ -105,15 +105,21 @@ class RestLimits:
         weight = weight_wrench(block)
         self._pull, self._weight = mass_root(block) @ weight, -float(weight[2])
         self._limits = [limit for limit in problem.mount_limits if limit.measure.channel in OVER]
-        gains = [[d.gain for d in each.mount_drives if d.number < STIFFNESS.stop] for each in problem.mount_decisions]
-        self._stiffness_slopes = np.array([sum(each) for each in gains], dtype=float)
+        gains = [
+            [d.gain for d in decision.mount_drives if d.number < STIFFNESS.stop] for decision in problem.mount_decisions
+        ]
+        self._stiffness_slopes = np.array([sum(decision_gains) for decision_gains in gains], dtype=float)
 
     def over(self, lower: Array, upper: Array) -> list[Array]:
-        """Return Bernstein coefficients of lower bounds of the relative violation of every limit, (4^n,) each."""
+        """Return Bernstein coefficients of lower bounds of the relative violation of each limit, shape (4^n,) each."""
         if not self._limits:
             return []
-        total = [float(edge[:, STIFFNESS].sum()) for edge in number_ranges(self._problem, lower, upper)]
+        total = [float(ends[:, STIFFNESS].sum()) for ends in number_ranges(self._problem, lower, upper)]
         stiffness = [[0.5 * sum(total)], 0.5 * (upper - lower) * self._stiffness_slopes, np.zeros(len(lower) ** 2)]
-        at = open_stiffness(self._problem, lower, upper)
-        rest = _Rest(len(lower), at, self._pull, self._weight, np.concatenate(stiffness))
-        return [each for limit in self._limits for each in OVER[limit.measure.channel](limit, rest)]
+        stiffness_matrix = open_stiffness(self._problem, lower, upper)
+        rest = _Rest(len(lower), stiffness_matrix, self._pull, self._weight, np.concatenate(stiffness))
+        return [
+            coefficients_of_limit
+            for limit in self._limits
+            for coefficients_of_limit in OVER[limit.measure.channel](limit, rest)
+        ]

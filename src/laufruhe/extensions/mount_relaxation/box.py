@@ -1,4 +1,4 @@
-"""The relaxation of one box of mounts by the forces of their springs (E42-E45, E52-E54, E57, E58, E62)."""
+"""Relaxation of one box of mounts by spring forces (E42-E45, E52-E54, E57, E58, E62)."""
 
 from __future__ import annotations
 
@@ -40,30 +40,32 @@ from laufruhe.numerics.budget import rounds
 if TYPE_CHECKING:
     from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 
-# rounds in which the roots of a mean narrow each other, and share of the mean from which a root is narrowed
+# rounds in which root bounds of a mean narrow each other; smallest share of the mean of a root to narrow
 ROUNDS, SMALL = 2, 0.03
-# share of a mean that loose bounds of odd multiples have to hide to be narrowed
+# smallest share of a mean lost to loose bounds of odd multiples that makes narrowing worthwhile
 LARGE = 0.03
-# share of the missing bound that loose bounds of odd multiples have to hide to be worth a branch
+# share of the missing bound, lost to loose bounds of odd multiples, that makes a branch worthwhile
 WORTH = 0.25
 
 
 class BoxRelaxation:
-    """Relaxation of a box, for designs whose norm is not over a number: its bounds hold for these alone.
+    """Relaxation of a norm on a box, valid for designs with a norm up to `upper_norm` alone.
 
     Attributes
     ----------
     roots
-        Lower bounds of the roots of the epigraph variables, as known last.
+        Lower bounds of the roots of the epigraph variables, shape (variables,).
 
     Parameters
     ----------
     search
-        The relaxation of the whole problem.
+        Relaxation of the problem.
     query
-        The norm.
-    upper_norm, cutoff
-        The number that the norm is not over, and the bound at which no better one is sought.
+        Norm with its orders.
+    ends
+        Norm up to which bounds hold (`upper_norm`), and the bound from which the box is fathomed (`cutoff`).
+    lower, upper
+        Box, shape (n,).
     """
 
     roots: Array
@@ -80,64 +82,63 @@ class BoxRelaxation:
         self._stated: dict[int, tuple[Response, list[MomentConstraint]]] = {}
         self._multiple_bounds: dict[tuple[int, ...], list[list[LinearUpperBound]]] = {}
         self.modes = tuple(
-            mode_constraints(self.mounts, basis, lower[own], upper[own])
-            for basis, own in zip(search.modes, search.mode_sides, strict=True)
+            mode_constraints(self.mounts, basis, lower[sides], upper[sides])
+            for basis, sides in zip(search.modes, search.mode_sides, strict=True)
         )
 
-    def bound(self, variables: Sequence[EpigraphVariable], known: Array) -> tuple[float, Array, Array | None]:
-        """Return a lower bound of the norm on the box, branching scores by side, and open numbers at the optimum.
+    def bound(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> tuple[float, Array, Array | None]:
+        """Return a lower bound of the norm on the box, branching scores, and open numbers at the optimum or None.
 
-        Several variables are bounded one by one. The roots of all are then at least chords between their lower and
-        upper bounds, and the chords are bounded together (E54). Lower bounds of the roots of the whole search are
-        written to `known`.
+        Several variables are bounded one by one. The chords of their roots between lower and upper bounds are then
+        bounded together (E54). On the root box, the lower bounds of its roots are written to `root_bounds`.
         """
         scores = np.zeros(len(self.lower))
-        self.roots = known
+        self.roots = root_bounds
         if not variables:
             return 0.0, scores, None
         if _is_single(variables):
-            squared_root, scores, middle = self._solve(variables, np.ones(1))
+            squared_root, scores, optimum = self._solve(variables, np.ones(1))
             root = variables[0].unit * math.sqrt(max(squared_root, 0.0)) - variables[0].loss
-            return max(root, 0.0), scores, middle
-        self.roots = known.copy()
+            return max(root, 0.0), scores, optimum
+        self.roots = root_bounds.copy()
         units = np.array([variable.unit for variable in variables])
         for k in np.flatnonzero(_matters(units * [variable.share for variable in variables])).tolist():
             squared_root = self._solve([variables[k]], np.ones(1))[0]
             self.roots[k] = max(self.roots[k], units[k] * math.sqrt(max(squared_root, 0.0)))
         result = self._bound_mean(variables, self.roots)
-        is_all = np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
-        if result[0] < self.cutoff and is_all:
+        is_root = np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
+        if result[0] < self.cutoff and is_root:
             if self.hides_mean(variables):
                 self.roots = self._narrow_roots(variables, self.roots)
-                result = max(result, self._bound_mean(variables, self.roots), key=lambda each: each[0])
-            known[:] = self.roots
+                result = max(result, self._bound_mean(variables, self.roots), key=lambda candidate: candidate[0])
+            root_bounds[:] = self.roots
         return result
 
     def _bound_mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> tuple[float, Array, Array | None]:
         mean = self._mean(variables, roots)
         if mean.floor >= self.cutoff:
             return mean.floor, np.zeros(len(self.lower)), None
-        bound, scores, middle = self._solve(variables, mean.prices, mean)
+        bound, scores, optimum = self._solve(variables, mean.prices, mean)
         bound = max(bound + mean.constant, mean.floor)
-        # halving may also tighten bounds of odd multiples (E62)
-        loose = np.zeros(len(scores))
+        # a branch may also tighten bounds of odd multiples (E62)
+        multiple_scores = np.zeros(len(scores))
         for variable in variables:
             for order, multiple in variable.multiples:
-                high = self._high_order(order)
-                if high is not None:
+                high_order = self._high_order(order)
+                if high_order is not None:
                     weight = variable.share * variable.factor / multiple / len(self.query.mounts)
-                    for j, violation in enumerate(high.looseness(self._solution_s) * weight):
-                        self._score(loose, [j], float(violation))
-        return bound, joint_scores(scores, loose, self.upper_norm - bound), middle
+                    for j, looseness in enumerate(high_order.looseness(self._solution_s) * weight):
+                        self._score(multiple_scores, [j], float(looseness))
+        return bound, joint_scores(scores, multiple_scores, self.upper_norm - bound), optimum
 
-    def _narrow_roots(self, variables: Sequence[EpigraphVariable], known: Array) -> Array:
-        """Return lower bounds of every root with the others in the rest of the norm (E58).
+    def _narrow_roots(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> Array:
+        """Return lower bounds of each root, given that the norm of the whole stays below its upper bound (E58).
 
-        Odd multiples of designs that are no worse than the best known are narrowed too. All of a round follow from the
-        same constraints, so that they may be solved side by side.
+        Upper bounds of odd multiples are narrowed too. All programs of a round have the same constraints, so that they
+        may be solved concurrently.
         """
-        lower, units = known.copy(), np.array([variable.unit for variable in variables])
-        none = np.zeros(5 * len(self.modes))
+        lower, units = root_bounds.copy(), np.array([variable.unit for variable in variables])
+        no_mode_slopes = np.zeros(5 * len(self.modes))
         for _ in rounds(ROUNDS):
             mean = self._mean(variables, lower)
             if mean.floor >= self.upper_norm:
@@ -150,7 +151,9 @@ class BoxRelaxation:
                 if np.any(bound.slopes)
             ]
             objectives = Objectives(self.cut_off(variables, lower), self.search.ahead)
-            bounds = objectives.all_bounds([*chosen, *(np.append(-bound.slopes, none) for _, bound in multiples)])
+            bounds = objectives.all_bounds(
+                [*chosen, *(np.append(-bound.slopes, no_mode_slopes) for _, bound in multiples)]
+            )
             lower[chosen] = np.maximum(lower[chosen], units[chosen] * bounds[: len(chosen)])
             for (order, multiple), bound in zip(multiples, bounds[len(chosen) :], strict=True):
                 uppers = self.search.multiple_uppers
@@ -165,22 +168,22 @@ class BoxRelaxation:
         return mean_bound(variables, self._multiple_bounds[key], roots, self.upper_norm, self.mounts.numbers)
 
     def hides_mean(self, variables: Sequence[EpigraphVariable]) -> bool:
-        """Return whether odd multiples may hide so much of the mean that narrowing them is worth it."""
+        """Return True if loose bounds of odd multiples hide enough of the mean to narrow them."""
         size = sum(variable.share * variable.unit for variable in variables)
         mean = self._mean(variables, np.array([variable.unit for variable in variables]))
         return float(mean.prices.sum()) + mean.constant < (1.0 - LARGE) * size
 
     def _high_order(self, order: Order) -> HighOrder | None:
-        high = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._near)
-        return None if self.query.is_travel or np.any(order.loads[1:]) or not high.is_above else high
+        result = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._near)
+        return None if self.query.is_travel or np.any(order.loads[1:]) or not result.is_above else result
 
     def _bounds_of(self, variable: EpigraphVariable) -> list[LinearUpperBound]:
-        """Return the bounds of odd multiples in the mean over mounts (E62)."""
+        """Return upper bounds of the odd multiples of a variable, averaged over mounts (E62)."""
         bounds = []
         for order, _ in variable.multiples:
-            known, high = self.search.multiple_uppers.get(id(order), math.inf), self._high_order(order)
-            upper = min(self.query.largest_sum(order, self.parts), len(self.query.mounts) * known)
-            bound = None if high is None else high.bound
+            amplitude, high_order = self.search.multiple_uppers.get(id(order), math.inf), self._high_order(order)
+            upper = min(self.query.largest_sum(order, self.parts), len(self.query.mounts) * amplitude)
+            bound = None if high_order is None else high_order.bound
             if bound is None:
                 bound = constant_bound(upper, self._near)
             else:
@@ -199,38 +202,38 @@ class BoxRelaxation:
     def _solve(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[float, Array, Array | None]:
-        """Return the least sum of variables at these prices, or of their roots; scores, and numbers at the optimum."""
-        # a solver works best where its objective is of size one
-        size = float(prices.sum())
-        program, responses = self._program(variables, prices / size, mean)
+        """Return the proven least sum of priced variables or roots, branching scores, and open numbers, or None."""
+        # the solver works best if prices add up to one
+        scale = float(prices.sum())
+        program, responses = self._program(variables, prices / scale, mean)
         if mean is not None:
-            program = replace(program, objective=np.append(mean.slopes / size, np.zeros(5 * len(self.modes))))
+            program = replace(program, objective=np.append(mean.slopes / scale, np.zeros(5 * len(self.modes))))
         solution = ConeProgram(program).solve(program)
         self._solution_s = solution.s
-        middle = None
+        optimum = None
         if self.search.stiffness_alone:
-            middle = 0.5 * (self.lower + self.upper)[: self.search.mount_numbers]
+            optimum = 0.5 * (self.lower + self.upper)[: self.search.mount_numbers]
             for j, decisions in enumerate(self.mounts.decisions):
-                middle[decisions[0]] += 0.5 * (self.upper - self.lower)[decisions[0]] * solution.s[j]
+                optimum[decisions[0]] += 0.5 * (self.upper - self.lower)[decisions[0]] * solution.s[j]
         orders = [order for variable in variables for order in variable.orders]
         scores = self._branching_scores(orders, responses, solution)
-        return size * proven_bound(program, solution.multipliers), scores, middle
+        return scale * proven_bound(program, solution.multipliers), scores, optimum
 
-    def cut_off(self, variables: Sequence[EpigraphVariable], known: Array) -> SdpProgram:
-        """Return the constraints of designs whose norm is not over its upper bound."""
+    def cut_off(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> SdpProgram:
+        """Return the program of designs in the box with a norm up to its upper bound."""
         if _is_single(variables):
             uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
             program, _ = self._program(variables, np.zeros(len(variables)))
             return replace(program, uppers=np.append(uppers, program.uppers[len(uppers) :]))
-        mean = self._mean(variables, known)
-        size = float(mean.prices.sum())
-        program, _ = self._program(variables, mean.prices / size, mean)
-        return replace(program, limit=mean.limit(size, self.upper_norm))
+        mean = self._mean(variables, root_bounds)
+        scale = float(mean.prices.sum())
+        program, _ = self._program(variables, mean.prices / scale, mean)
+        return replace(program, limit=mean.limit(scale, self.upper_norm))
 
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[SdpProgram, list[Response]]:
-        """Return the program of these variables at these prices, and the responses to its orders."""
+        """Return the program of variables at prices, and the responses to its orders."""
         quadratics: list[QuadraticBound] = []
         responses: list[Response] = []
         constraints: list[MomentConstraint] = []
@@ -238,16 +241,16 @@ class BoxRelaxation:
         for number, variable in enumerate(variables):
             first = len(responses)
             for k, order in enumerate(variable.orders, first):
-                response, own = self._state(order, self.query.bound(order, variable, self.upper_norm))
+                response, order_constraints = self._state(order, self.query.bound(order, variable, self.upper_norm))
                 responses.append(response)
-                constraints += [replace(constraint, order=k) for constraint in own]
-            at = range(first, len(responses))
-            quadratics += variable.quadratic_bounds(number, self.query, responses[first:], at)
+                constraints += [replace(constraint, order=k) for constraint in order_constraints]
+            numbers = range(first, len(responses))
+            quadratics += variable.quadratic_bounds(number, self.query, responses[first:], numbers)
             if mean is not None:
-                lengths = variable.lengths(self.query, responses[first:], at)
+                lengths = variable.lengths(self.query, responses[first:], numbers)
                 lower, upper = float(mean.lower[number]), float(mean.upper[number])
                 roots.append(RootTerm(prices[number], lower, upper, lengths))
-        # stiffness in motions of a symmetry that no order is followed in (E57)
+        # bounds of stiffness in motions of a symmetry without orders (E57)
         parts = {order.part for variable in variables for order in variable.orders}
         for k, mounts in enumerate(self.parts):
             if k and k not in parts and 0 not in parts:
@@ -265,25 +268,25 @@ class BoxRelaxation:
         return program, responses
 
     def _branching_scores(self, orders: Sequence[Order], responses: Sequence[Response], solution: Solution) -> Array:
-        """Return by side the violation of products by s of the optimum, as a share of the forces that count."""
+        """Return scores by side: violation of the products by s at the optimum, over the forces in the norm."""
         scores, s = np.zeros(len(self.lower)), solution.s
         for order, response, moments in zip(orders, responses, solution.moments, strict=False):
             size = float(np.sum(squared(self.query.signal(response) / response.unit) * moments)) or 1.0
             mounts = self.parts[order.part]
-            for spring, (deflection, added) in zip(mounts.springs, response.springs, strict=True):
+            for spring, (deflection, force) in zip(mounts.springs, response.springs, strict=True):
                 product = np.tensordot(s, spring.slopes(len(s)), 1) @ deflection
-                violation = spring.force_scaled(added - product, order.omega)
+                violation = spring.force_scaled(force - product, order.omega)
                 share = max(float(np.sum(squared(violation) * moments)), 0.0) / size
                 self._score(scores, [j for j, _ in spring.terms], share)
-            for place, (loads, moved) in zip(mounts.places, response.places, strict=True):
-                violation = place.force_scaled(moved - s[place.number] * loads, order.omega)
+            for place, (loads, shifted) in zip(mounts.places, response.places, strict=True):
+                violation = place.force_scaled(shifted - s[place.number] * loads, order.omega)
                 self._score(scores, [place.number], max(float(np.sum(squared(violation) * moments)), 0.0) / size)
-        for mode, priced, own, moments in zip(
+        for mode, mode_multipliers, sides, moments in zip(
             self.modes, solution.multipliers.modes, self.search.mode_sides, solution.modes, strict=True
         ):
-            of_numbers, of_mode = mode_scores(mode, priced, s, moments)
-            scores[own] += of_mode
-            for j, share in enumerate(of_numbers):
+            number_scores, side_scores = mode_scores(mode, mode_multipliers, s, moments)
+            scores[sides] += side_scores
+            for j, share in enumerate(number_scores):
                 self._score(scores, [j], float(share))
         return scores
 
@@ -297,11 +300,11 @@ def _is_single(variables: Sequence[EpigraphVariable]) -> bool:
     return len(variables) == 1 and not variables[0].multiples
 
 
-def joint_scores(scores: Array, loose: Array, missing: float) -> Array:
-    """Return the larger of two shares by side: of the largest score, and of the missing bound."""
-    minimum = max(WORTH * missing, 1e-100 * float(loose.max()), 1e-300)
-    return np.maximum(scores / max(float(scores.max()), 1e-300), loose / minimum)
+def joint_scores(scores: Array, multiple_scores: Array, missing_bound: float) -> Array:
+    """Return the larger of two scores: relaxation scores over their largest, multiple scores over the missing bound."""
+    unit = max(WORTH * missing_bound, 1e-100 * float(multiple_scores.max()), 1e-300)
+    return np.maximum(scores / max(float(scores.max()), 1e-300), multiple_scores / unit)
 
 
-def _matters(shares: Array) -> Mask:
-    return np.asarray(shares > SMALL * shares.sum())
+def _matters(sizes: Array) -> Mask:
+    return np.asarray(sizes > SMALL * sizes.sum())

@@ -1,4 +1,4 @@
-"""The relaxation of E43-E45 and E52-E54 as a cone program; bounds do not depend on how good its multipliers are."""
+"""Statement of the relaxation (E43-E45, E52-E54) as a cone program; any multipliers of it prove valid bounds."""
 
 from __future__ import annotations
 
@@ -33,12 +33,11 @@ from laufruhe.extensions.mount_relaxation.program import (
 )
 from laufruhe.numerics.arrays import Array, Indices
 
-# small price of every square in the objective, so that the remainder of multipliers is convex
-ASIDE = 3e-7
-# tolerances of gap and feasibility: of a bound, and of what narrows a box
+# small price of each square in the objective, which makes the remainder of the multipliers convex
+SQUARE_PRICE = 3e-7
+# (gap, feasibility) tolerances: of a bound, and of narrowing a box
 FINE, ROUGH = (1e-5, 1e-7), (2e-2, 5e-6)
-# equations are solved once and not refined, more regular instead, and steps stay off the ends of cones: bounds are as
-# good in less time
+# no iterative refinement, but stronger regularisation and shorter steps: equally good bounds in less time
 _SETTINGS = {
     "verbose": False,
     "tol_gap_abs": 1e-6,
@@ -51,15 +50,15 @@ _SETTINGS = {
     "max_step_fraction": 0.95,
 }
 
-ZERO, SIDES, LENGTH, MATRIX = "zero", "at least zero", "a length and its vector", "semidefinite"
+ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"
 _Parts: TypeAlias = defaultdict[Hashable, list[Array]]
 
 
 class ConeProgram:
-    """A program as rows of cones.
+    """Rows of cones of an `SdpProgram`.
 
-    Its variables are the epigraph variables, blocks of their quadratic bounds, roots and their lengths, s, and moments
-    of every order and of every mode.
+    The variables are, in this order: epigraph variables, blocks of their quadratic bounds, roots and their lengths, s,
+    and moments of each order and of each mode.
     """
 
     def __init__(self, program: SdpProgram) -> None:
@@ -78,10 +77,10 @@ class ConeProgram:
         self.modes = np.cumsum([int(self.ends[-1]), *sizes])
         self._add_links()
         self._add_linear()
-        at = 0
+        block_number = 0
         for quadratic in program.quadratics:
-            self._add_quadratic(quadratic, at)
-            at += len(quadratic.blocks)
+            self._add_quadratic(quadratic, block_number)
+            block_number += len(quadratic.blocks)
         for constraint in program.constraints:
             self._add_constraint(constraint)
         for number, root in enumerate(program.roots):
@@ -103,33 +102,38 @@ class ConeProgram:
         self.cones.append((cone, name))
 
     def _add_mode(self, number: int, mode: ModeConstraints) -> None:
-        """Add the six kinds of rows of E56."""
+        """Add the rows of E56 for one mode."""
         numbers, entries = self.program.numbers, _entries(6)
-        own = np.arange(self.modes[number], self.modes[number + 1])
-        corners = own[::entries]
+        mode_columns = np.arange(self.modes[number], self.modes[number + 1])
+        corners = mode_columns[::entries]
         self._add(np.ones((1, 1)), corners[:1], ZERO, right=np.ones(1))
-        both = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
+        difference = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
         columns = np.concatenate([corners[1:], self.first + np.arange(numbers)])
-        self._add(both, columns, ZERO, ("corners", number))
+        self._add(difference, columns, ZERO, ("corners", number))
         for name, matrices, cone in (("equal", mode.equal, ZERO), ("sides", mode.sides, SIDES)):
-            self._add(-column(matrices).reshape(len(matrices), -1), own, cone, (name, number))
+            self._add(-column(matrices).reshape(len(matrices), -1), mode_columns, cone, (name, number))
         for tensor in mode.matrices:
             i, j, factor = triangle(tensor.shape[1])
             rows = column(tensor[:, i, j]).transpose(1, 0, 2).reshape(len(i), -1) * factor[:, None]
-            self._add(-rows, own, MATRIX, ("matrices", number))
+            self._add(-rows, mode_columns, MATRIX, ("matrices", number))
         first = np.arange(entries)
         for k in range(1, 1 + numbers):
             for sign in (1.0, -1.0):
                 rows = np.concatenate([-np.eye(entries), -sign * np.eye(entries)], axis=1)
-                self._add(rows, np.concatenate([own[first], own[k * entries + first]]), MATRIX, (sign, number))
+                self._add(
+                    rows,
+                    np.concatenate([mode_columns[first], mode_columns[k * entries + first]]),
+                    MATRIX,
+                    (sign, number),
+                )
 
     def _add_links(self) -> None:
         sizes = self.program.sizes
         self._add(np.eye(len(sizes)), np.asarray(self.ends[:-1]), ZERO, right=np.ones(len(sizes)))
         corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
         for order in range(1, len(sizes) if count else 1):
-            both = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
-            self._add(both, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO, "links")
+            difference = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
+            self._add(difference, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO, "links")
 
     def _corner(self, order: int) -> Indices:
         return np.asarray(self.ends[order] + np.arange(_entries(1 + self.program.columns)))
@@ -138,7 +142,7 @@ class ConeProgram:
         return np.arange(self.ends[order], self.ends[order + 1])
 
     def _add_linear(self) -> None:
-        """Add the range of s, sets of unbalances, linear limits, bounds of variables, and traces under variables."""
+        """Add ranges of s, sets of unbalances, linear limits, bounds of variables, and traces below variables."""
         program, numbers = self.program, self.program.numbers
         for sign in (1.0, -1.0):
             self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, right=np.ones(numbers))
@@ -151,38 +155,38 @@ class ConeProgram:
         if len(program.uppers):
             bounded = np.flatnonzero(np.isfinite(program.uppers))
             self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
-        at = 0
+        block_number = 0
         for quadratic in program.quadratics:
             if quadratic.blocks:
-                span = np.arange(self.blocks[at], self.blocks[at + len(quadratic.blocks)])
+                span = np.arange(self.blocks[block_number], self.blocks[block_number + len(quadratic.blocks)])
                 traces = np.concatenate([_diagonal(size) for size in quadratic.blocks])
                 self._add(np.append(traces, -1.0)[None], np.append(span, quadratic.variable), SIDES)
-            at += len(quadratic.blocks)
+            block_number += len(quadratic.blocks)
 
-    def _add_quadratic(self, quadratic: QuadraticBound, at: int) -> None:
-        """Add that S - F(M) is semidefinite; the blocks of S are variables from number `at` on."""
+    def _add_quadratic(self, quadratic: QuadraticBound, block_number: int) -> None:
+        """Add S - F(M) positive semidefinite; the blocks of S are variables from block number `block_number` on."""
         i, j, factor = triangle(quadratic.size)
         columns, blocks = [], []
         for order, rows in quadratic.rows:
-            pairs = np.einsum("pax,pay->axy", rows[:, i], rows[:, j])
-            blocks.append(column(0.5 * (pairs + pairs.transpose(0, 2, 1))) * factor[:, None])
+            products = np.einsum("pax,pay->axy", rows[:, i], rows[:, j])
+            blocks.append(column(0.5 * (products + products.transpose(0, 2, 1))) * factor[:, None])
             columns.append(self._moment(order))
         if quadratic.blocks:
             entry_of = {pair: k for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
             for k, part in enumerate(quadratic.block_slices):
-                block_rows, block_columns, own = triangle(quadratic.blocks[k])
-                block = np.zeros((len(i), len(own)))
+                block_rows, block_columns, factors = triangle(quadratic.blocks[k])
+                block = np.zeros((len(i), len(factors)))
                 for entry, (a, b) in enumerate(zip(block_rows + part.start, block_columns + part.start, strict=True)):
                     block[entry_of[int(a), int(b)], entry] = -1.0
                 blocks.append(block)
-                columns.append(np.arange(self.blocks[at + k], self.blocks[at + k + 1]))
+                columns.append(np.arange(self.blocks[block_number + k], self.blocks[block_number + k + 1]))
         else:
             blocks.append(-column(np.eye(quadratic.size))[:, None])
             columns.append(np.array([quadratic.variable]))
         self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX, "quadratics")
 
     def _add_root(self, number: int, root: RootTerm) -> None:
-        """Add that a root is over its chord, and over the sum of lengths, each over that of its vector."""
+        """Add that a root is above its chord and above the sum of its lengths, each above that of its vector."""
         at, end = int(self.roots[number]), int(self.roots[number + 1])
         ends = np.array([number, at])
         self._add(np.array([[root.slope, -1.0]]), ends, SIDES, "chords", np.array([-root.offset]))
@@ -193,9 +197,9 @@ class ConeProgram:
                 at, (count, size) = at + 1, vector.shape
                 block = np.zeros((1 + count, 1 + size))
                 block[0, 0], block[1:, 1:] = -1.0, -vector
-                # the first row of a triangle column by column
+                # columns of the first row of the moments
                 first = self.ends[order] + np.cumsum(np.arange(size))
-                # off the diagonal an entry counts by the root of two
+                # entries off the diagonal are scaled by the root of two
                 block[1:, 2:] *= math.sqrt(0.5)
                 self._add(block, np.concatenate([[at], first]), LENGTH, ("lengths", number))
 
@@ -207,30 +211,33 @@ class ConeProgram:
         self._add(block, columns, MATRIX, "constraints", column(constraint.constant))
 
     def minimum(self, objective: Array | int) -> tuple[float, Array]:
-        """Return the proven bound of another objective, or of one root by its number, and s and w at the optimum."""
+        """Return the proven minimum of an objective, or of the root with this number, and s and w at the optimum."""
         if isinstance(objective, int):
             assert self.program.limit is not None
             program = replace(self.program, limit=replace(self.program.limit, root=objective))
         else:
             program = replace(self.program, objective=objective)
         solution = self.solve(program, ROUGH)
-        modes = [each[0, 0, 1:] for each in solution.modes]
+        modes = [moments[0, 0, 1:] for moments in solution.modes]
         return proven_bound(program, solution.multipliers), np.concatenate([solution.s, *modes])
 
     def solve(self, program: SdpProgram, tolerances: tuple[float, float] = FINE) -> Solution:
-        """Return multipliers and moments of a program with the same constraints, whatever the solver says of them."""
+        """Return multipliers and moments of a program with the same constraints, whatever the solver's status."""
         x, z, value = self._solver(tolerances).solve(self._cost(program))
         parts: _Parts = defaultdict(list)
         for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
             parts[name].append(part)
         lengths = []
         for number, root in enumerate(program.roots):
-            # the vectors of the cones, beside their first number, order by order
+            # vectors of the second-order cones without their first entry, order by order
             vectors = iter(parts["lengths", number])
             lengths.append([-np.array([next(vectors)[1:] for _ in rows]) for _, rows in root.rows])
         multipliers = SdpMultipliers(
             [matrix_of(part, bound.size) for part, bound in zip(parts["quadratics"], program.quadratics, strict=True)],
-            [matrix_of(part, own.size) for part, own in zip(parts["constraints"], program.constraints, strict=True)],
+            [
+                matrix_of(part, constraint.size)
+                for part, constraint in zip(parts["constraints"], program.constraints, strict=True)
+            ],
             _joined(parts["linear"]),
             _joined(parts["sets"]),
             [matrix_of(np.append(0.0, part), 1 + program.columns) for part in parts["links"]],
@@ -243,7 +250,7 @@ class ConeProgram:
         modes = []
         for start, end in zip(self.modes[:-1], self.modes[1:], strict=True):
             entries = x[start:end].reshape(1 + program.numbers, -1)
-            modes.append(np.array([matrix_of(each, 6) for each in entries]))
+            modes.append(np.array([matrix_of(entries_of_matrix, 6) for entries_of_matrix in entries]))
         s = np.clip(x[self.first : self.first + program.numbers], -1.0, 1.0)
         return Solution(multipliers, s, moments, value, modes)
 
@@ -259,19 +266,19 @@ class ConeProgram:
     def _cost(self, program: SdpProgram) -> Array:
         cost = np.zeros(int(self.modes[-1]))
         cost[: len(program.prices)] = program.prices
-        for number, (at, root) in enumerate(zip(self.roots, program.roots, strict=False)):
-            cost[at] = root.price if program.limit is None else float(number == program.limit.root)
+        for number, (start, root) in enumerate(zip(self.roots, program.roots, strict=False)):
+            cost[start] = root.price if program.limit is None else float(number == program.limit.root)
         slopes, mode_slopes = program.slopes
         cost[self.first : self.first + program.numbers] = slopes
-        for at, slope in zip(self.modes, mode_slopes, strict=False):
-            # entries (0, k) of a triangle column by column, which count by the root of two
-            cost[at + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
+        for start, slope in zip(self.modes, mode_slopes, strict=False):
+            # entries (0, k) of a triangle, which are scaled by the root of two
+            cost[start + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
         for order, size in enumerate(program.sizes):
-            cost[self._moment(order)] = -ASIDE * _diagonal(size)
+            cost[self._moment(order)] = -SQUARE_PRICE * _diagonal(size)
         return cost
 
     def _solver(self, tolerances: tuple[float, float]) -> DualSolver | PrimalSolver:
-        """Return the solver of all objectives under the same constraints."""
+        """Return the solver for all objectives under these constraints, at tolerances (gap, feasibility)."""
         import clarabel
 
         if tolerances not in self._solvers:
@@ -280,7 +287,7 @@ class ConeProgram:
             for (cone, _), right in zip(self.cones, self.right, strict=True):
                 size = len(right)
                 if cone == MATRIX:
-                    # the matrix that has a triangle of so many entries
+                    # rows of the matrix from the size of its triangle
                     cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
                 else:
                     cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))

@@ -1,12 +1,12 @@
-"""Cone programs for Clarabel, scaled, and solved by their dual where their matrices are large.
+"""Cone programs for Clarabel, scaled, and solved as primal or dual program.
 
-    least q'x   with   b - A x in K,   the matrices X_k of x positive semidefinite
-    least b'z   with   A_o' z = -q_o,   q_k + A_k' z positive semidefinite for every X_k,   z in the dual of K
+    minimum q'x   with   b - A x in K,   the matrices X_k of x positive semidefinite
+    minimum b'z   with   A_o' z = -q_o,   q_k + A_k' z positive semidefinite for each X_k,   z in the dual of K
 
 A_k are the columns of X_k and A_o all others: X_k and x_o are multipliers of the second program. In the first program
-an entry of X_k is a column and a row of the solver, in the second a row; rows of all other cones are variables and
-rows of the second. The form is taken in which the larger matrices stand once. Both are scaled as the first one is:
-rows and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001-034), those of a cone alike.
+an entry of X_k is a column and a row of the solver, in the second a row; rows of all other cones are columns and rows
+of the second. The program is chosen in which the larger matrices take less space. Both are scaled like the first: rows
+and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001-034), rows of one cone alike.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import passed
 
-# rounds of the scaling, and the range of scales
-_ROUNDS, _LEAST, _MOST = 10, 1e-4, 1e4
+# rounds of scaling, and the range of scales
+_ROUNDS, _MIN_SCALE, _MAX_SCALE = 10, 1e-4, 1e4
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,12 @@ class Cone:
 
     Attributes
     ----------
+    size
+        Count of rows.
     kind
-        The solver's cone; None where the rows are equations.
+        Clarabel's cone; None for equations.
     has_one_scale
-        Whether its rows are scaled alike.
+        True if all its rows need the same scale.
     """
 
     size: int
@@ -46,18 +48,18 @@ class Cone:
 
 
 class _ConeSolver:
-    """Solver of one program for any cost.
+    """Solver of one program for any cost vector.
 
     Parameters
     ----------
     rows, right
-        A and b.
+        A, shape (m, n), and b, shape (m,).
     cones
-        K, row by row.
+        K, in the order of the rows.
     matrices
-        Columns of every X_k, of which there is one at least, and their cone.
+        Columns of each X_k and its cone; at least one.
     settings
-        Of the solver.
+        Settings of Clarabel.
     """
 
     def __init__(
@@ -72,21 +74,21 @@ class _ConeSolver:
         self._solver: Any = None
 
     def solve(self, cost: Array) -> tuple[Array, Array, float]:
-        """Return x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
+        """Return x, z and q'x whatever the solver's status; q'x is infinite if it reports the program as unbounded."""
         scaled = self._column_scales * cost
         size = float(np.abs(scaled).max(initial=0.0))
-        factor = float(np.clip(1.0 / size, _LEAST, _MOST)) if size > 0.0 else 1.0
+        factor = float(np.clip(1.0 / size, _MIN_SCALE, _MAX_SCALE)) if size > 0.0 else 1.0
         x, z, is_bounded = self._solve_scaled(factor * scaled)
         x = self._column_scales * x
         return x, self._row_scales * z / factor, float(cost @ x) if is_bounded else math.inf
 
     @abstractmethod
     def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
-        """Return scaled x and z, and whether there is a least value."""
+        """Return scaled x and z, and True if the program is bounded."""
 
 
 class DualSolver(_ConeSolver):
-    """Solve the dual."""
+    """Solver of the dual program."""
 
     def __init__(
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
@@ -94,17 +96,19 @@ class DualSolver(_ConeSolver):
     ) -> None:  # fmt: skip
         super().__init__(rows, right, cones, matrices, settings)
         count, width = rows.shape
-        free = width - len(self._entries)
+        free_count = width - len(self._entries)
         self._order = np.concatenate([np.setdiff1d(np.arange(width), self._entries), self._entries])
-        self._signs = np.where(np.arange(width) < free, 1.0, -1.0)
-        coned = np.flatnonzero(np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones]))
-        self._zeros = np.zeros(len(coned))
+        self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
+        inequality_rows = np.flatnonzero(
+            np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones])
+        )
+        self._zeros = np.zeros(len(inequality_rows))
         transposed = diags_array(self._signs) @ self._scaled_rows[:, self._order].T
-        self._rows = csc_array(vstack([transposed, -eye_array(count, format="csr")[coned]]))
+        self._rows = csc_array(vstack([transposed, -eye_array(count, format="csr")[inequality_rows]]))
         self._kinds = [
-            _zero_cone(free),
+            _zero_cone(free_count),
             *(kind for _, kind in matrices),
-            *(c.kind for c in cones if c.kind is not None),
+            *(cone.kind for cone in cones if cone.kind is not None),
         ]
 
     def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
@@ -118,13 +122,13 @@ class DualSolver(_ConeSolver):
         solution, status = self._solver.solve(), clarabel.SolverStatus
         x = np.empty(len(cost))
         x[self._order] = -self._signs * np.nan_to_num(np.array(solution.z))[: len(cost)]
-        # the dual is infeasible where the program is unbounded
+        # the dual is infeasible if the program is unbounded
         is_bounded = solution.status not in (status.PrimalInfeasible, status.AlmostPrimalInfeasible)
         return x, np.nan_to_num(np.array(solution.x)), is_bounded
 
 
 class PrimalSolver(_ConeSolver):
-    """Solve the program as it is stated."""
+    """Solver of the primal program."""
 
     def __init__(
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
@@ -146,7 +150,7 @@ class PrimalSolver(_ConeSolver):
         else:
             self._solver.update(q=cost)
         solution, status = self._solver.solve(), clarabel.SolverStatus
-        x, z = (np.nan_to_num(np.array(each)) for each in (solution.x, solution.z))
+        x, z = (np.nan_to_num(np.array(values)) for values in (solution.x, solution.z))
         return x, z[: len(self._right)], solution.status not in (status.DualInfeasible, status.AlmostDualInfeasible)
 
 
@@ -154,22 +158,22 @@ def solver_for(
     rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
     settings: Mapping[str, Any],
 ) -> DualSolver | PrimalSolver:  # fmt: skip
-    """Return the solver in which the larger ones stand once: the matrices X_k, or the cones of one scale."""
-    of_matrices = sum(len(columns) ** 2 for columns, _ in matrices)
-    of_cones = sum(cone.size**2 for cone in cones if cone.has_one_scale)
-    solver = DualSolver if of_matrices >= of_cones else PrimalSolver
+    """Return the solver that stores the larger cones once: the matrices X_k, or the cones with one scale."""
+    matrix_size = sum(len(columns) ** 2 for columns, _ in matrices)
+    cone_size = sum(cone.size**2 for cone in cones if cone.has_one_scale)
+    solver = DualSolver if matrix_size >= cone_size else PrimalSolver
     return solver(rows, right, cones, matrices, settings)
 
 
 def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
-    """Return Clarabel's solver of least cost' x with right - rows x in the cones; it stops when time is over."""
+    """Return Clarabel's solver of minimum cost' x with right - rows x in the cones; it stops at the time budget."""
     import clarabel
 
-    own = clarabel.DefaultSettings()
+    options = clarabel.DefaultSettings()
     for name, value in settings.items():
-        setattr(own, name, value)
+        setattr(options, name, value)
     no_squares = csc_array((len(cost), len(cost)))
-    solver = clarabel.DefaultSolver(no_squares, cost, rows, right, cones, own)
+    solver = clarabel.DefaultSolver(no_squares, cost, rows, right, cones, options)
     solver.set_termination_callback(lambda _: passed())
     return solver
 
@@ -181,7 +185,7 @@ def _zero_cone(size: int) -> Any:
 
 
 def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]]) -> tuple[Array, Array]:
-    """Return scales of rows and columns, as if every entry of a matrix had a row too."""
+    """Return scales of rows, shape (m,), and columns, shape (n,), as if each entry of a matrix had a row too."""
     count, width = rows.shape
     entries = np.concatenate([columns for columns, _ in matrices])
     row = np.append(rows.row, count + np.arange(len(entries)))
@@ -189,41 +193,41 @@ def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, 
     sizes = np.append(np.abs(rows.data), np.ones(len(entries)))
     scales = [np.ones(count + len(entries)), np.ones(width)]
     groups = []
-    for place in (row, column):
-        order = np.argsort(place, kind="stable")
-        groups.append((order, *np.unique(place[order], return_index=True)))
+    for indices in (row, column):
+        order = np.argsort(indices, kind="stable")
+        groups.append((order, *np.unique(indices[order], return_index=True)))
     for _ in range(_ROUNDS):
         scaled = scales[0][row] * sizes * scales[1][column]
-        for k, (order, there, first) in enumerate(groups):
+        for k, (order, numbers, first) in enumerate(groups):
             largest = np.maximum.reduceat(scaled[order], first)
             scales[k] = scales[k].copy()
-            scales[k][there] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
-            scales[k] = np.clip(scales[k], _LEAST, _MOST)
-    at, (along, across) = 0, scales
+            scales[k][numbers] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
+            scales[k] = np.clip(scales[k], _MIN_SCALE, _MAX_SCALE)
+    start, (row_scales, column_scales) = 0, scales
     blocks = [(cone.size, cone.has_one_scale) for cone in cones] + [(len(columns), True) for columns, _ in matrices]
     for size, has_one_scale in blocks:
         if has_one_scale:
-            along[at : at + size] = along[at : at + size].mean()
-        at += size
-    across[entries] = 1.0 / along[count:]
-    return along[:count], across
+            row_scales[start : start + size] = row_scales[start : start + size].mean()
+        start += size
+    column_scales[entries] = 1.0 / row_scales[count:]
+    return row_scales[:count], column_scales
 
 
 @cache
 def triangle(size: int) -> tuple[Indices, Indices, Array]:
-    """Return rows and columns of the upper triangle column by column, and the factors that keep lengths."""
+    """Return rows and columns of the upper triangle, column by column, and the factors that preserve norms."""
     columns, rows = np.tril_indices(size)
     return rows, columns, np.where(rows == columns, 1.0, math.sqrt(2.0))
 
 
 def column(matrices: Array) -> Array:
-    """Return the upper triangles column by column, so that lengths are kept, shape (..., n (n + 1) / 2)."""
+    """Return upper triangles column by column, scaled to preserve norms, shape (..., n (n + 1) / 2)."""
     i, j, factor = triangle(matrices.shape[-1])
     return np.asarray(matrices[..., i, j] * factor)
 
 
 def matrix_of(entries: Array, size: int) -> Array:
-    """Return the symmetric matrix of such a triangle, shape (size, size)."""
+    """Return the symmetric matrix, shape (size, size), from the entries of `column`."""
     i, j, factor = triangle(size)
     matrix = np.zeros((size, size))
     matrix[i, j] = matrix[j, i] = entries / factor

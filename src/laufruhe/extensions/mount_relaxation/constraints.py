@@ -1,7 +1,7 @@
-"""Constraints on the moments of an order that every design of a box satisfies (E43, E52, E53).
+"""Constraints on the moments of an order that each design of a box satisfies (E43, E52, E53).
 
-A matrix M stands for (1, v)(1, v)', v the products of E42 and the unbalances. Where a matrix P(s), linear in the shared
-numbers s, is positive semidefinite, so is
+A matrix M stands for (1, v)(1, v)', where v are the products of E42 and the unbalances. If a matrix P(s), linear in the
+shared numbers s, is positive semidefinite, so is
 
     [1 V]' P(s) [1 V],    V = [Re y, Im y]                                              (E43)
 
@@ -20,23 +20,23 @@ from laufruhe.extensions.mount_relaxation.response import Response, product
 from laufruhe.numerics.arrays import Array, ComplexArray
 
 ROUNDING = 1e-13
-"""Share of terms that cancel, which is allowed for their rounding."""
+"""Relative slack of constraints, for the rounding of terms that cancel."""
 
 
 @dataclass(frozen=True, eq=False)
 class MomentConstraint:
-    """A matrix that is linear in s and M, and positive semidefinite.
+    """Matrix, linear in s and M, that is positive semidefinite.
 
     Attributes
     ----------
     order
         Number of the order.
     constant
-        Shape (p, p).
+        Matrix at s = 0 and M = 0, shape (p, p).
     slopes
-        By s, shape (numbers, p, p).
+        Slopes by s, shape (numbers, p, p).
     moments
-        Coefficients of M in every entry, shape (p, p, d, d).
+        Coefficients of M in each entry, shape (p, p, d, d).
     """
 
     order: int
@@ -46,25 +46,25 @@ class MomentConstraint:
 
     @property
     def size(self) -> int:
-        """Return p."""
+        """Rows p of the matrix."""
         return len(self.moments)
 
 
 def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentConstraint]:
-    """Return all constraints of one order, numbered 0."""
+    """Return all constraints on the moments of one order, which has the number 0."""
     numbers, constraints = mounts.numbers, list[MomentConstraint]()
-    for spring, (deflection, added) in zip(mounts.springs, response.springs, strict=True):
-        constraints += _spring_constraints(numbers, spring, deflection, added)
-    for place, (loads, moved) in zip(mounts.places, response.places, strict=True):
-        constraints += _place_constraints(numbers, place, loads, moved)
-    unit, still = mounts.highest, mounts.still
-    # A - L and U - A; where places move, only in motions that these do not touch
+    for spring, (deflection, force) in zip(mounts.springs, response.springs, strict=True):
+        constraints += _spring_constraints(numbers, spring, deflection, force)
+    for place, (loads, shifted) in zip(mounts.places, response.places, strict=True):
+        constraints += _place_constraints(numbers, place, loads, shifted)
+    unit, unturned_motions = mounts.highest, mounts.unturned_motions
+    # A - L and U - A; where places are open, only in motions without turns about them
     for sign, matrix in _stiffness_limits(mounts):
-        pressed = sign * (response.carried - matrix @ response.motion) / unit
+        image = sign * (response.carried - matrix @ response.motion) / unit
         constant, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
-        constraint = product_constraint(constant, slopes, response.motion, pressed)
-        constraints.append(_restricted(constraint, still) if mounts.places else constraint)
-    # (A - a)(A - b) is semidefinite where no eigenvalue is between, and so is (A - a)(b - A) where all are (E53)
+        constraint = product_constraint(constant, slopes, response.motion, image)
+        constraints.append(_restricted(constraint, unturned_motions) if mounts.places else constraint)
+    # (A - a)(A - b) is semidefinite if no eigenvalue lies between a and b; (A - a)(b - A), if all do (E53)
     minimum = max(mounts.lowest, 0.0)
     pairs = [(response.carried - a * response.motion, response.carried - b * response.motion) for a, b in mounts.bands]
     pairs.append((response.carried - minimum * response.motion, unit * response.motion - response.carried))
@@ -73,23 +73,23 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
 
 
 def _spring_constraints(
-    numbers: int, spring: SpringTerm, deflection: ComplexArray, added: ComplexArray
+    numbers: int, spring: SpringTerm, deflection: ComplexArray, force: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return that an open stiffness lies between its bounds, and so does its product (E53)."""
+    """Return the constraints that an open stiffness, and its product, lie between their bounds (E53)."""
     slopes = spring.slopes(numbers) / spring.size
     constraints = [
         product_constraint(
-            constant / spring.size, sign * slopes, deflection, (constant @ deflection + sign * added) / spring.size
+            constant / spring.size, sign * slopes, deflection, (constant @ deflection + sign * force) / spring.size
         )
         for constant, sign in spring.sides
     ]
-    for low, high in spring.spans:
-        first, second = (low @ deflection + added) / spring.size, (high @ deflection - added) / spring.size
+    for below, above in spring.spans:
+        first, second = (below @ deflection + force) / spring.size, (above @ deflection - force) / spring.size
         if len(deflection) > 1:
             moments = product(first, second)[None, None]
         else:
-            # real and imaginary parts each by each
-            rows = [np.concatenate([each.real, each.imag]) for each in (first, second)]
+            # products of real and imaginary parts, pair by pair
+            rows = [np.concatenate([part.real, part.imag]) for part in (first, second)]
             moments = _symmetrised(np.einsum("ax,by->abxy", *rows))
         size = float(np.linalg.norm(first) * np.linalg.norm(second))
         constraints.append(_of_moments(numbers, moments, size))
@@ -101,57 +101,59 @@ def _symmetrised(products: Array) -> Array:
     return np.asarray(0.25 * (products + products.transpose(0, 1, 3, 2)))
 
 
-def _of_moments(numbers: int, moments: Array, terms: float) -> MomentConstraint:
+def _of_moments(numbers: int, moments: Array, scale: float) -> MomentConstraint:
     count, size = len(moments), float(np.abs(moments).max()) or 1.0
-    relaxed = min(ROUNDING * terms / size, 1.0) * np.eye(count)
-    return MomentConstraint(0, relaxed, np.zeros((numbers, count, count)), moments / size)
+    slack = min(ROUNDING * scale / size, 1.0) * np.eye(count)
+    return MomentConstraint(0, slack, np.zeros((numbers, count, count)), moments / size)
 
 
-def product_constraint(constant: Array, slopes: Array, y: ComplexArray, pressed: ComplexArray) -> MomentConstraint:
-    """Return E43 of P = constant + sum s_j slopes_j.
+def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: ComplexArray) -> MomentConstraint:
+    """Return constraint E43 for P = constant + sum s_j slopes_j.
 
     Parameters
     ----------
-    y, pressed
-        y and P y as functions of (1, v), shape (p, d) each.
+    constant, slopes
+        Shapes (p, p) and (numbers, p, p).
+    y, image
+        Coefficients of (1, v) in y and in P y, shape (p, d) each.
     """
     p, d = y.shape
     size = float(np.abs(y).max()) or 1.0
-    parts = [(part(y) / size, part(pressed) / size) for part in (np.real, np.imag)]
+    parts = [(part(y) / size, part(image) / size) for part in (np.real, np.imag)]
     moments = np.zeros((p + 2, p + 2, d, d))
     for k, (first, first_pressed) in enumerate(parts):
         moments[:p, p + k, 0] += 0.5 * first_pressed
         moments[:p, p + k, :, 0] += 0.5 * first_pressed
         moments[p + k, :p] = moments[:p, p + k]
-        for other, (second, second_pressed) in enumerate(parts):
-            twice = first.T @ second_pressed + second.T @ first_pressed
-            moments[p + k, p + other] = 0.25 * (twice + twice.T)
+        for column, (second, second_pressed) in enumerate(parts):
+            products = first.T @ second_pressed + second.T @ first_pressed
+            moments[p + k, p + column] = 0.25 * (products + products.T)
     return MomentConstraint(0, _padded(constant, 2), _padded(slopes, 2), moments)
 
 
 def _place_constraints(
-    numbers: int, place: PlaceTerm, loads: ComplexArray, moved: ComplexArray
+    numbers: int, place: PlaceTerm, loads: ComplexArray, shifted: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return 1 + s and 1 - s, bordered by all turns and moments that s multiplies (E52)."""
+    """Return 1 + s and 1 - s, bordered by the turns and moments that s multiplies, as constraints (E52)."""
     size = np.abs(loads).max(axis=1, keepdims=True)
     size = np.where(size > 0.0, size, 1.0)
-    plain, rows = (np.concatenate([each.real, each.imag]) for each in (loads / size, moved / size))
+    plain, products = (np.concatenate([part.real, part.imag]) for part in (loads / size, shifted / size))
     count, d = plain.shape
     constraints = []
     for sign in (1.0, -1.0):
         slopes = np.zeros((numbers, 1, 1))
         slopes[place.number] = sign
-        pressed = plain + sign * rows
+        border = plain + sign * products
         moments = np.zeros((1 + count, 1 + count, d, d))
-        moments[0, 1:, 0] += 0.5 * pressed
-        moments[0, 1:, :, 0] += 0.5 * pressed
+        moments[0, 1:, 0] += 0.5 * border
+        moments[0, 1:, :, 0] += 0.5 * border
         moments[1:, 0] = moments[0, 1:]
-        moments[1:, 1:] = _symmetrised(np.einsum("ax,by->abxy", plain, pressed))
+        moments[1:, 1:] = _symmetrised(np.einsum("ax,by->abxy", plain, border))
         constraints.append(MomentConstraint(0, _padded(np.eye(1), count), _padded(slopes, count), moments))
-    squares = [np.einsum("ax,by->abxy", each, each) for each in (plain, rows)]
-    left = squares[0] - squares[1]
-    terms = float(np.square(plain).sum() + np.square(rows).sum())
-    return [*constraints, _of_moments(numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)), terms)]
+    squares = [np.einsum("ax,by->abxy", part, part) for part in (plain, products)]
+    difference = squares[0] - squares[1]
+    scale = float(np.square(plain).sum() + np.square(products).sum())
+    return [*constraints, _of_moments(numbers, 0.5 * (difference + difference.transpose(0, 1, 3, 2)), scale)]
 
 
 def _stiffness_limits(mounts: OpenMounts) -> list[tuple[float, Array]]:
@@ -159,13 +161,15 @@ def _stiffness_limits(mounts: OpenMounts) -> list[tuple[float, Array]]:
 
 
 def stiffness_constraints(mounts: OpenMounts, size: int) -> list[MomentConstraint]:
-    """Return A - L and U - A in motions of no order, with moments of a size that they do not depend on."""
-    unit, still, constraints = mounts.highest, mounts.still, []
+    """Return A - L and U - A in motions without orders, for moments of shape (size, size)."""
+    unit, unturned_motions, constraints = mounts.highest, mounts.unturned_motions, []
     for sign, matrix in _stiffness_limits(mounts):
-        constant, slopes = (still.T @ part @ still / unit for part in (mounts.middle - matrix, mounts.slopes))
-        none = np.zeros((len(constant), len(constant), size, size))
-        constraints.append(MomentConstraint(0, sign * constant, sign * slopes, none))
-    return constraints if still.size else []
+        constant, slopes = (
+            unturned_motions.T @ part @ unturned_motions / unit for part in (mounts.middle - matrix, mounts.slopes)
+        )
+        no_moments = np.zeros((len(constant), len(constant), size, size))
+        constraints.append(MomentConstraint(0, sign * constant, sign * slopes, no_moments))
+    return constraints if unturned_motions.size else []
 
 
 def _restricted(constraint: MomentConstraint, motions: Array) -> MomentConstraint:

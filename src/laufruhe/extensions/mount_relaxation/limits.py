@@ -1,7 +1,7 @@
-"""Limits of forces, travel and transmissibility of a running engine, beside the objective (E61).
+"""Limits of norms of force and travel, and of transmissibility, in the relaxation (E61).
 
-A norm that is limited is at least its epigraph variables (E45, E54), which then have upper bounds. Transmissibility of
-an order is one inequality between the squares of its forces, and of those at rest under the same load.
+A norm is at least its epigraph variables (E45, E54), so that its limit bounds them above. Transmissibility of an order
+is an inequality between the squares of its forces and of the forces at rest under the same load.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK
 
-# share of a limit from which the best design counts as near to it
+# a limit enters only if the best design has more than this share of it
 NEAR_LIMIT = 0.7
 UNBOUNDED = ResponseBound((), math.inf, False)
 
 Stated = tuple[Response, list[MomentConstraint]]
-"""The response to an order, and the constraints on its moments."""
+"""Response to an order, and the constraints on its moments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class NormLimit:
 
 @dataclass(frozen=True, eq=False)
 class RatioLimit:
-    """Upper bound of the root of squares of forces of some orders, over that at rest."""
+    """Upper bound of the root sum of squares of forces in some orders, over the same at rest."""
 
     orders: tuple[Order, ...]
     upper: float
@@ -59,7 +59,19 @@ class RatioLimit:
 
 @dataclass(eq=False)
 class LimitTerms:
-    """Responses of limits that the objective does not have, and the constraints of limits."""
+    """Terms that limits add to a program.
+
+    Attributes
+    ----------
+    responses
+        Responses to orders that the objective lacks.
+    constraints
+        Constraints on the moments of these orders.
+    quadratics, uppers
+        Quadratic bounds of further epigraph variables, and the upper bounds of these variables.
+    linear
+        Limits of transmissibility.
+    """
 
     responses: list[Response] = field(default_factory=list)
     constraints: list[MomentConstraint] = field(default_factory=list)
@@ -70,37 +82,39 @@ class LimitTerms:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """Limits that count."""
+    """Limits that the best design comes near."""
 
     norms: tuple[NormLimit, ...]
     ratios: tuple[RatioLimit, ...]
 
     @property
     def loads(self) -> list[ComplexArray]:
-        """Return the loads per column of the unbalances of all orders."""
+        """Loads of all orders per column of the unbalances, shape (columns, k) each."""
         orders = [order for limit in self.norms for order in limit.query.orders]
         orders += [order for limit in self.ratios for order in limit.orders]
         return [order.loads[1:] for order in orders]
 
     def in_basis(self, basis: Array, parts: Sequence[OpenMounts]) -> Limits:
-        """Return the limits with columns of unbalances that are sums of their own, shape (fewer, columns)."""
+        """Return the limits in another basis of the unbalances, `basis` of shape (fewer, columns)."""
         norms = []
         for limit in self.norms:
             query = limit.query.in_basis(basis)
             norms.append(NormLimit(query, tuple(epigraph_variables(query, parts)), limit.upper))
-        ratios = (RatioLimit(tuple(order.in_basis(basis) for order in r.orders), r.upper) for r in self.ratios)
+        ratios = (
+            RatioLimit(tuple(order.in_basis(basis) for order in ratio.orders), ratio.upper) for ratio in self.ratios
+        )
         return Limits(tuple(norms), tuple(ratios))
 
     def terms(
         self, variables: Sequence[EpigraphVariable], state: Callable[[Order, ResponseBound], Stated],
         responses: Sequence[Response],
     ) -> LimitTerms:  # fmt: skip
-        """Return what limits add to a program.
+        """Return the terms that limits add to a program.
 
         Parameters
         ----------
         variables, responses
-            Of the objective so far, with the responses to its orders.
+            Epigraph variables of the objective, and the responses to their orders.
         state
             Return the response to an order, and the constraints on its moments.
         """
@@ -118,23 +132,25 @@ class Limits:
 
         for limit in self.norms:
             for variable in limit.variables:
-                at = [number(order, limit.query.bound(order, variable, limit.upper)) for order in variable.orders]
-                own = [all_responses[k] for k in at]
-                terms.quadratics += variable.quadratic_bounds(len(variables) + len(terms.uppers), limit.query, own, at)
+                numbers = [number(order, limit.query.bound(order, variable, limit.upper)) for order in variable.orders]
+                norm_responses = [all_responses[k] for k in numbers]
+                terms.quadratics += variable.quadratic_bounds(
+                    len(variables) + len(terms.uppers), limit.query, norm_responses, numbers
+                )
                 terms.uppers.append((variable.root_bound(limit.upper / variable.share) / variable.unit) ** 2)
         for ratio in self.ratios:
             moving = [number(order, UNBOUNDED) for order in ratio.orders]
-            still = [number(replace(order, omega=0.0), UNBOUNDED) for order in ratio.orders]
-            forces = {k: all_responses[k].forces * all_responses[k].unit for k in (*moving, *still)}
+            resting = [number(replace(order, omega=0.0), UNBOUNDED) for order in ratio.orders]
+            forces = {k: all_responses[k].forces * all_responses[k].unit for k in (*moving, *resting)}
             size = max(float(np.linalg.norm(force[..., 0])) for force in forces.values()) or 1.0
             matrices = [(k, squared(forces[k] / size)) for k in moving]
-            matrices += [(k, -(ratio.upper**2) * squared(forces[k] / size)) for k in still]
+            matrices += [(k, -(ratio.upper**2) * squared(forces[k] / size)) for k in resting]
             terms.linear.append(LinearLimit(tuple(matrices), 0.0))
         return terms
 
 
 def _key(order: Order) -> tuple[int, int, int, bool]:
-    return order.point, order.place, order.part, order.omega > 0.0
+    return order.point, order.index, order.part, order.omega > 0.0
 
 
 def limits_of(
@@ -147,8 +163,10 @@ def limits_of(
     ----------
     known
         The best design.
-    in_parts, of_all_motions
-        Return the orders of a measure, by symmetric parts of the motions if there are such, and of all motions (E57).
+    in_parts
+        Return the orders of a measure, each in the symmetric parts of the motions if there are such (E57).
+    of_all_motions
+        Return the orders of a measure in all motions.
     """
     norms: list[NormLimit] = []
     for limit in problem.limits:

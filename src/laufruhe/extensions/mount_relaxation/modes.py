@@ -1,9 +1,9 @@
-"""Natural modes that limits ask for, beside the orders of a relaxation (E56).
+"""Natural modes required by limits of decoupling (E56).
 
-A motion has a mode of its own where some v with A v = l v has a' v b' v >= s |v|^2, a and b its parts of displacement
-and of momentum (E7). Scaled so that b' v = 1, that is a ball, v = V (1, w) with |w| <= 1. For a given v all designs
-that have it are convex, because A(s) v = l v is linear in s and l. So boxes are divided over w as well as over the
-mounts. On a box the moments Z = (1, w)(1, w)', Z_j = s_j Z stand for all designs,
+A motion has a mode of its own if some v with A v = l v has a' v b' v >= s |v|^2, where a and b are its displacement and
+momentum (E7). Scaled to b' v = 1, these v are a ball: v = V (1, w) with |w| <= 1. For a fixed v all designs that have
+this mode are convex, because A(s) v = l v is linear in s and l. So boxes are divided over w as well as over the mounts.
+On a box the moments Z = (1, w)(1, w)', Z_j = s_j Z stand for all designs,
 
     V^-1 (A_c V Z + sum H_j V Z_j) = l Z,    symmetric, between least and largest square, Z + Z_j, Z - Z_j >= 0   (E56)
 """
@@ -22,9 +22,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK
 
 OF_SHARES = frozenset({DECOUPLING})
-"""Channels of the energy shares of motions in modes."""
+"""Channels that measure energy shares of motions in modes."""
 
-# least square of the radius of a ball, as a share of that of its middle
+# smallest squared radius of the ball of modes, over the squared length of its centre
 NO_SIZE = 1e-8
 
 
@@ -35,9 +35,11 @@ class ModeConstraints:
     Attributes
     ----------
     matrices
-        Tensors T: sum of T_m Z_m is positive semidefinite, shape (1 + numbers, p, p, d, d) each.
-    sides, equal
-        Matrices C: sum of <C_m, Z_m> is at least zero, or is zero, shape (n, 1 + numbers, d, d).
+        Tensors T with sum of T_m Z_m positive semidefinite, shape (1 + numbers, p, p, d, d) each.
+    sides
+        Matrices C with sum of <C_m, Z_m> >= 0, shape (n, 1 + numbers, d, d).
+    equal
+        Matrices C with sum of <C_m, Z_m> = 0, shape (n, 1 + numbers, d, d).
     """
 
     matrices: tuple[Array, ...]
@@ -46,7 +48,7 @@ class ModeConstraints:
 
 
 def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
-    """Return V of every motion with a limit of decoupling, shape (6, 6); none where places of mounts are open."""
+    """Return V of each motion with a limit of decoupling, shape (6, 6) each; () if places of mounts are open."""
     if mounts.places:
         return ()
     shares: dict[int, float] = {}
@@ -58,23 +60,23 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
 
 
 def mode_basis(root: Array, motion: int, share: float) -> Array:
-    """Return V of the ball |v - a / 2 s| <= |a| / 2 s where b' v = 1, in coordinates in which the mass is one."""
+    """Return V of the ball |v - a / 2 s| <= |a| / 2 s, b' v = 1, in coordinates of unit mass, shape (6, 6)."""
     displacement, momentum = root[:, motion], np.linalg.inv(root)[motion]
     length = float(momentum @ momentum)
     middle = displacement / (2.0 * share) + momentum * (1.0 - 0.5 / share) / length
-    reach = float(displacement @ displacement) / (4.0 * share**2) - (1.0 - 0.5 / share) ** 2 / length
+    squared_radius = float(displacement @ displacement) / (4.0 * share**2) - (1.0 - 0.5 / share) ** 2 / length
     across = np.linalg.svd(momentum[None])[2][1:].T
-    # a ball of no size would leave V singular
-    size = math.sqrt(max(reach, NO_SIZE * float(middle @ middle)))
-    return np.column_stack([middle, size * across])
+    # a radius of zero would make V singular
+    radius = math.sqrt(max(squared_radius, NO_SIZE * float(middle @ middle)))
+    return np.column_stack([middle, radius * across])
 
 
 def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Array) -> ModeConstraints:
-    """Return the constraints of a mode on a box of mounts, with w between `lower` and `upper`, shape (5,) each."""
+    """Return the constraints of a mode on a box of mounts, for `lower` <= w <= `upper`, shape (5,) each."""
     inverse, count, d = np.linalg.inv(basis), mounts.numbers, 6
     unit = float(np.linalg.norm(mounts.middle, 2))
     stiffness = inverse @ (np.array([mounts.middle, *mounts.slopes]) / unit) @ basis
-    # the entries (a, b) of V^-1 A V Z by those of Z
+    # coefficients of Z in the entries (a, b) of V^-1 A V Z
     entry = np.einsum("max,by->mabxy", stiffness, np.eye(d))
     entry = 0.5 * (entry + entry.transpose(0, 1, 2, 4, 3))
     identity = np.einsum("ax,by->abxy", np.eye(d), np.eye(d))
@@ -98,7 +100,7 @@ def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Arra
         side = np.zeros((1 + count, d, d))
         side[0] = matrix
         if not count:
-            # on a box of no width, where no Z_j says it
+            # a box without width has no Z_j that implies the side
             sides.append(side)
         for j in range(1, 1 + count):
             for sign in (1.0, -1.0):

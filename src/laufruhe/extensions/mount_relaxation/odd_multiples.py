@@ -1,9 +1,9 @@
-"""A mean over operating points as a sum of roots, odd multiples of their orders taken off (E54, E58, E62).
+"""Lower bound of a mean over operating points as a sum of roots, less odd multiples of their orders (E54, E58, E62).
 
-With one loss factor eta and A <= a < W^2, the work of the springs is y* A y <= r* A r / (W^2 - a)^2, mode by mode. A
-spring's force is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any t > 0, and traces and r* A r are
-linear in s. Of a mass that is free, y0 = r / W^2, every entry of K u0 is linear in s and lies under a chord on a box;
-what springs change has (y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 - a))^2 r* A r / W^4.
+With one loss factor eta and A <= a < W^2, the work of the springs is y* A y <= r* A r / (W^2 - a)^2, mode by mode. The
+force of a spring is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any t > 0; traces and r* A r are
+linear in s. For a free mass y0 = r / W^2, so that each entry of K u0 is linear in s and lies below a chord on a box.
+The change by springs has (y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 - a))^2 r* A r / W^4.
 """
 
 from __future__ import annotations
@@ -23,12 +23,16 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 
 @dataclass(frozen=True, eq=False)
 class LinearUpperBound:
-    """A number is at most constant + slopes' s for all designs of a box, and at most `upper` for those that count.
+    """Upper bound constant + slopes' s for all designs of a box, and upper bound `upper` for better designs alone.
 
     Attributes
     ----------
+    constant, slopes
+        Coefficients of s, slopes of shape (numbers,).
+    upper
+        Upper bound over better designs.
     near
-        Of the linear bound at the best design, or at one next to it in the box.
+        Linear bound at the design of the box nearest to the best.
     """
 
     constant: float
@@ -37,23 +41,23 @@ class LinearUpperBound:
     near: float = 0.0
 
     def __add__(self, other: LinearUpperBound) -> LinearUpperBound:
-        """Return the bound of the sum of both numbers."""
+        """Return the bound of the sum of two numbers."""
         return LinearUpperBound(
             self.constant + other.constant, self.slopes + other.slopes, self.upper + other.upper, self.near + other.near
         )
 
     @property
     def largest(self) -> float:
-        """Return the bound over all s."""
+        """Upper bound over all s."""
         return min(self.constant + float(np.abs(self.slopes).sum()), self.upper)
 
     @property
-    def better(self) -> LinearUpperBound:
-        """Return the linear bound, or the constant one if that is less at the best design."""
+    def tighter(self) -> LinearUpperBound:
+        """The linear bound, or the constant one if it is smaller at the best design."""
         return self if self.near < self.upper else constant_bound(self.upper, self.slopes)
 
     def times(self, factor: float) -> LinearUpperBound:
-        """Return the bound of a multiple with a factor of at least zero."""
+        """Return the bound of a multiple; `factor` is not negative."""
         upper = factor * self.upper if factor else 0.0
         return LinearUpperBound(factor * self.constant, factor * self.slopes, upper, factor * self.near)
 
@@ -65,14 +69,16 @@ def constant_bound(upper: float, slopes: Array) -> LinearUpperBound:
 
 @dataclass(frozen=True, eq=False)
 class HighOrder:
-    """Forces of springs of one loss factor in an order above all natural frequencies.
+    """Forces of springs of one loss factor, in an order above all natural frequencies.
 
     Attributes
     ----------
     load
         r, shape (k,).
+    omega
+        Angular frequency [rad/s].
     near
-        s of a design at which the bounds should be close.
+        s of a design at which the bounds are tight, shape (numbers,).
     """
 
     mounts: OpenMounts
@@ -82,10 +88,10 @@ class HighOrder:
 
     @property
     def is_above(self) -> bool:
-        """Return whether the order is above all natural frequencies, and springs have one loss factor and no more."""
+        """True if the order is above all natural frequencies, and damping is one loss factor alone."""
         mounts = self.mounts
-        more = mounts.dynamic or np.any(mounts.dampers) or np.any(mounts.lags)
-        return self._distance > 0.0 and not more and not np.any(mounts.losses != mounts.losses[0])
+        has_other_damping = mounts.dynamic or np.any(mounts.dampers) or np.any(mounts.lags)
+        return self._distance > 0.0 and not has_other_damping and not np.any(mounts.losses != mounts.losses[0])
 
     @property
     def _distance(self) -> float:
@@ -97,30 +103,32 @@ class HighOrder:
 
     @property
     def bound(self) -> LinearUpperBound | None:
-        """Return the bound of the sum of force amplitudes over all mounts of the problem; None where there is none."""
-        counts = (self.mounts.times**2)[self.mounts.stands]
+        """Upper bound of the sum of force amplitudes over all mounts of the problem [N]; None without one."""
+        counts = (self.mounts.times**2)[self.mounts.spring_mounts]
         traces = linear_sum(self.mounts, counts[:, None, None] * np.eye(3), self.near)
         weights = np.array([work_weight(self.mounts, m, self.load) for m in range(len(self.mounts.motions))])
         work = linear_sum(self.mounts, weights, self.near)
-        # the root of the product of traces and work, under their weighted mean
-        sizes = [max(each.near, 1e-9 * each.largest) for each in (traces, work)]
+        # the root of traces times work is at most their weighted mean
+        sizes = [max(bound.near, 1e-9 * bound.largest) for bound in (traces, work)]
         if min(sizes) <= 0.0:
             return None
-        t = math.sqrt(sizes[1] / sizes[0])
-        by_work = traces.times(0.5 * t) + work.times(0.5 / t)
-        changed = by_work.times(self._turning**2 * self.mounts.highest / self._distance / self.omega**2)
-        none = LinearUpperBound(0.0, np.zeros(self.mounts.numbers), 0.0)
-        free = sum((chord.bound(self.near) for chord in self.chords), none)
-        return min(by_work.times(self._turning / self._distance), free + changed, key=lambda each: each.near)
+        ratio = math.sqrt(sizes[1] / sizes[0])
+        by_work = traces.times(0.5 * ratio) + work.times(0.5 / ratio)
+        spring_change = by_work.times(self._turning**2 * self.mounts.highest / self._distance / self.omega**2)
+        zero = LinearUpperBound(0.0, np.zeros(self.mounts.numbers), 0.0)
+        free_mass = sum((chord.bound(self.near) for chord in self.chords), zero)
+        return min(
+            by_work.times(self._turning / self._distance), free_mass + spring_change, key=lambda bound: bound.near
+        )
 
     @cached_property
     def chords(self) -> list[Chord]:
-        """Return parts of the springs' forces on a mass that is free, along motion and across it."""
+        """Components of spring forces on a free mass, along the motion and across it."""
         load = self.load * np.exp(-0.5j * float(np.angle(np.sum(self.load * self.load))))
         chords = []
         for m in range(len(self.mounts.motions)):
             deflections = [self.mounts.motions[m] @ load, *_place_deflections(self.mounts, m, load)]
-            factor = float(self.mounts.times[self.mounts.stands[m]]) * self._turning / self.omega**2
+            factor = float(self.mounts.times[self.mounts.spring_mounts[m]]) * self._turning / self.omega**2
             for deflection in deflections:
                 for part in (deflection.real, deflection.imag):
                     if not np.any(part):
@@ -132,23 +140,26 @@ class HighOrder:
                         if spring.mount == m:
                             for j, matrix in spring.terms:
                                 slopes[j] += axes @ spring.axes @ matrix @ spring.axes.T @ part
-                    chords += [Chord(factor * float(c), factor * s) for c, s in zip(middle, slopes.T, strict=True)]
+                    chords += [
+                        Chord(factor * float(constant), factor * slope)
+                        for constant, slope in zip(middle, slopes.T, strict=True)
+                    ]
         return chords
 
     def looseness(self, s: Array) -> Array:
-        """Return the excess of the chords over the numbers that they bound, by s."""
+        """Return the excess of the chords over the components at s, shape (numbers,)."""
         return sum((chord.looseness(s) for chord in self.chords), np.zeros(self.mounts.numbers))
 
 
 @dataclass(frozen=True, eq=False)
 class Chord:
-    """|constant + slopes' s| over a box, under the chord between its ends."""
+    """Absolute value |constant + slopes' s| over a box, bounded above by the chord between its ends."""
 
     constant: float
     slopes: Array
 
     def bound(self, near: Array) -> LinearUpperBound:
-        """Return the chord."""
+        """Return the chord; `near` are the numbers s of a design, shape (numbers,)."""
         reach = float(np.abs(self.slopes).sum())
         low, high = self.constant - reach, self.constant + reach
         factor = (abs(high) - abs(low)) / (high - low) if high > low else 0.0
@@ -156,21 +167,21 @@ class Chord:
         return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ near))
 
     def looseness(self, s: Array) -> Array:
-        """Return the excess over the number at s, shared by the change that every s makes."""
+        """Return the excess of the chord at s, shared in proportion to the slopes, shape (numbers,)."""
         reach = np.abs(self.slopes)
-        violation = self.bound(s).near - abs(self.constant + float(self.slopes @ s))
-        return np.asarray(max(violation, 0.0) * reach / max(float(reach.sum()), 1e-300))
+        excess = self.bound(s).near - abs(self.constant + float(self.slopes @ s))
+        return np.asarray(max(excess, 0.0) * reach / max(float(reach.sum()), 1e-300))
 
 
 def _place_deflections(mounts: OpenMounts, m: int, load: ComplexArray) -> list[ComplexArray]:
     return [
-        h * place.arms.T @ (place.aside @ mounts.turns @ load)
-        for place in mounts.places for k, h in place.mounts if k == m
+        reach * place.arms.T @ (place.turn_axes @ mounts.turns @ load)
+        for place in mounts.places for mount, reach in place.mounts if mount == m
     ]  # fmt: skip
 
 
 def linear_sum(mounts: OpenMounts, weights: Array, near: Array) -> LinearUpperBound:
-    """Return the sum of <W, K> over springs, W of shape (springs, 3, 3)."""
+    """Return the bound of sum <W, K> over springs, which is exact; `weights` W of shape (springs, 3, 3)."""
     slopes = np.zeros(mounts.numbers)
     for spring in mounts.springs:
         for j, matrix in spring.terms:
@@ -180,28 +191,32 @@ def linear_sum(mounts: OpenMounts, weights: Array, near: Array) -> LinearUpperBo
 
 
 def work_weight(mounts: OpenMounts, number: int, load: ComplexArray) -> Array:
-    """Return W with r* G' K G r <= <W, K> for a spring, wherever it stands."""
-    moved = _place_deflections(mounts, number, load)
+    """Return W, shape (3, 3), with r* G' K G r <= <W, K> for a spring at any of its open places."""
+    place_deflections = _place_deflections(mounts, number, load)
     deflection = mounts.motions[number] @ load
     weight = np.real(np.outer(deflection, deflection.conj()))
-    if not moved:
+    if not place_deflections:
         return np.asarray(weight)
-    far = sum(float(np.linalg.norm(each)) for each in moved)
-    size = float(np.linalg.norm(mounts.motions[number])) * float(np.linalg.norm(load))
-    stretch = max(far, ALIKE * size) / max(float(np.linalg.norm(deflection)), 1e-300)
-    return np.asarray((1.0 + stretch) * weight + (1.0 + 1.0 / stretch) * far**2 * np.eye(3))
+    place_part = sum(float(np.linalg.norm(part)) for part in place_deflections)
+    scale = float(np.linalg.norm(mounts.motions[number])) * float(np.linalg.norm(load))
+    stretch = max(place_part, ALIKE * scale) / max(float(np.linalg.norm(deflection)), 1e-300)
+    return np.asarray((1.0 + stretch) * weight + (1.0 + 1.0 / stretch) * place_part**2 * np.eye(3))
 
 
 @dataclass(frozen=True, eq=False)
 class MeanBound:
-    """The mean is at least prices' roots + slopes' s + constant, and at least `floor`.
+    """Lower bounds of a mean: prices' roots + slopes' s + constant, and `floor`.
 
     Attributes
     ----------
     prices
-        Of the roots, in their units.
+        Coefficients of the roots in their units.
+    slopes, constant
+        Coefficients of s, shape (numbers,), and constant.
+    floor
+        Bound by the lower bounds of the roots alone.
     lower, upper
-        Bounds of the roots, in their units.
+        Bounds of the roots in their units.
     """
 
     prices: Array
@@ -212,7 +227,7 @@ class MeanBound:
     upper: Array
 
     def limit(self, size: float, norm: float) -> ObjectiveLimit:
-        """Return the limit of designs with a mean that is not over a number, in a unit."""
+        """Return the limit of designs with a mean up to `norm`, in units of `size`."""
         return ObjectiveLimit(self.slopes / size, (norm - self.constant) / size)
 
 
@@ -220,42 +235,51 @@ def mean_bound(
     variables: Sequence[EpigraphVariable], multiples: Sequence[Sequence[LinearUpperBound]], lower: Array, norm: float,
     numbers: int,
 ) -> MeanBound:  # fmt: skip
-    """Return the bound of a mean over the designs in which it is not over `norm`.
+    """Return the bound of a mean over the designs in which it is at most `norm`.
 
     Parameters
     ----------
+    variables
+        Epigraph variables of the mean.
     multiples
-        Bounds of the odd multiples of every variable.
+        Upper bounds of the odd multiples of each variable.
     lower
-        Bounds of the roots.
+        Lower bounds of the roots, shape (variables,).
+    norm
+        Upper bound of the mean.
     numbers
         Count of s.
     """
     shares, units = (np.array([getattr(variable, name) for variable in variables]) for name in ("share", "unit"))
     options = []
     for variable, bounds in zip(variables, multiples, strict=True):
-        # a norm is at least ratio root - what is taken off: by the plain order, and by its cosine
-        own = [(1.0, constant_bound(variable.loss, np.zeros(numbers)), variable.loss)]
+        # options (ratio, loss, largest loss): the norm is at least ratio * root - loss
+        choices = [(1.0, constant_bound(variable.loss, np.zeros(numbers)), variable.loss)]
         if bounds:
             weights = variable.multiple_weights
-            parts = [bound.better.times(weight) for bound, weight in zip(bounds, weights, strict=True)]
+            parts = [bound.tighter.times(weight) for bound, weight in zip(bounds, weights, strict=True)]
             maximum = sum(weight * bound.largest for bound, weight in zip(bounds, weights, strict=True))
             total = sum(parts, LinearUpperBound(0.0, np.zeros(numbers), 0.0))
-            own = [(COSINE / variable.factor, constant_bound(0.0, np.zeros(numbers)), 0.0), (1.0, total, maximum)]
-        options.append(own)
+            choices = [(COSINE / variable.factor, constant_bound(0.0, np.zeros(numbers)), 0.0), (1.0, total, maximum)]
+        options.append(choices)
     norms = np.array([
-        max([0.0, *(ratio * root - limit for ratio, _, limit in own)]) for own, root in zip(options, lower, strict=True)
+        max([0.0, *(ratio * root - largest_loss for ratio, _, largest_loss in choices)])
+        for choices, root in zip(options, lower, strict=True)
     ])  # fmt: skip
     floor = float(shares @ norms)
-    rest = (norm - floor) / shares + norms
+    norm_limits = (norm - floor) / shares + norms
     upper = np.array(
-        [min((r + maximum) / ratio for ratio, _, maximum in own) for own, r in zip(options, rest, strict=True)]
+        [
+            min((norm_limit + maximum) / ratio for ratio, _, maximum in choices)
+            for choices, norm_limit in zip(options, norm_limits, strict=True)
+        ]
     )
-    # the option that shows most of the best design
-    best = [
-        max(own, key=lambda option: option[0] * unit - option[1].near) for own, unit in zip(options, units, strict=True)
+    # the option with the largest bound at the best design
+    chosen = [
+        max(choices, key=lambda option: option[0] * unit - option[1].near)
+        for choices, unit in zip(options, units, strict=True)
     ]
-    ratios = np.array([ratio for ratio, _, _ in best])
-    slopes = -sum((share * taken.slopes for share, (_, taken, _) in zip(shares, best, strict=True)), np.zeros(numbers))
-    constant = -float(sum(share * taken.constant for share, (_, taken, _) in zip(shares, best, strict=True)))
+    ratios = np.array([ratio for ratio, _, _ in chosen])
+    slopes = -sum((share * loss.slopes for share, (_, loss, _) in zip(shares, chosen, strict=True)), np.zeros(numbers))
+    constant = -float(sum(share * loss.constant for share, (_, loss, _) in zip(shares, chosen, strict=True)))
     return MeanBound(shares * units * ratios, slopes, constant, floor, lower / units, np.maximum(upper, lower) / units)

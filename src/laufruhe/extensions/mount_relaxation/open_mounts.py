@@ -1,8 +1,8 @@
 """Open mounts of a box, linear in numbers s from -1 to 1 that all orders share (E42, E52).
 
-An open stiffness along a fixed axis is one number. Where a mount may turn, its stiffness in the plane that turns is a
-matrix of three numbers, in space one of six, between the least and the largest of its own. A place that may move along
-an axis is one number more.
+An open stiffness along a fixed axis is one number s. The stiffness of a mount that may turn is a matrix between the
+smallest and the largest of its stiffnesses: three numbers in a plane, six in space. A place that may move along an axis
+is one more number.
 """
 
 from __future__ import annotations
@@ -33,46 +33,48 @@ from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, T
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK, limited_stiffness, number_ranges
 
-# share of the largest turn that counts as none
+# relative size of a turn that counts as zero
 ALIKE = 1e-12
-# share of a square given to the arms of mounts whose places are open
+# weight in the bound |a + b|^2 <= (1 + STRETCH) |a|^2 + (1 + 1 / STRETCH) |b|^2, b the shift of an open place
 STRETCH = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class OpenMounts:
-    """The springs of all mounts of a box; springs of one place are separate.
+    """Springs of all mounts of a box; several springs of one mount are separate.
 
     Attributes
     ----------
     root
-        Transposed map from motion in coordinates in which the mass is one, shape (k, 6); k is 6 for all motions.
+        Transposed map from motion in coordinates of unit mass, shape (k, 6); k is 6 for all motions.
     motions
-        G at the middle of the box in these coordinates, shape (springs, 3, k).
+        Map G from these coordinates to deflection at the middle of the box, shape (springs, 3, k).
     middles, dampers
-        Stiffness and damping at the middle, shape (springs, 3, 3).
+        Stiffness [N/m] and damping [N s/m] at the middle, shape (springs, 3, 3).
     losses, lags
         Loss factors, and viscous damping over stiffness [s], shape (springs,).
-    stands
-        Number of the mount that each belongs to, shape (springs,).
+    spring_mounts
+        Number of the mount of each spring, shape (springs,).
     members
-        Numbers of the mounts of the problem that every mount stands for, one or two that mirror each other.
+        For each mount, the numbers of the problem's mounts that it represents: one, or two mirror images.
     dynamic
-        Further springs whose stiffness depends on frequency.
+        Further springs with stiffness that depends on frequency.
+    springs, places
+        Open terms of springs and dampers, and open places.
     decisions
-        Decisions that every s follows.
+        For each s, the numbers of the decisions that it follows.
     floors, ceilings
         Lower and upper bounds of the stiffness A by limits (E31, E43), within the tolerance of limits.
     bands
-        Squares of angular frequencies that none stands between.
+        Ranges (a, b) of squared angular frequencies without a natural frequency.
     minimum, maximum
-        Lower and upper bounds of stiffness by the bounds of its numbers, shape (k, k).
-    lossy, lagging, damping
-        Lower bounds of loss, of damping by lag per frequency, and of viscous damping, shape (k, k).
+        Lower and upper bounds of A by the ranges of the open numbers, shape (k, k).
+    loss_floor, lag_floor, damping
+        Lower bounds of hysteretic loss, of damping by lag, and of viscous damping, shape (k, k).
     softest
-        Least stiffness of every spring in any direction, shape (springs,).
+        Smallest stiffness of each spring in any direction [N/m], shape (springs,).
     planes
-        Number and stiffness of every plane in which mounts turn, by its key (E63).
+        Number and stiffness of each plane in which mounts turn, by its key (E63).
     """
 
     root: Array
@@ -81,7 +83,7 @@ class OpenMounts:
     dampers: Array
     losses: Array
     lags: Array
-    stands: NDArray[np.intp]
+    spring_mounts: NDArray[np.intp]
     members: tuple[tuple[int, ...], ...]
     dynamic: DynamicSprings
     springs: tuple[SpringTerm, ...]
@@ -92,117 +94,117 @@ class OpenMounts:
     bands: tuple[tuple[float, float], ...]
     minimum: Array
     maximum: Array
-    lossy: Array
-    lagging: Array
+    loss_floor: Array
+    lag_floor: Array
     damping: Array
     softest: Array
     planes: Mapping[Any, tuple[int, PlaneStiffness]]
 
     @property
     def numbers(self) -> int:
-        """Return the count of s."""
+        """Count of s."""
         return len(self.decisions)
 
     @property
     def size(self) -> int:
-        """Return k."""
+        """Count k of coordinates of the motion."""
         return len(self.root)
 
     @cached_property
     def lowest(self) -> float:
-        """Return a lower bound of the eigenvalues of A."""
-        return max(float(np.linalg.eigvalsh(each)[0]) for each in (self.minimum + self.at_rest, *self.floors))
+        """Lower bound of the eigenvalues of A."""
+        return max(float(np.linalg.eigvalsh(matrix)[0]) for matrix in (self.minimum + self.at_rest, *self.floors))
 
     @cached_property
     def highest(self) -> float:
-        """Return an upper bound of the eigenvalues of A."""
-        return min(float(np.linalg.eigvalsh(each)[-1]) for each in (self.maximum + self.at_rest, *self.ceilings))
+        """Upper bound of the eigenvalues of A."""
+        return min(float(np.linalg.eigvalsh(matrix)[-1]) for matrix in (self.maximum + self.at_rest, *self.ceilings))
 
     @property
     def times(self) -> Array:
-        """Return the ratio of motion and force of every mount to those of one of its members."""
-        return np.sqrt([len(own) for own in self.members])
+        """Ratio of motion and force of each mount to those of one of its members, shape (mounts,)."""
+        return np.sqrt([len(numbers) for numbers in self.members])
 
     @cached_property
-    def straight(self) -> list[int | None]:
-        """Return the open number that every s spans; None where s is one of a matrix."""
-        along = {j for spring in self.springs if spring.axes.shape[1] < 3 for j, _ in spring.terms}
-        along |= {place.number for place in self.places}
-        return [own[0] if j in along else None for j, own in enumerate(self.decisions)]
+    def single_decisions(self) -> list[int | None]:
+        """Index of the open number that each s spans alone; None if s is an entry of a matrix."""
+        single_numbers = {j for spring in self.springs if spring.axes.shape[1] < 3 for j, _ in spring.terms}
+        single_numbers |= {place.number for place in self.places}
+        return [indices[0] if j in single_numbers else None for j, indices in enumerate(self.decisions)]
 
     @property
     def turns(self) -> Array:
-        """Return turns of the block per motion, shape (3, k)."""
+        """Turns of the block per motion, shape (3, k)."""
         return np.asarray(self.root.T[3:])
 
     @cached_property
-    def still(self) -> Array:
-        """Return the motions that move mounts alike wherever these stand, as columns, shape (k, n)."""
-        turns = np.concatenate([np.zeros((1, self.size)), *(place.aside @ self.turns for place in self.places)])
-        _, sizes, across = np.linalg.svd(turns)
-        return np.asarray(across[np.count_nonzero(sizes > ALIKE * max(float(sizes[0]), ALIKE)) :].T)
+    def unturned_motions(self) -> Array:
+        """Motions that move all mounts alike at any of their open places, as columns, shape (k, n)."""
+        turns = np.concatenate([np.zeros((1, self.size)), *(place.turn_axes @ self.turns for place in self.places)])
+        _, sizes, directions = np.linalg.svd(turns)
+        return np.asarray(directions[np.count_nonzero(sizes > ALIKE * max(float(sizes[0]), ALIKE)) :].T)
 
     @cached_property
     def middle(self) -> Array:
-        """Return A where every s is zero, shape (k, k)."""
+        """A at s = 0, shape (k, k)."""
         return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, self.middles, strict=True)) + self.at_rest)
 
     @property
     def at_rest(self) -> Array:
-        """Return the static part of A of springs that depend on frequency, shape (k, k)."""
+        """Static part of A from springs with stiffness that depends on frequency, shape (k, k)."""
         rows = self.dynamic.rows @ self.root.T
         return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(
             self.size, self.size
         )
 
-    def turning(self, omega: float) -> NDArray[np.complex128]:
-        """Return 1 + i (eta + W lag) of every spring; 1 at rest."""
+    def stiffness_factors(self, omega: float) -> NDArray[np.complex128]:
+        """Return 1 + i (eta + W lag) of each spring, shape (springs,); 1 at rest."""
         return np.asarray(1.0 + 1j * (self.losses * (omega > 0.0) + omega * self.lags), dtype=np.complex128)
 
-    def lost(self, omega: float) -> Array:
-        """Return the lower bound of loss, shape (k, k)."""
-        return self.lossy + omega * self.lagging + omega * self.damping
+    def loss_at(self, omega: float) -> Array:
+        """Return a lower bound of the loss matrix at angular frequency `omega`, shape (k, k)."""
+        return self.loss_floor + omega * self.lag_floor + omega * self.damping
 
     @property
     def mounts(self) -> int:
-        """Return the count of mounts."""
+        """Count of mounts."""
         return len(self.members)
 
     @property
     def products(self) -> int:
-        """Return the count of complex products in every order."""
+        """Count of complex products in each order."""
         return sum(len(s.axes.T) for s in self.springs) + sum(place.products for place in self.places)
 
     @cached_property
     def slopes(self) -> Array:
-        """Return the slopes of A by every s without places, shape (numbers, k, k)."""
-        out = np.zeros((self.numbers, self.size, self.size))
+        """Slopes of A by each s without places, shape (numbers, k, k)."""
+        slopes = np.zeros((self.numbers, self.size, self.size))
         for spring in self.springs:
             arms = spring.axes.T @ self.motions[spring.mount]
             for j, matrix in spring.terms:
-                out[j] += spring.elastic * carried(arms, matrix)
-        return out
+                slopes[j] += spring.elastic * carried(arms, matrix)
+        return slopes
 
 
 def is_lifted(problem: Problem) -> bool:
-    """Return whether only numbers that loads are affine in, stiffness, places and inclinations of mounts are open."""
+    """Return True if all open numbers are affine in loads, or stiffness, places or inclinations of mounts."""
     mounts = problem.mount_decisions
-    others = [d for d in problem.decisions if d not in mounts and not d.is_affine]
-    if not mounts or others:
+    unsupported = [decision for decision in problem.decisions if decision not in mounts and not decision.is_affine]
+    if not mounts or unsupported:
         return False
     low, high = number_ranges(problem)
     moved, turned = (np.any(low[:, part] < high[:, part], axis=1) for part in (POSITION, TURNED))
-    still = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
+    are_fixed = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
     springs = every_spring(mounting_in(problem.engine).mounts)
     dynamic = np.array([bool(spring.dynamic) for _, spring in springs])
-    # what depends on frequency does not follow these numbers
+    # springs that depend on frequency must neither move nor turn
     nonlinear = dynamic & (moved | turned)
-    return still and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
+    return are_fixed and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
-def open_mounts(problem: Problem, lower: Array, upper: Array, framed: PlaneFrames | None = None) -> OpenMounts:
-    """Return the mounts of a problem that `is_lifted`, its open numbers between bounds."""
-    mounting, maps = mounting_in(problem.engine), ParameterMaps(problem, lower, upper, framed)
+def open_mounts(problem: Problem, lower: Array, upper: Array, frames: PlaneFrames | None = None) -> OpenMounts:
+    """Return the open mounts of a problem that `is_lifted`, for open numbers between bounds, shape (n,) each."""
+    mounting, maps = mounting_in(problem.engine), ParameterMaps(problem, lower, upper, frames)
     root = mass_root(mounting.block)
     count, centre = len(maps.low), np.array(mounting.block.centre_of_gravity)
     motions = np.array([point_motion(NUMBERS, maps.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
@@ -210,7 +212,7 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, framed: PlaneFrame
     places = maps.places()
     floors, ceilings, bands = limited_stiffness(problem, root)
     # bounds by the ranges of numbers
-    low, high, lossy, lagging, damping = (np.zeros((6, 6)) for _ in range(5))
+    low, high, loss_floor, lag_floor, damping = (np.zeros((6, 6)) for _ in range(5))
     for m, motion in enumerate(motions):
         moved = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
         minimum, maximum = maps.bounds(m, STIFFNESS)
@@ -219,17 +221,18 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, framed: PlaneFrame
             size = float(np.linalg.norm(maximum, 2)) * moved**2
             high += (1.0 + 1.0 / STRETCH) * size * (root[:, 3:] @ root[:, 3:].T)
         else:
-            own = carried(motion, minimum)
-            low += own
-            lossy += float(maps.low[m, LOSS]) * own
-            lagging += float(maps.low[m, LAG]) * own
+            stiffness = carried(motion, minimum)
+            low += stiffness
+            loss_floor += float(maps.low[m, LOSS]) * stiffness
+            lag_floor += float(maps.low[m, LAG]) * stiffness
             damping += carried(motion, maps.bounds(m, DAMPING)[0])
-    stands = [k for k, _ in every_spring(mounting.mounts)]
+    spring_mounts = [k for k, _ in every_spring(mounting.mounts)]
     return OpenMounts(
         root, motions, np.array([total for total, _, _ in springs]), np.array([total for _, total, _ in springs]),
-        maps.low[:, LOSS], maps.low[:, LAG], np.array(stands, dtype=np.intp), tuple((k,) for k in sorted({*stands})),
-        mounting.dynamic, tuple(s for *_, own in springs for s in own), places, maps.numbers.decisions,
+        maps.low[:, LOSS], maps.low[:, LAG], np.array(spring_mounts, dtype=np.intp),
+        tuple((k,) for k in sorted({*spring_mounts})), mounting.dynamic,
+        tuple(term for *_, terms in springs for term in terms), places, maps.numbers.decisions,
         tuple((1.0 - 2.0 * SLACK) * floor for floor in floors),
         tuple((1.0 + SLACK) ** 2 * ceiling for ceiling in ceilings),
-        tuple(bands), low, high, lossy, lagging, damping, maps.low[:, STIFFNESS].min(axis=1), maps.planes,
+        tuple(bands), low, high, loss_floor, lag_floor, damping, maps.low[:, STIFFNESS].min(axis=1), maps.planes,
     )  # fmt: skip

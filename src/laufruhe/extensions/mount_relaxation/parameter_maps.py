@@ -1,19 +1,19 @@
-"""Numbers s that open springs, dampers and places of mounts follow (E42, E52, E63, E66).
+"""Maps from the shared numbers s to springs, dampers and places of mounts (E42, E52, E63, E66).
 
-A mount that turns in a plane has the stiffnesses k1 and k2, b the angle of its first axis from the first of axes that
-do not turn. With p = (k1 + k2) / 2 and d = (k1 - k2) / 2 its matrix is
+A mount that turns in a plane has the stiffnesses k1 and k2; b is the angle of its first axis from the first of axes
+that do not turn. With p = (k1 + k2) / 2 and d = (k1 - k2) / 2 its matrix is
 
     K11 = p + d cos 2b,    K22 = p - d cos 2b,    K12 = d sin 2b.                            (E63)
 
 All three are linear in spring forces, so that boxes of them are divided, in place of stiffnesses and angle.
 
-Dampers of a mount are given along its own axes, so that they turn with it. Where its stiffness is given too, and
-c_i = a + b k_i along all axes that turn, they are in every design
+Dampers of a mount lie along its axes, so that they turn with it. If its stiffness is fixed, and c_i = a + b k_i along
+all axes that turn, each design has
 
     C = a I + b K                                                                           (E66)
 
-along these, and turning changes them by b times the change of stiffness: no number and no product more.
-Otherwise C is a matrix of its own between its least and its largest, with numbers and products of its own, as K is.
+in these axes. Turning then changes C by b times the change of stiffness, without further numbers or products.
+Otherwise C is a matrix between its smallest and its largest value, with numbers and products of its own, like K.
 """
 
 from __future__ import annotations
@@ -33,19 +33,19 @@ from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, T
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import number_ranges
 
-# angle by which a mount is turned to see which of its axes stay [rad]
-ASIDE = 0.3
-STAYS = 1e-9
-# shares of the largest stiffness: least difference along which dampers are fitted, largest width that counts as none
-STEEP, TINY = 1e-3, 1e-6
-# share of the largest stiffness that roundings may take
+# test angle that shows which axes of a mount do not turn [rad], and the difference of axes that counts as none
+TEST_ANGLE = 0.3
+AXIS_TOL = 1e-9
+# shares of the largest stiffness: smallest range over which dampers are fitted, largest range that counts as none
+MIN_RANGE, ZERO_RANGE = 1e-3, 1e-6
+# slack for rounding, as a share of the largest stiffness; rounds of contraction
 ROUNDING = 1e-9
 ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
 class SpringTerm:
-    """The open part of a spring or damper along some axes, its middle left out: the sum of s_j times a matrix.
+    """Open part of a spring or damper along some axes: sum of s_j times a matrix, added to its middle.
 
     Attributes
     ----------
@@ -54,13 +54,13 @@ class SpringTerm:
     axes
         Unit vectors, shape (3, b).
     terms
-        Number j and matrix, shape (b, b) [N/m].
+        Number j and matrix, shape (b, b) [N/m or N s/m].
     sides
-        Matrices C and signs: C + sign times the sum is positive semidefinite.
+        Matrices C and signs: C + sign * sum is positive semidefinite.
     spans
-        Matrices C and D: (C + the sum)(D - the sum) is positive semidefinite.
+        Matrices C and D: (C + sum)(D - sum) is positive semidefinite.
     size
-        Of the sum [N/m, or N s/m].
+        Size of the sum [N/m or N s/m].
     elastic, viscous
         Factors of the sum in stiffness and damping: 1 and b of a spring, 0 and 1 of a damper (E66).
     """
@@ -76,71 +76,71 @@ class SpringTerm:
 
     def slopes(self, numbers: int) -> Array:
         """Return the matrices by s, shape (numbers, b, b)."""
-        out = np.zeros((numbers, *self.terms[0][1].shape))
+        slopes = np.zeros((numbers, *self.terms[0][1].shape))
         for j, matrix in self.terms:
-            out[j] += matrix
-        return out
+            slopes[j] += matrix
+        return slopes
 
     def force_scaled(self, products: ComplexArray, omega: float) -> ComplexArray:
-        """Return products in the size of their forces."""
+        """Return products, shape (b, d), scaled to the size of their forces."""
         return np.asarray(math.hypot(self.elastic, omega * self.viscous) * products, dtype=np.complex128)
 
     @property
     def largest(self) -> float:
-        """Return an upper bound of the norm of the sum."""
+        """Upper bound of the norm of the sum."""
         return float(sum(np.linalg.norm(matrix, 2) for _, matrix in self.terms))
 
 
 @dataclass(frozen=True, eq=False)
 class PlaceTerm:
-    """A place along an axis that moves, by s_j times the reach of each mount.
+    """Open place along an axis: mounts move by s_j times their reach.
 
     Attributes
     ----------
     number
-        j.
+        Index j of s.
     axis
-        Unit vector of C2.
+        Unit vector in the axes of C2, shape (3,).
     mounts
-        Number and reach [m] of each spring that moves, all of one loss.
-    aside
-        Unit vectors across it about which turns count, shape (n, 3).
+        Number and reach [m] of each spring that moves; all have one loss factor.
+    turn_axes
+        Unit vectors across the axis about which turns move the mounts, shape (n, 3).
     is_damped
-        Whether any of these has a damper.
+        True if any of these mounts has a damper.
     """
 
     number: int
     axis: Array
     mounts: tuple[tuple[int, float], ...]
-    aside: Array
+    turn_axes: Array
     is_damped: bool
 
     @property
     def products(self) -> int:
-        """Return the count of complex products: turns, moments of springs without loss, and those of dampers over W."""
-        return (3 if self.is_damped else 2) * len(self.aside)
+        """Count of complex products: turns, moments of springs without loss, and moments of dampers over i W."""
+        return (3 if self.is_damped else 2) * len(self.turn_axes)
 
     def force_scaled(self, products: ComplexArray, omega: float) -> ComplexArray:
-        """Return the moments alone, those of dampers in the size of their forces."""
-        count = len(self.aside)
+        """Return the moments among products, those of dampers scaled to the size of their forces."""
+        count = len(self.turn_axes)
         return np.concatenate([products[count : 2 * count], omega * products[2 * count :]])
 
     @property
     def arms(self) -> Array:
-        """Return the motion of a mount per turn about each axis, and the moment per force, shape (n, 3)."""
-        return np.cross(self.aside, self.axis)
+        """Motion of a mount per turn about each axis, and moment per force, shape (n, 3)."""
+        return np.cross(self.turn_axes, self.axis)
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneFrames:
-    """Axes in which planes are stated, and boxes in them (E63).
+    """Fixed axes in which planes of turning mounts are stated, and boxes of their stiffness (E63).
 
     Attributes
     ----------
     frames
-        Numbers of every spring whose angles these have, shape (springs, 14).
+        Numbers of each spring that fix its axes, shape (springs, 14).
     boxes
-        K11, K22 and K12 by the key of a plane, shape (3, 2) each; None where all is open.
+        Ranges of K11, K22 and K12 by the key of a plane, shape (3, 2) each; None for full ranges.
     """
 
     frames: Array
@@ -148,7 +148,7 @@ class PlaneFrames:
 
 
 class _SharedNumbers:
-    """Numbers s by keys, so that mirrored mounts share theirs."""
+    """Indices of s by keys; mirrored mounts share them."""
 
     def __init__(self) -> None:
         self._known: dict[Any, tuple[int, tuple[int, ...]]] = {}
@@ -162,7 +162,15 @@ class _SharedNumbers:
 
 
 class ParameterMaps:
-    """Maps from s to stiffness, damping and places, one mount after the other."""
+    """Maps from s to stiffness, damping and places of each mount.
+
+    Parameters
+    ----------
+    lower, upper
+        Bounds of the open numbers of mounts, shape (n,) each.
+    framed
+        Axes and boxes of planes; by default the axes at the middle, and full ranges.
+    """
 
     def __init__(self, problem: Problem, lower: Array, upper: Array, framed: PlaneFrames | None = None) -> None:
         self.low, self.high = number_ranges(problem, lower, upper)
@@ -179,110 +187,116 @@ class ParameterMaps:
                 self.drives[drive.mount].setdefault(drive.number, []).append((j, drive.gain))
 
     def middle(self, m: int) -> Array:
-        """Return the middles of all numbers of a spring."""
+        """Return the middles of the ranges of all numbers of a spring, shape (14,)."""
         return np.asarray(0.5 * (self.low[m] + self.high[m]))
 
     def reach(self, m: int) -> Array:
-        """Return half the ranges of all numbers of a spring."""
+        """Return half the ranges of all numbers of a spring, shape (14,)."""
         return np.asarray(0.5 * (self.high[m] - self.low[m]))
 
     def springs(self, m: int) -> tuple[Array, Array, list[SpringTerm]]:
-        """Return stiffness and damping at the middle, shape (3, 3), and the open terms of both (E66)."""
+        """Return stiffness and damping at the middle, shape (3, 3) each, and the open terms of both (E66)."""
         axes, turning = self._turning(m)
-        stay = [i for i in range(3) if i not in turning]
-        stiffness, springs = self._along(m, axes, stay)
-        damping = np.asarray(axes[stay].T @ np.diag(self.low[m, DAMPING][stay]) @ axes[stay])
+        fixed_axes = [i for i in range(3) if i not in turning]
+        stiffness, fixed_terms = self._along(m, axes, fixed_axes)
+        damping = np.asarray(axes[fixed_axes].T @ np.diag(self.low[m, DAMPING][fixed_axes]) @ axes[fixed_axes])
         if not turning:
-            return stiffness, damping, springs
-        added, terms = self._turned(m, axes, turning, STIFFNESS)
-        line, dampers = self._damping_line(m, turning), self.low[m, DAMPING][turning]
-        if line is None:
-            lost, viscous = self._turned(m, axes, turning, DAMPING)
-            terms += [replace(each, elastic=0.0, viscous=1.0) for each in viscous]
+            return stiffness, damping, fixed_terms
+        turned_stiffness, terms = self._turned(m, axes, turning, STIFFNESS)
+        damping_line, dampers = self._damping_line(m, turning), self.low[m, DAMPING][turning]
+        if damping_line is None:
+            turned_damping, viscous = self._turned(m, axes, turning, DAMPING)
+            terms += [replace(term, elastic=0.0, viscous=1.0) for term in viscous]
         else:
             plane = axes[turning].T @ axes[turning]
-            lost = line[0] * plane + line[1] * added
-            terms = [replace(each, viscous=line[1]) for each in terms]
+            turned_damping = damping_line[0] * plane + damping_line[1] * turned_stiffness
+            terms = [replace(term, viscous=damping_line[1]) for term in terms]
             self._bounds[m, DAMPING.start] = damping + dampers.min() * plane, damping + dampers.max() * plane
-        return stiffness + added, damping + lost, [*springs, *terms]
+        return stiffness + turned_stiffness, damping + turned_damping, [*fixed_terms, *terms]
 
     def _turning(self, m: int) -> tuple[Array, list[int]]:
-        """Return own axes, and which of them turn."""
+        """Return the axes of a mount, shape (3, 3), and the indices of those that turn."""
         middle, turned = self.middle(m), self.reach(m)[TURNED] > 0.0
         if np.count_nonzero(turned) == 1:
             middle[TURNED] = self._frames[m, TURNED]
         axes = mount_axes(middle[TURNED])
         if not turned.any():
             return axes, []
-        other = mount_axes(middle[TURNED] + ASIDE * turned)
-        stay = [i for i in range(3) if np.abs(other[i] - axes[i]).max() < STAYS]
-        if np.count_nonzero(turned) > 1 or len(stay) != 1:
+        turned_test_axes = mount_axes(middle[TURNED] + TEST_ANGLE * turned)
+        fixed_axes = [i for i in range(3) if np.abs(turned_test_axes[i] - axes[i]).max() < AXIS_TOL]
+        if np.count_nonzero(turned) > 1 or len(fixed_axes) != 1:
             return np.eye(3), [0, 1, 2]
-        return axes, [i for i in range(3) if i not in stay]
+        return axes, [i for i in range(3) if i not in fixed_axes]
 
     def _damping_line(self, m: int, turning: Sequence[int]) -> tuple[float, float] | None:
-        """Return a and b of E66; None where dampers do not follow stiffness."""
+        """Return a and b of E66, or None if the dampers do not follow stiffness."""
         dampers = self.low[m, DAMPING][turning]
         if np.ptp(dampers) == 0.0:
             return float(dampers[0]), 0.0
-        low, high = (each[m, STIFFNESS][turning] for each in (self.low, self.high))
-        if np.any(low < high) or np.ptp(low) <= STEEP * low.max():
+        low, high = (ranges[m, STIFFNESS][turning] for ranges in (self.low, self.high))
+        if np.any(low < high) or np.ptp(low) <= MIN_RANGE * low.max():
             return None
         ends = [int(np.argmin(low)), int(np.argmax(low))]
         slope = float(np.diff(dampers[ends])[0] / np.diff(low[ends])[0])
-        shift = float(dampers[ends[0]] - slope * low[ends[0]])
-        misfit = float(np.abs(dampers - shift - slope * low).max())
-        return (shift, slope) if misfit <= STAYS * STAYS * float(dampers.max()) else None
+        intercept = float(dampers[ends[0]] - slope * low[ends[0]])
+        misfit = float(np.abs(dampers - intercept - slope * low).max())
+        return (intercept, slope) if misfit <= AXIS_TOL * AXIS_TOL * float(dampers.max()) else None
 
     def _turned(self, m: int, axes: Array, turning: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
-        low, high = (each[m, kind][turning] for each in (self.low, self.high))
+        low, high = (ranges[m, kind][turning] for ranges in (self.low, self.high))
         if float(low.min()) == float(high.max()):
             return np.asarray(low[0] * axes[turning].T @ axes[turning]), []
         return self._in_plane(m, axes, turning, kind) if len(turning) == 2 else self._in_space(m, kind)
 
     def _along(self, m: int, axes: Array, chosen: Sequence[int]) -> tuple[Array, list[SpringTerm]]:
-        # stiffness along axes that stay
+        # stiffness along axes that do not turn
         middle, reach, springs, total = self.middle(m), self.reach(m), [], np.zeros((3, 3))
         for i in chosen:
             total += middle[i] * np.outer(axes[i], axes[i])
             if reach[i] > 0.0:
-                parts = [(j, gain * self.half[j]) for j, gain in self.drives[m][i]]
-                terms = tuple((self.numbers.index(("one", j), [j]), np.array([[h]])) for j, h in parts)
-                side = np.array([[reach[i]]])
-                sides = (side, 1.0), (side, -1.0)
-                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, ((side, side),), float(reach[i])))
+                half_ranges = [(j, gain * self.half[j]) for j, gain in self.drives[m][i]]
+                terms = tuple(
+                    (self.numbers.index(("one", j), [j]), np.array([[half_range]])) for j, half_range in half_ranges
+                )
+                bound = np.array([[reach[i]]])
+                sides = (bound, 1.0), (bound, -1.0)
+                springs.append(SpringTerm(m, axes[i][:, None], terms, sides, ((bound, bound),), float(reach[i])))
         return total, springs
 
     def _in_plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
-        """Return stiffness along two axes that turn about the third, in axes that do not turn (E52, E63)."""
+        """Return stiffness or damping in the plane of two axes that turn, and its terms, in fixed axes (E52, E63)."""
         key, plane, sign = self._plane(m, axes, pair, kind)
         box = plane.full_box if self._boxes is None else self._boxes[key]
-        first = 3 * self.planes.setdefault(key, (len(self.planes), plane))[0]
-        (c1, c2, c3), halves = box.mean(axis=1), 0.5 * (box[:, 1] - box[:, 0])
-        one, two, both = np.diag([1.0, 0.0]), np.diag([0.0, 1.0]), sign * (np.ones((2, 2)) - np.eye(2))
+        first_number = 3 * self.planes.setdefault(key, (len(self.planes), plane))[0]
+        (centre1, centre2, centre3), halves = box.mean(axis=1), 0.5 * (box[:, 1] - box[:, 0])
+        first_entry, second_entry = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
+        off_diagonal = sign * (np.ones((2, 2)) - np.eye(2))
         terms = tuple(
-            (self.numbers.index((k, key), [len(self.half) + first + k]), halves[k] * matrix)
-            for k, matrix in enumerate((one, two, both))
+            (self.numbers.index((k, key), [len(self.half) + first_number + k]), halves[k] * matrix)
+            for k, matrix in enumerate((first_entry, second_entry, off_diagonal))
         )
-        centre = c1 * one + c2 * two + c3 * both
+        centre = centre1 * first_entry + centre2 * second_entry + centre3 * off_diagonal
         low, high = plane.stiffness_range(box)
-        # of a box |K12| <= h3 is under any diag(h3 w, h3 / w)
-        w = math.sqrt((halves[0] + TINY * high) / (halves[1] + TINY * high))
-        near, size = np.diag([halves[0] + w * halves[2], halves[1] + halves[2] / w]), float(halves.max()) or 1.0
-        maximum = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
+        # on a box [[0, K12], [K12, 0]] with |K12| <= h3 lies below diag(h3 w, h3 / w) for any w
+        ratio = math.sqrt((halves[0] + ZERO_RANGE * high) / (halves[1] + ZERO_RANGE * high))
+        box_bound = np.diag([halves[0] + ratio * halves[2], halves[1] + halves[2] / ratio])
+        size = float(halves.max()) or 1.0
+        radius = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
         sides = [(centre - low * np.eye(2), 1.0), (high * np.eye(2) - centre, -1.0)]
         spans = [(sides[0][0], sides[1][0])]
         if self._boxes is not None:
-            sides += [(near, 1.0), (near, -1.0)]
-            spans += [(maximum * np.eye(2), maximum * np.eye(2))]
+            sides += [(box_bound, 1.0), (box_bound, -1.0)]
+            spans += [(radius * np.eye(2), radius * np.eye(2))]
         spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), tuple(spans), size)
-        top = min(high * np.eye(2), centre + near, key=lambda each: float(np.trace(each)))
-        rest = np.delete(axes, pair, axis=0)
-        aside = [
-            float(each[m, kind][np.setdiff1d(range(3), pair)[0]]) * rest.T @ rest for each in (self.low, self.high)
+        upper = min(high * np.eye(2), centre + box_bound, key=lambda matrix: float(np.trace(matrix)))
+        third_axis = np.delete(axes, pair, axis=0)
+        third_axis_terms = [
+            float(ranges[m, kind][np.setdiff1d(range(3), pair)[0]]) * third_axis.T @ third_axis
+            for ranges in (self.low, self.high)
         ]
         self._bounds[m, kind.start] = (
-            axes[pair].T @ (low * np.eye(2)) @ axes[pair] + aside[0], axes[pair].T @ top @ axes[pair] + aside[1]
+            axes[pair].T @ (low * np.eye(2)) @ axes[pair] + third_axis_terms[0],
+            axes[pair].T @ upper @ axes[pair] + third_axis_terms[1]
         )  # fmt: skip
         return np.asarray(axes[pair].T @ centre @ axes[pair]), [spring]
 
@@ -291,21 +305,24 @@ class ParameterMaps:
         number = kind.start + np.array(pair)
         turns = [(k, j, gain) for k in range(TURNED.start, TURNED.stop) for j, gain in self.drives[m].get(k, [])]
         axis, _, gain = turns[0]
-        # a plane that several numbers turn is shared with no other mount
+        # mounts share a plane only if a single number turns it
         turned = tuple((k, j, abs(gain)) for k, j, gain in turns) if len(turns) == 1 else (m, *turns)
         drives = [drive for k in number for drive in self.drives[m].get(int(k), [])]
         side = math.copysign(1.0, gain)
-        angles = sorted(side * (float(each[m, axis]) - float(self._frames[m, axis])) for each in (self.low, self.high))
-        ahead = self._frames[m, TURNED].copy()
-        ahead[axis - TURNED.start] += side * ASIDE
-        sign = math.copysign(1.0, float(mount_axes(ahead)[pair[0]] @ axes[pair[1]]))
+        angles = sorted(
+            side * (float(values[m, axis]) - float(self._frames[m, axis])) for values in (self.low, self.high)
+        )
+        turned_angles = self._frames[m, TURNED].copy()
+        turned_angles[axis - TURNED.start] += side * TEST_ANGLE
+        sign = math.copysign(1.0, float(mount_axes(turned_angles)[pair[0]] @ axes[pair[1]]))
         start = (*self.start[m, number], side * (self.start[m, axis] - self._frames[m, axis]))
-        key = (kind.start, tuple(drives), turned, tuple(round(float(each), 9) for each in start))
-        near = self._frames[m, number]
-        return key, PlaneStiffness(self.low[m, number], self.high[m, number], (angles[0], angles[1]), near), sign
+        key = (kind.start, tuple(drives), turned, tuple(round(float(entry), 9) for entry in start))
+        near_stiffness = self._frames[m, number]
+        plane = PlaneStiffness(self.low[m, number], self.high[m, number], (angles[0], angles[1]), near_stiffness)
+        return key, plane, sign
 
     def _in_space(self, m: int, kind: slice) -> tuple[Array, list[SpringTerm]]:
-        # matrix of six numbers between the least and the largest of its own
+        # matrix of six numbers between the smallest and the largest value
         low, high = float(self.low[m, kind].min()), float(self.high[m, kind].max())
         half, decisions = 0.5 * (high - low), sorted({j for drives in self.drives[m].values() for j, _ in drives})
         terms = []
@@ -328,7 +345,7 @@ class ParameterMaps:
         return np.asarray(axes.T @ np.diag(low) @ axes), np.asarray(axes.T @ np.diag(high) @ axes)
 
     def places(self) -> tuple[PlaceTerm, ...]:
-        """Return the places that move, by decision, axis and loss."""
+        """Return the open places, grouped by decision, axis, loss factor and lag."""
         groups: dict[tuple[int, int, float, float], list[tuple[int, float]]] = {}
         for m, drives in enumerate(self.drives):
             for k in range(POSITION.start, POSITION.stop):
@@ -345,7 +362,7 @@ class ParameterMaps:
 
 
 def mount_axes(angles: Array) -> Array:
-    """Return the own axes of a mount as rows, shape (3, 3) (E2)."""
+    """Return the axes of a mount as rows, shape (3, 3), from its angles [rad], shape (3,) (E2)."""
     return np.array(turned_axes(NUMBERS, angles.tolist()))
 
 
@@ -356,11 +373,11 @@ class PlaneStiffness:
     Attributes
     ----------
     low, high
-        Of k1 and k2 [N/m].
+        Ranges of k1 and k2 [N/m], shape (2,) each.
     angles
-        Least and largest b [rad].
+        Smallest and largest b [rad].
     near
-        k1 and k2 of the design whose own axes these are [N/m].
+        k1 and k2 of the design that defines the fixed axes [N/m].
     """
 
     low: Array
@@ -370,7 +387,7 @@ class PlaneStiffness:
 
     @property
     def full_box(self) -> Array:
-        """Return least and largest K11, K22 and K12, shape (3, 2)."""
+        """Smallest and largest K11, K22 and K12, shape (3, 2)."""
         (low1, low2), (high1, high2) = self.low, self.high
         doubled = 2.0 * self.angles[0], 2.0 * self.angles[1]
         cosines = _sine_range(doubled[0] + 0.5 * math.pi, doubled[1] + 0.5 * math.pi)
@@ -378,14 +395,14 @@ class PlaneStiffness:
         first = [(low1 * c + low2 * (1.0 - c), high1 * c + high2 * (1.0 - c)) for c in shares]
         second = [(low2 * c + low1 * (1.0 - c), high2 * c + high1 * (1.0 - c)) for c in shares]
         across = [d * s for d in (0.5 * (low1 - high2), 0.5 * (high1 - low2)) for s in _sine_range(*doubled)]
-        ends = [(min(a for a, _ in own), max(b for _, b in own)) for own in (first, second)]
+        ends = [(min(a for a, _ in values), max(b for _, b in values)) for values in (first, second)]
         return np.array([*ends, (min(across), max(across))])
 
     def stiffness_range(self, box: Array) -> tuple[float, float]:
-        """Return the least and the largest of both k1 and k2 on a box."""
+        """Return the smallest and the largest principal stiffness on a box, shape (3, 2) [N/m]."""
         (low1, low2), (high1, high2) = self.low, self.high
         near, _, steep = self._polar(box)
-        # the sign of k1 - k2, where it is the same all over the box
+        # k1 - k2 has one sign on the whole box
         if steep < math.inf and near[0] > 0.0:
             return low2, high1
         if steep < math.inf and near[1] < 0.0:
@@ -402,7 +419,7 @@ class PlaneStiffness:
         return (float(near[0]), float(near[1])), (float(aside[0]), float(aside[1])), steep
 
     def contracted(self, box: Array) -> Array | None:
-        """Return the part of a box that holds all possible matrices in it; None where it holds none."""
+        """Return the part of a box, shape (3, 2), that holds all possible matrices in it; None if none is possible."""
         part, rounding = box.copy(), ROUNDING * float(self.high.max())
         for _ in range(ROUNDS):
             near, aside, steep = self._polar(part)
@@ -426,18 +443,18 @@ def _contract_by_trace(box: Array, low: float, high: float) -> Array:
 
 
 def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
-    """Contract a box to K - low and high - K positive semidefinite."""
+    """Contract a box, shape (3, 2), to matrices K with eigenvalues between low and high."""
     part = box.copy()
-    across = max(box[2, 0], -box[2, 1], 0.0)
-    over, under = box[:2, 1] - low, high - box[:2, 0]
-    if min(over.min(), under.min()) < 0.0:
+    off_diagonal = max(box[2, 0], -box[2, 1], 0.0)
+    above_low, below_high = box[:2, 1] - low, high - box[:2, 0]
+    if min(above_low.min(), below_high.min()) < 0.0:
         part[0] = 1.0, -1.0
         return np.asarray(part * high)
     for k, other in ((0, 1), (1, 0)):
-        minimum = low + (across**2 / over[other] if over[other] > 0.0 else 0.0)
-        maximum = high - (across**2 / under[other] if under[other] > 0.0 else 0.0)
+        minimum = low + (off_diagonal**2 / above_low[other] if above_low[other] > 0.0 else 0.0)
+        maximum = high - (off_diagonal**2 / below_high[other] if below_high[other] > 0.0 else 0.0)
         part[k] = max(box[k, 0], minimum), min(box[k, 1], maximum)
-    reach = math.sqrt(min(over[0] * over[1], under[0] * under[1]))
+    reach = math.sqrt(min(above_low[0] * above_low[1], below_high[0] * below_high[1]))
     part[2] = max(box[2, 0], -reach), min(box[2, 1], reach)
     return part
 

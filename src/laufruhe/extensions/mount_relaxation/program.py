@@ -1,12 +1,13 @@
-"""The semidefinite relaxation of a box of mounts, and the bound that multipliers prove (E43-E45, E52-E54).
+"""Semidefinite relaxation of a box of mounts, and the bound that multipliers prove (E43-E45, E52-E54).
 
-A moment matrix M of every order stands for (1, v)(1, v)' (E42), under the constraints of E43. Its first rows, of (1, u)
-with u the unbalances, are the same for all orders. The objective is a sum of epigraph variables, each over its bounds
+A moment matrix M of each order represents (1, v)(1, v)' (E42), under the constraints of E43. Its first rows, for (1, u)
+with unbalances u, are the same for all orders. The objective is a sum of epigraph variables, each above its bounds
 
     S - F(M) positive semidefinite,    F(M) = sum R M R'                                     (E54)
 
-where S is the variable times the identity, or blocks whose traces add up to it: the square of a longest vector, or of
-a sum of lengths. A solver proposes multipliers; the bound follows from them by linear algebra (E44).
+where S is the variable times the identity, or has blocks with traces that add up to it. Their optima are the square of
+the longest vector, or the square of a sum of lengths. A solver proposes multipliers; linear algebra turns any
+multipliers into a valid lower bound (E44).
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.numerics.arrays import Array
 
-# shifts that make a matrix convex, as shares of its largest eigenvalue
+# diagonal shifts to try for convexity, over the largest eigenvalue
 _SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 1.1, 0.25)])
 _FLAT = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
 class QuadraticBound:
-    """An epigraph variable over F(M) (E54).
+    """Bound of an epigraph variable from below by F(M) (E54).
 
     Attributes
     ----------
     variable
         Number of the epigraph variable.
     rows
-        Number of an order, and R of every part of the sum, shape (parts, k, d).
+        For each order in the sum, its number and R of each part, shape (parts, k, d).
     blocks
-        Sizes of the blocks of S; none where S is the variable times the identity.
+        Sizes of the blocks of S; () if S is the variable times the identity.
     """
 
     variable: int
@@ -47,16 +48,16 @@ class QuadraticBound:
 
     @property
     def size(self) -> int:
-        """Return k."""
+        """Rows k of S."""
         return int(self.rows[0][1].shape[1])
 
     @property
     def block_slices(self) -> list[slice]:
-        """Return the rows of every block of S."""
+        """Rows of each block of S."""
         return [slice(int(a), int(b)) for a, b in pairwise(np.cumsum((0, *self.blocks)))]
 
     def price_of(self, multiplier: Array) -> float:
-        """Return the part of the price of the variable that a multiplier takes."""
+        """Return the price of the variable that a multiplier of shape (k, k) needs."""
         if not self.blocks:
             return float(np.trace(multiplier))
         return max(float(np.linalg.eigvalsh(multiplier[part, part])[-1]) for part in self.block_slices)
@@ -64,16 +65,16 @@ class QuadraticBound:
 
 @dataclass(frozen=True, eq=False)
 class RootTerm:
-    """The root of an epigraph variable: over a chord of the square root, and over a sum of lengths (E58).
+    """Root of an epigraph variable: above a chord of the square root, and above a sum of lengths (E58).
 
     Attributes
     ----------
     price
-        In the objective.
+        Coefficient in the objective.
     lower, upper
         Bounds of the root, the ends of the chord.
     rows
-        Number of an order, and vectors that are linear in the first row of its moments, shape (lengths, k, d).
+        For each order, its number and vectors linear in the first row of its moments, shape (lengths, k, d).
     """
 
     price: float
@@ -83,23 +84,27 @@ class RootTerm:
 
     @property
     def slope(self) -> float:
-        """Return the slope of the chord over the square."""
+        """Slope of the chord over the square."""
         return 1.0 / (self.lower + self.upper)
 
     @property
     def offset(self) -> float:
-        """Return the chord at zero."""
+        """Value of the chord at zero."""
         return self.lower * self.upper * self.slope
 
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveLimit:
-    """Upper bound of the sum of the roots at their prices and of slopes' s.
+    """Upper bound of the sum of priced roots and of slopes' s.
 
     Attributes
     ----------
+    slopes
+        Coefficients of s, shape (numbers,).
+    upper
+        Upper bound.
     root
-        Number of the root that is minimised alone; None where it is the objective of the program.
+        Number of the root that is minimised alone; None to minimise the objective of the program.
     """
 
     slopes: Array
@@ -109,7 +114,7 @@ class ObjectiveLimit:
 
 @dataclass(frozen=True, eq=False)
 class LinearLimit:
-    """Upper bound of a sum <C, M>: number of an order and C, shape (d, d)."""
+    """Upper bound of a sum of <C, M>: order number and C, shape (d, d), of each term."""
 
     matrices: tuple[tuple[int, Array], ...]
     upper: float
@@ -122,23 +127,27 @@ class SdpProgram:
     Attributes
     ----------
     sizes
-        d of every order.
+        Length d of (1, v) for each order.
     reaches
-        Upper bounds of the squares of the entries of v, of every order shape (d - 1,).
+        For each order, upper bounds of the squares of the entries of v, shape (d - 1,).
     numbers, columns
-        How many s there are, and columns of unbalances.
+        Counts of s and of unbalance columns.
     prices
-        Of the epigraph variables.
-    roots
-        Of the epigraph variables, where the roots are minimised in place of the variables.
-    uppers
-        Upper bounds of the epigraph variables, infinite where there is none; empty where no variable has one.
-    objective
-        Further objective: slopes by every s, and by the w of every mode.
-    limit
-        Upper bound of what else would be the objective, while one root, or `objective`, is minimised.
+        Coefficients of the epigraph variables in the objective.
+    quadratics, constraints, linear
+        Bounds of the epigraph variables, constraints on moments, and limits of transmissibility.
     sets
-        Matrices C with <C, (1, u)(1, u)'> <= 0 for unbalances allowed, shape (1 + columns, 1 + columns).
+        Matrices C with <C, (1, u)(1, u)'> <= 0 for allowed unbalances, shape (1 + columns, 1 + columns).
+    roots
+        Roots of the epigraph variables, if these are minimised in place of the variables.
+    modes
+        Constraints of required natural modes.
+    uppers
+        Upper bounds of the epigraph variables, infinite for none; empty if no variable has one.
+    objective
+        Further objective: slopes by s, then by w of each mode, shape (numbers + 5 modes,).
+    limit
+        Upper bound of the usual objective while one root, or `objective`, is minimised.
     """
 
     sizes: tuple[int, ...]
@@ -158,23 +167,31 @@ class SdpProgram:
 
     @property
     def slopes(self) -> tuple[Array, list[Array]]:
-        """Return `objective` split into slopes by s, and by the w of every mode."""
+        """Slopes of `objective` by s, shape (numbers,), and by w of each mode, shape (5,)."""
         joined = np.zeros(self.numbers + 5 * len(self.modes)) if self.objective is None else self.objective
         return joined[: self.numbers], list(joined[self.numbers :].reshape(-1, 5))
 
 
 @dataclass(frozen=True, eq=False)
 class SdpMultipliers:
-    """Multipliers of a program.
+    """Multipliers of the constraints of a program.
 
     Attributes
     ----------
+    quadratics, constraints
+        One symmetric matrix for each semidefinite constraint.
+    linear, sets
+        One number for each linear limit and each set.
     links
-        Of (1, u)(1, u)' being the same for all orders; one for every order but the first.
+        One matrix for each order but the first: (1, u)(1, u)' is the same in all orders.
     chords
-        Of the chord of every root.
+        One number for the chord of each root.
     lengths
-        Of every root and order a vector for each length.
+        For each root and order, a vector for each length.
+    limit
+        Multiplier of the limit of the objective.
+    modes
+        Multipliers of each mode.
     """
 
     quadratics: Sequence[Array]
@@ -190,7 +207,7 @@ class SdpMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class ModeMultipliers:
-    """Multipliers of a mode: of its matrices, sides and equations, of the corners Z_j = s_j, and of Z +- Z_j >= 0."""
+    """Multipliers of a mode: of matrices, sides, equations, the entries (0, 0) of Z_j = s_j Z, and Z +- Z_j >= 0."""
 
     matrices: Sequence[Array]
     sides: Array
@@ -201,7 +218,7 @@ class ModeMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """A solver's multipliers, s, moments of orders and modes, and value; infinite where it finds no point."""
+    """Solver output: multipliers, s, moments of orders and modes, and value; infinite if no point is feasible."""
 
     multipliers: SdpMultipliers
     s: Array
@@ -211,26 +228,26 @@ class Solution:
 
 
 def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
-    """Return the lower bound of a program that multipliers prove, whatever they are (E44)."""
+    """Return the lower bound that multipliers prove; it is valid for any multipliers (E44)."""
     remainders, bound = [np.zeros((d, d)) for d in program.sizes], 0.0
     objective, mode_objectives = program.slopes
     slopes = np.array(objective, dtype=float)
-    prices, times, limit = np.array(program.prices, dtype=float), 1.0, program.limit
+    prices, limit_multiplier, limit = np.array(program.prices, dtype=float), 1.0, program.limit
     if limit is not None:
-        times = max(multipliers.limit, 0.0)
-        slopes += times * limit.slopes
-        bound -= times * limit.upper
+        limit_multiplier = max(multipliers.limit, 0.0)
+        slopes += limit_multiplier * limit.slopes
+        bound -= limit_multiplier * limit.upper
     for number, (root, chord, vectors) in enumerate(
         zip(program.roots, multipliers.chords, multipliers.lengths, strict=True)
     ):
-        root_price = times * root.price + float(limit is not None and number == limit.root)
+        root_price = limit_multiplier * root.price + float(limit is not None and number == limit.root)
         chord_price, vectors = _split_price(root_price, float(chord), vectors)
         prices[number] = chord_price * root.slope
         bound += chord_price * root.offset
-        for (order, rows), along in zip(root.rows, vectors, strict=True):
-            first = 0.5 * np.einsum("na,nad->d", along, rows)
-            remainders[order][0] += first
-            remainders[order][:, 0] += first
+        for (order, rows), length_multipliers in zip(root.rows, vectors, strict=True):
+            row = 0.5 * np.einsum("na,nad->d", length_multipliers, rows)
+            remainders[order][0] += row
+            remainders[order][:, 0] += row
     for quadratic, price in zip(
         program.quadratics, _scaled_to_prices(program, prices, multipliers.quadratics), strict=True
     ):
@@ -250,13 +267,13 @@ def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
     corner = slice(1 + program.columns)
     for matrix, factor in zip(program.sets, np.maximum(multipliers.sets, 0.0), strict=True):
         remainders[0][corner, corner] += factor * matrix
-    for order, link in enumerate(multipliers.links, 1):
-        symmetric = 0.5 * (link + link.T)
+    for order, link_multiplier in enumerate(multipliers.links, 1):
+        symmetric = 0.5 * (link_multiplier + link_multiplier.T)
         remainders[order][corner, corner] += symmetric
         remainders[0][corner, corner] -= symmetric
-    for mode, priced, slope in zip(program.modes, multipliers.modes, mode_objectives, strict=True):
-        bound += _mode_bound(mode, priced, slope)
-        slopes -= priced.corners
+    for mode, mode_multipliers, slope in zip(program.modes, multipliers.modes, mode_objectives, strict=True):
+        bound += _mode_bound(mode, mode_multipliers, slope)
+        slopes -= mode_multipliers.corners
     minimum = sum(_least_quadratic(matrix, reach) for matrix, reach in zip(remainders, program.reaches, strict=True))
     return bound - float(np.abs(slopes).sum()) + minimum
 
@@ -271,14 +288,14 @@ def _split_price(price: float, chord: float, vectors: Sequence[Array]) -> tuple[
 
 
 def _mode_bound(mode: ModeConstraints, multipliers: ModeMultipliers, slope: Array) -> float:
-    # E56: least remainder over (1, w)(1, w)', every s_j with the worse sign
+    # E56: minimum of the remainder over (1, w)(1, w)', each s_j with its worse sign
     remainder = _mode_remainder(mode, multipliers)
     remainder[1:, 0, 0] += multipliers.corners
     remainder[0, 0, 1:] += 0.5 * slope
     remainder[0, 1:, 0] += 0.5 * slope
-    for matrix, (above, under) in zip(remainder[1:], multipliers.signs, strict=True):
+    for matrix, (upper_part, lower_part) in zip(remainder[1:], multipliers.signs, strict=True):
         # P + Q + |P - Q - L| is over L and -L
-        first, second = _psd_part(above), _psd_part(under)
+        first, second = _psd_part(upper_part), _psd_part(lower_part)
         values, vectors = np.linalg.eigh(_symmetric(matrix - first + second))
         remainder[0] -= first + second + (vectors * np.abs(values)) @ vectors.T
     return _least_with_shift(remainder[0], 1.0)
@@ -293,16 +310,16 @@ def _mode_remainder(mode: ModeConstraints, multipliers: ModeMultipliers) -> Arra
 
 
 def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, moments: Array) -> tuple[Array, Array]:
-    """Return branching scores of every s and every w: the priced violation of products of means."""
+    """Return branching scores by s, shape (numbers,), and by w, shape (5,): priced violations of products."""
     remainder, z = _mode_remainder(mode, multipliers), moments[0][0]
     violations = moments[1:] - s[:, None, None] * moments[0]
     priced = np.abs(np.einsum("jab,jab->jb", remainder[1:], violations))
-    plain = np.abs(np.einsum("ab,ab->b", remainder[0], moments[0] - np.outer(z, z)))
-    return priced.sum(axis=1), np.asarray((priced.sum(axis=0) + plain)[1:])
+    squares = np.abs(np.einsum("ab,ab->b", remainder[0], moments[0] - np.outer(z, z)))
+    return priced.sum(axis=1), np.asarray((priced.sum(axis=0) + squares)[1:])
 
 
 def _scaled_to_prices(program: SdpProgram, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
-    # multipliers of the quadratic bounds take the price of each epigraph variable
+    # scale the multipliers of the quadratic bounds so that they add up to the price of each epigraph variable
     uppers = program.uppers
     positive = [_psd_part(multiplier) for multiplier in multipliers]
     sums = np.zeros(len(prices))
@@ -310,7 +327,7 @@ def _scaled_to_prices(program: SdpProgram, prices: Array, multipliers: Sequence[
         sums[quadratic.variable] += quadratic.price_of(price)
     factors = np.where(sums > 0.0, prices / np.where(sums > 0.0, sums, 1.0), 0.0)
     if len(uppers):
-        # a variable with an upper bound may have any price
+        # a variable with an upper bound needs no exact price
         factors = np.where(np.isfinite(uppers), 1.0, factors)
     return [factors[q.variable] * price for q, price in zip(program.quadratics, positive, strict=True)]
 
@@ -333,16 +350,16 @@ def _least_quadratic(matrix: Array, reaches: Array) -> float:
 
 
 def _least_with_shift(matrix: Array, reach: float) -> float:
-    """Return the best lower bound over |v|^2 <= reach of the shifts tried."""
+    """Return the largest lower bound of (1, v)' matrix (1, v) over |v|^2 <= reach among the shifts."""
     symmetric = _symmetric(matrix)
     if len(symmetric) == 1:
-        # nothing of it is open
+        # no open entry
         return float(symmetric[0, 0])
     values, vectors = np.linalg.eigh(symmetric[1:, 1:])
-    along = (vectors.T @ symmetric[1:, 0]) ** 2
-    top, best = float(np.abs(values).max(initial=0.0)), -math.inf
-    for shift in _SHIFTS * top:
-        if values[0] + shift > _FLAT * top and (shift == 0.0 or reach < math.inf):
+    coefficients = (vectors.T @ symmetric[1:, 0]) ** 2
+    largest, best = float(np.abs(values).max(initial=0.0)), -math.inf
+    for shift in _SHIFTS * largest:
+        if values[0] + shift > _FLAT * largest and (shift == 0.0 or reach < math.inf):
             loss = shift * reach if shift else 0.0
-            best = max(best, float(symmetric[0, 0] - np.sum(along / (values + shift))) - loss)
+            best = max(best, float(symmetric[0, 0] - np.sum(coefficients / (values + shift))) - loss)
     return best

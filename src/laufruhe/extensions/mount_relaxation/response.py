@@ -1,10 +1,9 @@
 """Response of an order over a box of mounts, affine in products of open numbers and motion (E42, E52, E66).
 
-A spring whose stiffness is open adds the force t = kappa(s) u to that of the middle, u its deflection. A mount that
-may move by s times h sees s h (theta x e) more of the turn theta of the block, and has the moment s h e x f more. What
-is open of a damper adds i W t, t = (C - C(c)) u; where it follows what is open of stiffness, i W b t. With these
-products t, s theta and s f as variables w, f without loss and that of dampers over i W each by itself, and unbalances
-beside them,
+An open stiffness adds the force t = kappa(s) u to that of the middle, where u is the spring's deflection. A mount with
+an open place s h sees s h (theta x e) more of the block's turn theta, and has the further moment s h e x f. An open
+damper adds i W t, t = (C - C(c)) u; if it follows an open stiffness, i W b t. The variables w are these products: t,
+s theta and s f, with f without loss and the forces of dampers over i W each by itself. With them and the unbalances u,
 
     D(c) y = r0 + R u - (terms linear in w)                                                 (E42)
 
@@ -25,32 +24,32 @@ from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.rigid_body import carried
 
-# least unit of a product, as a share of the largest of its kind
-SMALL = 0.1
+# smallest unit of a product, over the largest of its kind
+MIN_UNIT = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Response of an order over a box, as complex functions of (1, v), shapes (..., d), in units of a motion.
+    """Response of an order over a box, as complex coefficients of (1, v), shapes (..., d), in units of a motion.
 
     Attributes
     ----------
     columns
-        Of the unbalances in v.
+        Count of unbalance columns in v.
     motion, carried
-        y, and A y in coordinates in which the mass is one, shape (k, d).
+        y and A y in coordinates of unit mass, shape (k, d).
     members
-        Of every mount the numbers of those of the problem that it stands for.
+        For each mount of the relaxation, the numbers of the problem's mounts that it represents.
     deflections, forces
-        Of one of these, shape (mounts, 3, d).
+        Deflection and force of one member of each mount, shape (mounts, 3, d).
     springs
-        Of every spring u and t, shape (b, d) each.
+        For each spring, u and t, shape (b, d) each.
     places
-        Of every place turns and moments (4, d), and s times these.
+        For each place, turns and moments, and s times these, shape (4, d) each.
     reaches
         Upper bounds of the squares of v over all designs of the box, shape (d - 1,).
     unit
-        The motion that is counted as one.
+        Length of the motion that counts as one.
     """
 
     columns: int
@@ -66,22 +65,22 @@ class Response:
 
     @property
     def size(self) -> int:
-        """Return d."""
+        """Length d of (1, v)."""
         return int(self.motion.shape[-1])
 
 
 @dataclass(frozen=True, eq=False)
 class ResponseBound:
-    """Upper bound of the amplitude of force, or travel, of mounts by their numbers, for all designs that count."""
+    """Upper bound of the force or travel amplitude of `mounts` over all better designs; `upper` [N or m]."""
 
     mounts: tuple[int, ...]
     upper: float
     is_travel: bool
 
     def deflections(self, mounts: OpenMounts) -> Array:
-        """Return bounds of the deflections of springs, shape (springs,): a mount has its softest direction at least."""
+        """Return upper bounds of spring deflections, from force and softest direction, shape (springs,)."""
         bounds = np.full(mounts.mounts, math.inf)
-        softest = np.bincount(mounts.stands, mounts.softest, mounts.mounts)
+        softest = np.bincount(mounts.spring_mounts, mounts.softest, mounts.mounts)
         for k, members in enumerate(mounts.members):
             if members[0] not in self.mounts:
                 continue
@@ -89,7 +88,7 @@ class ResponseBound:
                 bounds[k] = self.upper * mounts.times[k]
             elif softest[k] > 0.0 and not mounts.dynamic:
                 bounds[k] = self.upper * mounts.times[k] / softest[k]
-        return np.asarray(bounds[mounts.stands])
+        return np.asarray(bounds[mounts.spring_mounts])
 
 
 def response_of(
@@ -100,17 +99,17 @@ def response_of(
     Parameters
     ----------
     loads
-        r, and its change per unit of every column of the unbalances, shape (1 + columns, k).
+        r, and its change per unit of each unbalance column, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
     near
-        Motions of a design, which give units, shape (k, n).
+        Motions of a design, which set the units, shape (k, n).
     bound
-        Bound of forces or travel of the designs that count.
+        Bound of force or travel over better designs.
     """
     unit, columns = float(np.linalg.norm(near)) or 1.0, len(loads) - 1
     sizes = _units(mounts, near / unit)
-    # every product is a variable in its unit
+    # columns of v: unbalances, then real and imaginary parts of the products, each in its unit
     count = len(sizes)
     variables = np.zeros((count, 1 + columns + 2 * count), dtype=complex)
     rows = np.arange(count)
@@ -118,39 +117,41 @@ def response_of(
     ends = np.cumsum([spring.axes.shape[1] for spring in mounts.springs] + [place.products for place in mounts.places])
     products = np.split(variables, ends[:-1]) if len(ends) else []
     springs, places = products[: len(mounts.springs)], products[len(mounts.springs) :]
-    # what products add to deflections, to the elastic load on the block, and to the load of the middle
-    turning, width = mounts.turning(omega), variables.shape[1]
-    shifted = np.zeros((len(turning), 3, width), dtype=complex)
+    # contributions of products to deflections, to the elastic load on the block, and to the load of the middle
+    stiffness_factors, width = mounts.stiffness_factors(omega), variables.shape[1]
+    shifted = np.zeros((len(stiffness_factors), 3, width), dtype=complex)
     moments, load = (np.zeros((mounts.size, width), dtype=complex) for _ in range(2))
-    for place, part in zip(mounts.places, places, strict=True):
-        turns, *place_moments = np.split(part, len(part) // len(place.aside))
+    for place, product in zip(mounts.places, places, strict=True):
+        turns, *place_moments = np.split(product, len(product) // len(place.turn_axes))
         for m, reach in place.mounts:
             shifted[m] += reach * place.arms.T @ turns
-        on_block = [mounts.root[:, 3:] @ place.aside.T @ each for each in place_moments]
+        on_block = [mounts.root[:, 3:] @ place.turn_axes.T @ force for force in place_moments]
         moments += on_block[0]
-        # mounts of one place have one loss factor
-        for moment, factor in zip(on_block, (turning[place.mounts[0][0]], 1j * omega), strict=False):
+        # all mounts of one place have the same loss factor
+        for moment, factor in zip(on_block, (stiffness_factors[place.mounts[0][0]], 1j * omega), strict=False):
             load -= moment * factor
-    for spring, part in zip(mounts.springs, springs, strict=True):
-        factor = spring.elastic * turning[spring.mount] + 1j * omega * spring.viscous
-        load -= factor * mounts.motions[spring.mount].T @ spring.axes @ part
+    for spring, product in zip(mounts.springs, springs, strict=True):
+        factor = spring.elastic * stiffness_factors[spring.mount] + 1j * omega * spring.viscous
+        load -= factor * mounts.motions[spring.mount].T @ spring.axes @ product
     load[:, : 1 + columns] += loads.T / unit
-    impedances = mounts.middles * turning[:, None, None] + 1j * omega * mounts.dampers
+    impedances = mounts.middles * stiffness_factors[:, None, None] + 1j * omega * mounts.dampers
     load -= np.einsum("mia,mij,mjd->ad", mounts.motions, impedances, shifted)
-    whole = sum(carried(g, z) for g, z in zip(mounts.motions, impedances, strict=True))
+    middle_stiffness = sum(carried(g, z) for g, z in zip(mounts.motions, impedances, strict=True))
     dynamic = mounts.at_rest + mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0]
-    motion = np.asarray(np.linalg.solve(whole + dynamic - omega**2 * np.eye(mounts.size), load), dtype=np.complex128)
+    motion = np.asarray(
+        np.linalg.solve(middle_stiffness + dynamic - omega**2 * np.eye(mounts.size), load), dtype=np.complex128
+    )
     deflections = mounts.motions @ motion + shifted
     elastic, viscous = mounts.middles @ deflections, mounts.dampers @ deflections
-    for spring, part in zip(mounts.springs, springs, strict=True):
-        elastic[spring.mount] += spring.elastic * (spring.axes @ part)
-        viscous[spring.mount] += spring.viscous * (spring.axes @ part)
-    forces = elastic * turning[:, None, None] + 1j * omega * viscous
+    for spring, product in zip(mounts.springs, springs, strict=True):
+        elastic[spring.mount] += spring.elastic * (spring.axes @ product)
+        viscous[spring.mount] += spring.viscous * (spring.axes @ product)
+    forces = elastic * stiffness_factors[:, None, None] + 1j * omega * viscous
     place_loads = []
     for place in mounts.places:
-        own = [np.asarray(sum(h * place.arms @ each[m] for m, h in place.mounts))
-               for each in (elastic, viscous)[: 1 + place.is_damped]]  # fmt: skip
-        place_loads.append(np.concatenate([place.aside @ mounts.turns @ motion, *own]))
+        place_forces = [np.asarray(sum(h * place.arms @ force[m] for m, h in place.mounts))
+               for force in (elastic, viscous)[: 1 + place.is_damped]]  # fmt: skip
+        place_loads.append(np.concatenate([place.turn_axes @ mounts.turns @ motion, *place_forces]))
     carried_motion = np.einsum("mia,mid->ad", mounts.motions, elastic) + moments + mounts.at_rest @ motion
     motion_bound = _motion_bound(mounts, loads, omega)
     bounds = _product_bounds(
@@ -161,11 +162,12 @@ def response_of(
         motion,
         np.asarray(carried_motion, dtype=np.complex128),
         mounts.members,
-        deflections[[int(np.argmax(mounts.stands == k)) for k in range(mounts.mounts)]] / mounts.times[:, None, None],
+        deflections[[int(np.argmax(mounts.spring_mounts == k)) for k in range(mounts.mounts)]]
+        / mounts.times[:, None, None],
         _mount_forces(mounts, forces, omega, motion) / mounts.times[:, None, None],
         tuple(
-            (spring.axes.T @ deflections[spring.mount], part)
-            for spring, part in zip(mounts.springs, springs, strict=True)
+            (spring.axes.T @ deflections[spring.mount], product)
+            for spring, product in zip(mounts.springs, springs, strict=True)
         ),
         tuple(zip(place_loads, places, strict=True)),
         np.concatenate([np.ones(columns), *([(bounds / (unit * sizes)) ** 2] * 2)]),
@@ -177,22 +179,25 @@ def _mount_forces(mounts: OpenMounts, forces: ComplexArray, omega: float, motion
     static = mounts.dynamic.directions @ np.diag([law.static for law in mounts.dynamic.laws]) @ mounts.dynamic.rows
     added = mounts.dynamic.forces(np.array([omega]), mounts.root.T)[0] + static.reshape(-1, 6) @ mounts.root.T
     total = np.asarray(added @ motion, dtype=np.complex128).reshape(mounts.mounts, 3, -1)
-    np.add.at(total, mounts.stands, forces)
+    np.add.at(total, mounts.spring_mounts, forces)
     return total
 
 
-def _units(mounts: OpenMounts, near: ComplexArray) -> Array:
-    """Return the rough size of every product at some motions, none much smaller than others of its kind."""
-    deflections, turns = mounts.motions @ near, mounts.turns @ near
+def _units(mounts: OpenMounts, motions: ComplexArray) -> Array:
+    """Return the unit of each product: its rough size at some motions, at least MIN_UNIT of the largest of its kind."""
+    deflections, turns = mounts.motions @ motions, mounts.turns @ motions
     sizes = [_lengths(spring.axes.T @ deflections[spring.mount]) for spring in mounts.springs]
-    minimum = SMALL * max((float(each.max()) for each in sizes), default=0.0)
-    units = [spring.size * np.maximum(each, minimum) for spring, each in zip(mounts.springs, sizes, strict=True)]
+    minimum = MIN_UNIT * max((float(spring_sizes.max()) for spring_sizes in sizes), default=0.0)
+    units = [
+        spring.size * np.maximum(spring_sizes, minimum)
+        for spring, spring_sizes in zip(mounts.springs, sizes, strict=True)
+    ]
     for place in mounts.places:
-        units.append(np.maximum(_lengths(place.aside @ turns), SMALL * np.linalg.norm(turns)))
+        units.append(np.maximum(_lengths(place.turn_axes @ turns), MIN_UNIT * np.linalg.norm(turns)))
         for matrices in (mounts.middles, mounts.dampers)[: 1 + place.is_damped]:
             forces = [(h, matrices[m] @ deflections[m]) for m, h in place.mounts]
             moment = _lengths(np.asarray(sum(h * place.arms @ force for h, force in forces)))
-            units.append(np.maximum(moment, SMALL * sum(abs(h) * np.linalg.norm(force) for h, force in forces)))
+            units.append(np.maximum(moment, MIN_UNIT * sum(abs(h) * np.linalg.norm(force) for h, force in forces)))
     joined = np.concatenate([np.zeros(0), *units])
     return np.where(joined > 0.0, joined, joined.max(initial=0.0) or 1.0)
 
@@ -202,7 +207,7 @@ def _lengths(rows: ComplexArray) -> Array:
 
 
 def _product_bounds(mounts: OpenMounts, motion: float, deflections: Array) -> Array:
-    # upper bounds of the products from those of motion and deflections, shape (springs,)
+    # upper bounds of the products from those of motion and of deflections, shape (products,)
     turn = motion * float(np.linalg.norm(mounts.turns, 2))
     kinds = _largest(mounts, "elastic"), _largest(mounts, "viscous")
     bounds = [np.full(spring.axes.shape[1], spring.largest * deflections[spring.mount]) for spring in mounts.springs]
@@ -210,7 +215,7 @@ def _product_bounds(mounts: OpenMounts, motion: float, deflections: Array) -> Ar
         moments = [
             sum(abs(h) * kind[m] * deflections[m] for m, h in place.mounts) for kind in kinds[: 1 + place.is_damped]
         ]
-        bounds.append(np.repeat([turn, *moments], len(place.aside)))
+        bounds.append(np.repeat([turn, *moments], len(place.turn_axes)))
     return np.concatenate([np.zeros(0), *bounds])
 
 
@@ -230,58 +235,60 @@ def _largest(mounts: OpenMounts, kind: Literal["elastic", "viscous"]) -> Array:
 
 
 def response_bound(mounts: OpenMounts, loads: ComplexArray, omega: float, travel: bool, chosen: Sequence[int]) -> float:
-    """Return an upper bound of the sum of amplitudes of force, or travel, over mounts and all designs of the box.
+    """Return an upper bound of the sum of force or travel amplitudes over mounts, for all designs of the box.
 
     Parameters
     ----------
     loads
-        r, and its change by the largest unbalance of every column, shape (1 + columns, k).
+        r, and its change by the largest unbalance of each column, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
+    travel
+        True for travel [m], False for force [N].
     chosen
-        Numbers of the mounts of the problem.
+        Numbers of the mounts of the problem in the sum.
     """
-    members = [k for k, own in enumerate(mounts.members) if own[0] in chosen]
-    sizes, counted = mounts.times[mounts.stands], np.isin(mounts.stands, members)
+    members = [k for k, numbers in enumerate(mounts.members) if numbers[0] in chosen]
+    sizes, is_chosen = mounts.times[mounts.spring_mounts], np.isin(mounts.spring_mounts, members)
     if not travel:
         elastic, viscous = _largest(mounts, "elastic"), _largest(mounts, "viscous")
-        sizes = sizes * (elastic * np.abs(mounts.turning(omega)) + omega * viscous)
-    per_motion = float((_deflections_per_motion(mounts) * sizes)[counted].sum())
+        sizes = sizes * (elastic * np.abs(mounts.stiffness_factors(omega)) + omega * viscous)
+    per_motion = float((_deflections_per_motion(mounts) * sizes)[is_chosen].sum())
     if not travel:
-        none = np.zeros((len(mounts.losses), 3, mounts.size), dtype=np.complex128)
-        dynamic = _mount_forces(mounts, none, omega, np.eye(mounts.size, dtype=np.complex128))
+        no_forces = np.zeros((len(mounts.losses), 3, mounts.size), dtype=np.complex128)
+        dynamic = _mount_forces(mounts, no_forces, omega, np.eye(mounts.size, dtype=np.complex128))
         per_motion += math.sqrt(len(chosen)) * float(np.linalg.norm(dynamic))
     return _motion_bound(mounts, loads, omega) * per_motion
 
 
 def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> float:
-    """Return an upper bound of |y| over the box: damping takes energy, and far above resonance the mass resists."""
-    lost = mounts.lost(omega)
-    even = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(mounts.size)
+    """Return an upper bound of |y| over the box, by the energy lost in damping or by the inertia above resonance."""
+    loss = mounts.loss_at(omega)
+    uniform_loss = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(mounts.size)
     if not mounts.dynamic:
-        # all of A has the least loss of its springs
-        lost = max(lost, even + omega * mounts.damping, key=lambda each: float(np.linalg.eigvalsh(each)[0]))
-    rise = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
-    top = mounts.highest + max(float(np.linalg.eigvalsh(rise)[-1]), 0.0)
-    # at rest stiffness carries all of the load
-    moving = max(float(np.linalg.eigvalsh(lost)[0]), omega**2 - top)
-    resistance = moving if omega > 0.0 else mounts.lowest
+        # all of A has at least the smallest loss factor of its springs
+        loss = max(loss, uniform_loss + omega * mounts.damping, key=lambda matrix: float(np.linalg.eigvalsh(matrix)[0]))
+    dynamic_stiffness = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
+    top = mounts.highest + max(float(np.linalg.eigvalsh(dynamic_stiffness)[-1]), 0.0)
+    # at rest, stiffness carries the load
+    moving_resistance = max(float(np.linalg.eigvalsh(loss)[0]), omega**2 - top)
+    resistance = moving_resistance if omega > 0.0 else mounts.lowest
     return float(np.linalg.norm(loads, axis=1).sum()) / resistance if resistance > 0.0 else math.inf
 
 
 def in_parts(functions: ComplexArray) -> Array:
-    """Return real and imaginary parts one after the other, shape (n, d) to (2 n, d)."""
+    """Return real parts, then imaginary parts, shape (2 n, d) from (n, d)."""
     rows = functions.reshape(-1, functions.shape[-1])
     return np.concatenate([rows.real, rows.imag])
 
 
 def squared(functions: ComplexArray) -> Array:
-    """Return the sum of their squares in the moments of (1, v), shape (d, d)."""
+    """Return the coefficients of the sum of squares in the moments of (1, v), shape (d, d)."""
     rows = in_parts(functions)
     return np.asarray(rows.T @ rows)
 
 
 def product(first: ComplexArray, second: ComplexArray) -> Array:
-    """Return Re first* second in the moments of (1, v), shape (d, d)."""
+    """Return the coefficients of Re first* second in the moments of (1, v), shape (d, d)."""
     products = in_parts(first).T @ in_parts(second)
     return np.asarray(0.5 * (products + products.T))

@@ -1,4 +1,4 @@
-"""Semidefinite relaxation of mounts, and unbalances with them, over boxes (E42-E45, E52-E54)."""
+"""Semidefinite relaxation of a problem with open mounts and unbalances, to bound boxes (E42-E45, E52-E54)."""
 
 from __future__ import annotations
 
@@ -41,72 +41,76 @@ from laufruhe.prove.best_first import NEARLY
 from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
 
-# work that all relaxations may take together, a number of moments to the power EFFORT each, and how many they may be
+# total work of the relaxations, each its number of moments to the power EFFORT, and the most relaxations
 WORK, EFFORT, MOST_BOXES = 6e7, 5, 100
-# share of the missing bound that omitted orders may have
+# largest share of the missing bound that omitted orders may carry
 OMITTED = 0.3
-# share of the bounds of unbalances that gives units beside the best design
+# share of the unbalance ranges that enters the units of products, besides the best design
 WIDE = 0.3
 # share of a side within which a number counts as at its end
 AT_END = 0.1
 
 
 class SdpRelaxation:
-    """Bounds of boxes for designs whose objective is not over `value`.
+    """Relaxation that bounds boxes, for designs with an objective up to `value` alone.
 
     Attributes
     ----------
+    value
+        Objective up to which bounds hold [SI].
+    cutoff
+        Bound from which a box is fathomed [SI].
     lower, upper
-        Of the open numbers of the mounts, of matrices of planes (E63), and of modes.
+        Root box, shape (n,): open numbers of mounts, stiffness entries of planes (E63), and coordinates of modes.
     near
-        Those of the best design, modes left out.
+        The best design in these coordinates without those of modes.
     modes, mode_sides
-        Basis of every mode, and its sides in these.
+        Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
     candidates
-        Open numbers at the optimum of the first relaxation, from which a search may find a better design.
+        Open numbers at the optimum of the first relaxation: starts from which a search may find a better design.
     multiple_uppers
-        Upper bounds of odd multiples by the id of their order, in designs that count.
+        Upper bounds of odd multiples over better designs, by the id of their order.
     ahead
-        Speculative executor; None where nothing is worked out ahead.
+        Speculative executor; None to compute everything in this process.
     """
 
     def __init__(
-        self, problem: Problem, value: float, room: float, near: Sequence[Value], ahead: Ahead | None = None
+        self, problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], ahead: Ahead | None = None
     ) -> None:
-        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - NEARLY * room, ahead
+        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - NEARLY * gap_tolerance, ahead
         lower, upper = sides_of(problem.mount_decisions)
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._frames = number_ranges(problem, self._near, self._near)[0]
         self._planes = open_mounts(problem, lower, upper, PlaneFrames(self._frames)).planes
         self.near = np.concatenate([self._near, *(np.append(plane.near, 0.0) for _, plane in self._planes.values())])
-        turned = np.concatenate([np.zeros((0, 2)), *(plane.full_box for _, plane in self._planes.values())])
-        lower, upper = np.append(lower, turned[:, 0]), np.append(upper, turned[:, 1])
+        plane_ranges = np.concatenate([np.zeros((0, 2)), *(plane.full_box for _, plane in self._planes.values())])
+        lower, upper = np.append(lower, plane_ranges[:, 0]), np.append(upper, plane_ranges[:, 1])
         self._parts = self.parts(lower, upper)
         self.modes = mode_bases(problem, self._parts[0])
         ones = np.ones(5 * len(self.modes))
         self.lower, self.upper = np.append(lower, -ones), np.append(upper, ones)
         self.mode_sides = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
         self.candidates: list[Array] = []
-        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * room) if divides(problem) else None
+        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if divides(problem) else None
         self._model = AffineModel(off_resonance(problem))
-        fixed = [v for v, d in zip(near, problem.decisions, strict=True) if d.is_affine]
-        basis = unbalance_basis(self._model.domains, fixed)
+        unbalances = [v for v, d in zip(near, problem.decisions, strict=True) if d.is_affine]
+        basis = unbalance_basis(self._model.domains, unbalances)
         known = evaluate(problem, problem.design(list(near)))
-        terms = [term for term in problem.load_terms if term.measure.on_mounts]
-        # loads of the block are those of all mounts, and known where no unbalance is open
+        mount_terms = [term for term in problem.load_terms if term.measure.on_mounts]
+        # terms that no open number changes are constants
         kinds = {d.kind for d in problem.decisions}
-        rest = [t for t in problem.load_terms if not depends(t.measure.channel, kinds, problem)]
-        self._constant = sum(t.weight * known.value(t.measure) for t in rest)
+        fixed_terms = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
+        self._constant = sum(term.weight * known.value(term.measure) for term in fixed_terms)
 
         def orders_of(measure: Measure, parts: Sequence[OpenMounts] = self._parts) -> MeasureOrders:
             return measure_orders(problem, measure, self._model, known, basis, parts)
 
-        queries = [(t.weight, orders_of(t.measure)) for t in terms]
+        queries = [(term.weight, orders_of(term.measure)) for term in mount_terms]
         limits = limits_of(problem, known, orders_of, lambda measure: orders_of(measure, self._parts[:1]))
         loads = [order.loads[1:] for _, query in queries for order in query.orders]
-        self.basis, fewer = basis[0].reduced([*loads, *limits.loads])
-        self._terms = [(weight, query.in_basis(fewer)) for weight, query in queries]
-        self.limits = limits.in_basis(fewer, self._parts)
+        self.basis, reduction = basis[0].reduced([*loads, *limits.loads])
+        self._terms = [(weight, query.in_basis(reduction)) for weight, query in queries]
+        self.limits = limits.in_basis(reduction, self._parts)
         self._variables = [epigraph_variables(query, self._parts) for _, query in self._terms]
         self._reset()
 
@@ -116,9 +120,9 @@ class SdpRelaxation:
         self._last_box = self.lower, self.upper, self._roots[0]
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
-        """Return the mounts of a box for all motions, and for either symmetry if there is one (E57)."""
+        """Return the mounts of a box for all motions, then for each symmetry of the motions if there is one (E57)."""
         count = len(self.problem.mount_decisions)
-        boxes = {key: np.column_stack([lower[own], upper[own]]) for key, own in self._plane_sides()}
+        boxes = {key: np.column_stack([lower[sides], upper[sides]]) for key, sides in self._plane_sides()}
         mounts = open_mounts(self.problem, lower[:count], upper[:count], PlaneFrames(self._frames, boxes))
         return (mounts, *split_mounts(mounts))
 
@@ -127,25 +131,25 @@ class SdpRelaxation:
         return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
 
     def contracted(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """Return the part of a box that holds all possible planes in it; None where it holds none."""
+        """Return the box contracted to the plane stiffnesses that are possible in it; None if none is."""
         lower, upper = lower.copy(), upper.copy()
-        for key, own in self._plane_sides():
-            part = self._planes[key][1].contracted(np.column_stack([lower[own], upper[own]]))
+        for key, sides in self._plane_sides():
+            part = self._planes[key][1].contracted(np.column_stack([lower[sides], upper[sides]]))
             if part is None:
                 return None
-            lower[own], upper[own] = part.T
+            lower[sides], upper[sides] = part.T
         return lower, upper
 
     def near_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
-        """Return s of the best design, or of the next to it in a box; zero where s is one of six of a matrix."""
+        """Return s of the design of the box nearest to the best, shape (numbers,); zero for entries of matrices."""
         s = np.zeros(mounts.numbers)
-        for j, side in enumerate(mounts.straight):
+        for j, side in enumerate(mounts.single_decisions):
             if side is not None and upper[side] > lower[side]:
                 s[j] = (2.0 * self.near[side] - lower[side] - upper[side]) / (upper[side] - lower[side])
         return np.clip(s, -1.0, 1.0)
 
     def is_at_end(self, lower: Array, upper: Array, side: int, sign: float) -> bool:
-        """Return whether the best design is at the lower (sign 1) or the upper (sign -1) end of a side."""
+        """Return True if the best design lies near the lower (sign 1) or upper (sign -1) end of a side."""
         if side >= len(self.near):
             return False
         distance = self.near[side] - lower[side] if sign > 0.0 else upper[side] - self.near[side]
@@ -153,76 +157,78 @@ class SdpRelaxation:
 
     @property
     def mount_numbers(self) -> int:
-        """Return the count of open numbers of mounts."""
+        """Count of open numbers of mounts."""
         return len(self.problem.mount_decisions)
 
     @property
     def stiffness_alone(self) -> bool:
-        """Return whether nothing but stiffness is open."""
+        """True if stiffness alone is open."""
         return self._stiffness_boxes is not None
 
     @property
     def has_loose_mean(self) -> bool:
-        """Return whether odd multiples of the orders of a mean loosen its bound (E58)."""
+        """True if odd multiples of its orders loosen the bound of a mean (E58)."""
         if not any(variable.multiples for variable in self._variables[0]):
             return False
         return self._box(0, self.lower, self.upper).hides_mean(self._variables[0])
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Return whether bounds by orders hold for samples."""
+        """True if bounds by orders are also bounds of the sampled norms."""
         plain = self._stiffness_boxes is None or self._stiffness_boxes.is_sampled_fully
         return plain and all(query.is_sampled_fully for _, query in self._terms)
 
     @property
     def max_boxes(self) -> int:
-        """Return the number of boxes that take some tens of seconds."""
+        """Budget of boxes: as many as take some tens of seconds."""
         parts = [order.part for variables in self._variables for variable in variables for order in variable.orders]
         cost = sum((1 + self.basis.count + 2 * self._parts[k].products) ** EFFORT for k in parts)
         return self.problem.search.boxes_or(int(min(WORK / max(cost, 1), MOST_BOXES)))
 
     def bound(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Return the better bound of a box, by boxes of stiffness or the relaxation, and branching scores by side."""
-        known, part = 0.0, self.contracted(lower, upper)
-        if part is None:
+        """Return the lower bound of a box [SI] by stiffness boxes or relaxation, and branching scores, shape (n,)."""
+        stiffness_bound, contracted_box = 0.0, self.contracted(lower, upper)
+        if contracted_box is None:
             return math.inf, np.zeros(len(lower))
-        lower, upper = part
+        lower, upper = contracted_box
         if self._stiffness_boxes is not None:
             count = len(self._near)
-            known = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
-        bound, scores = (known, np.zeros(len(lower))) if known >= self.cutoff else self.relax(lower, upper)
-        return max(known, bound), scores
+            stiffness_bound = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
+        bound, scores = (
+            (stiffness_bound, np.zeros(len(lower))) if stiffness_bound >= self.cutoff else self.relax(lower, upper)
+        )
+        return max(stiffness_bound, bound), scores
 
     def relax(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Return the bound of a box by the relaxation, and branching scores by side."""
+        """Return the lower bound of a box by the relaxation [SI], and branching scores, shape (n,)."""
         total, scores = self._constant, np.zeros(len(lower))
         for k, (weight, _) in enumerate(self._terms):
             is_first = not self.candidates and k == 0
             box = self._box(k, lower, upper)
-            bound, own, middle = box.bound(self._variables[k], self._roots[k])
+            bound, term_scores, candidate = box.bound(self._variables[k], self._roots[k])
             if k == 0:
                 self._last_box = lower, upper, box.roots
             total += weight * bound
-            scores += own
-            if is_first and middle is not None:
-                self.candidates.append(middle)
+            scores += term_scores
+            if is_first and candidate is not None:
+                self.candidates.append(candidate)
         return total, scores * (upper > lower)
 
     def _box(self, term: int, lower: Array, upper: Array) -> BoxRelaxation:
         weight, query = self._terms[term]
-        ends = (self.value - self._constant) / weight, (self.cutoff - self._constant) / weight
-        return BoxRelaxation(self, query, ends, lower, upper)
+        limits = (self.value - self._constant) / weight, (self.cutoff - self._constant) / weight
+        return BoxRelaxation(self, query, limits, lower, upper)
 
     def cut_off(self, lower: Array, upper: Array) -> tuple[SdpProgram, OpenMounts]:
-        """Return the constraints by the first term of designs of a box that are not over the value."""
+        """Return the program of designs in a box with a first term up to its value, and the mounts of the box."""
         box = self._box(0, lower, upper)
-        # bounds of the roots on the last box hold in all of it
+        # root bounds of the last box hold in each part of that box
         low, high, roots = self._last_box
         is_inside = bool(np.all(lower >= low) and np.all(upper <= high))
         return box.cut_off(self._variables[0], roots if is_inside else self._roots[0]), box.mounts
 
     def under(self, value: float) -> SdpRelaxation:
-        """Return the relaxation of designs that are better than a value, without orders that this hardly needs."""
+        """Return the relaxation of designs below a value, without orders that add little to the proof."""
         relaxation = copy(self)
         relaxation.value = relaxation.cutoff = value
         relaxation._variables = [
@@ -237,7 +243,7 @@ class SdpRelaxation:
         return relaxation
 
     def up_to(self, value: float) -> SdpRelaxation:
-        """Return the relaxation of designs that are not over a value, with the same orders and the same goal."""
+        """Return the relaxation of designs up to a value, with unchanged orders and cutoff."""
         relaxation = copy(self)
         relaxation.value = value
         relaxation._reset()
@@ -245,18 +251,18 @@ class SdpRelaxation:
 
     def _needed(self, variable: EpigraphVariable, value: float) -> tuple[Order, ...]:
         size = np.array([float(np.sum(np.abs(order.signal) ** 2)) for order in variable.orders])
-        rest = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
-        cutoff = rest <= OMITTED * (1.0 - value / self.value)
-        return variable.orders[: int(np.argmax(cutoff)) + 1] if cutoff.any() else variable.orders
+        omitted = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
+        is_enough = omitted <= OMITTED * (1.0 - value / self.value)
+        return variable.orders[: int(np.argmax(is_enough)) + 1] if is_enough.any() else variable.orders
 
     def response(self, mounts: OpenMounts, order: Order, bound: ResponseBound, lower: Array, upper: Array) -> Response:
-        """Return the response to an order, in units of the best design or of the next to it in the box."""
+        """Return the response to an order over a box; units follow the design of the box nearest to the best."""
         count = len(self._near)
-        inside = [float(v) for v in np.clip(self._near, lower[:count], upper[:count])]
-        mounting = mounting_in(self.problem.design(inside, self.problem.mount_decisions))
+        design = [float(v) for v in np.clip(self._near, lower[:count], upper[:count])]
+        mounting = mounting_in(self.problem.design(design, self.problem.mount_decisions))
         moving = order.omega > 0.0
         parts = (mounting.springs, mounting.losses * moving, mounting.dampers * order.omega)
-        k, h, c = (mounts.root @ mounting.total(each) @ mounts.root.T for each in parts)
+        k, h, c = (mounts.root @ mounting.total(part) @ mounts.root.T for part in parts)
         load = order.loads[0] + self.basis.near @ order.loads[1:]
         loads = np.column_stack([load, WIDE * order.loads[1:].T])
         near = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(mounts.size), loads)

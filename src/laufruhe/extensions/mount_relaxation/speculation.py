@@ -1,4 +1,4 @@
-"""Bounds of several objectives under the constraints of one box, which other processes may work out ahead."""
+"""Bounds of several objectives under the constraints of one box, which worker processes may compute ahead."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from laufruhe.numerics.workers import Speculation, speculation
 _Step: TypeAlias = tuple[str, bytes, Array | int]
 Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
-# seconds of relaxations after which processes are worth starting: where there is one, there are often dozens
-WORTH = 0.25
+# seconds of relaxations after which worker processes start: such searches often need dozens
+START_SECONDS = 0.25
 
 
 class _Cache(threading.local):
-    """The program that this thread stated last."""
+    """Cone program that this thread built last, by name."""
 
     name = ""
     program: ConeProgram | None = None
@@ -40,12 +40,12 @@ def _bound(step: _Step) -> tuple[float, Array]:
 
 
 def bounds_ahead() -> AbstractContextManager[Ahead]:
-    """Return the speculative executor of all boxes of one search."""
-    return speculation(_bound, WORTH)
+    """Return the speculative executor for all boxes of one search."""
+    return speculation(_bound, START_SECONDS)
 
 
 class Objectives:
-    """Objectives of one program; every worker has a copy of it, so that all return the same."""
+    """Objectives of one program; each worker has a copy of it, so that all workers return the same bounds."""
 
     def __init__(self, program: SdpProgram, ahead: Ahead | None) -> None:
         self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead
@@ -53,12 +53,12 @@ class Objectives:
             ahead.discard()
 
     def bound(self, key: Hashable, objective: Array | int) -> tuple[float, Array]:
-        """Return the bound as `ConeProgram.minimum` does."""
+        """Return the bound and optimum as `ConeProgram.minimum` does; `key` names the objective."""
         step = (self._name, self._program, objective)
         return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
 
     def all_bounds(self, objectives: Sequence[Array | int]) -> list[float]:
-        """Return the bound of each of some objectives."""
+        """Return the bound of each objective; later ones are computed ahead."""
         bounds = []
         for k, objective in enumerate(objectives):
             self.prefetch(islice(enumerate(objectives), k, None))
@@ -66,6 +66,8 @@ class Objectives:
         return bounds
 
     def prefetch(self, objectives: Iterable[tuple[Hashable, Array | int]]) -> None:
-        """Name objectives that may be asked for next."""
+        """Start objectives that may follow, the most likely first."""
         if self._ahead is not None:
-            self._ahead.prefetch(((self._name, key), (self._name, self._program, own)) for key, own in objectives)
+            self._ahead.prefetch(
+                ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives
+            )
