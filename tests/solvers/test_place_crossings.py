@@ -54,7 +54,7 @@ def _bound(problem: Problem) -> float:
     """Return the bound of all places within their bounds, by whatever decides what else is open."""
     relaxed = without_places(problem)
     method = next(each for each in METHODS if each.suits(relaxed))
-    result = method.decided(relaxed)
+    result = method.solve(relaxed)
     assert result.certificate is not None
     return float(result.certificate.lower_bound)
 

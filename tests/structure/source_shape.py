@@ -167,6 +167,18 @@ def loading(known: Trees) -> set[str]:
     return found
 
 
+def is_lazy_call(function: Function) -> bool:
+    """Return True if a function imports another one and ends with its call: the module of the caller stays light."""
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    if len(body) < 2:
+        return False
+    first, last = body[0], body[-1]
+    call = last.value if isinstance(last, ast.Return | ast.Expr) else None
+    if not (isinstance(first, ast.ImportFrom) and isinstance(call, ast.Call) and isinstance(call.func, ast.Name)):
+        return False
+    return [alias.asname or alias.name for alias in first.names] == [call.func.id]
+
+
 def late_imports(known: Trees) -> set[str]:
     heavy = loading(known)
     return {
@@ -174,6 +186,7 @@ def late_imports(known: Trees) -> set[str]:
         for module, tree in known.items()
         if room(module) not in LATE_ROOMS and module.rpartition(".")[2] != COMMAND
         for _, function in functions(tree)
+        if not is_lazy_call(function)
         for node in statements(function)
         for name in imported(node, module, known)
         if name.partition(".")[0] not in HEAVY and name not in heavy

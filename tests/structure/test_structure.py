@@ -4,6 +4,7 @@ What breaks a rule today stands in `exceptions.toml`. Whoever mends one takes it
 `python tests/structure/source_shape.py --prune`.
 """
 
+import ast
 import pickle
 
 import pytest
@@ -15,7 +16,7 @@ from structure import source_shape
 pytestmark = pytest.mark.slow
 
 RULES = {
-    "late_imports": "imports inside a function, of what is neither a heavy library nor wanted by a command",
+    "late_imports": "imports inside a function, of no heavy library, for no command, and not to hand over",
     "circles": "modules in a circle of imports, those inside functions included",
     "questions_of_norm": "modules that ask which norm they hold, with how often",
     "questions_of_channel": "modules that ask which channel they measure, with how often",
@@ -59,3 +60,14 @@ def test_every_room_has_its_tests():
 def test_a_circle_is_found_also_through_a_third_module():
     graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set(), "e": {"a"}}
     assert source_shape.circles(graph) == [{"a", "b", "c"}]
+
+
+def test_a_function_that_hands_over_may_import_late():
+    def shape(text):
+        return source_shape.is_lazy_call(ast.parse(text).body[0])
+
+    assert shape("def f(x):\n    from m import g\n    return g(x)")
+    assert shape("def f(x):\n    'Docstring.'\n    from m import g\n    y = x + 1\n    g(y)")
+    assert not shape("def f(x):\n    from m import g\n    return 1 + g(x)")
+    assert not shape("def f(x):\n    from m import g, h\n    return g(h(x))")
+    assert not shape("def f(x):\n    return g(x)")

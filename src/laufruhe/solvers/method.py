@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
 
 from laufruhe.numerics.norms import Norm
-from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
@@ -53,9 +50,8 @@ class Method:
         Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
     reach
         What its bounds can prove.
-    home
-        The function `module:name` that finds the design, proven as far as it is; `.module:name` is below
-        `laufruhe.solvers`.
+    solver
+        Return the best design with its certificate. The function imports its module when it is first called.
     judges_fidelity
         Whether the fidelity is chosen again where the design needs a better one than that given (F11).
     knows
@@ -75,7 +71,7 @@ class Method:
     name: str
     needs: Mapping[Kind, Collection[Dependence]]
     reach: ProofStrength
-    home: str
+    solver: Callable[[Problem], Result]
     judges_fidelity: bool = False
     knows: frozenset[Channel] = frozenset()
     norms: Callable[[Norm], bool] = is_convex
@@ -111,13 +107,6 @@ class Method:
             return self.still(measure.channel)
         return all(each is Dependence.NONE or each in self.needs[kind] for kind, each in found.items())
 
-    def decided(self, problem: Problem) -> Result:
-        """The design, accurate as far as that is looked at; what decides is imported when it first does."""
-        solve = partial(by_home, self.home)
-        return solve_within(problem, solve) if self.judges_fidelity else solve(problem)
-
-
-def by_home(home: str, *asked: Any) -> Result:
-    """Call a function by its name; its module is imported when it is first called."""
-    found: Result = call_by_name(f"laufruhe.solvers{home}" if home.startswith(".") else home, *asked)
-    return found
+    def solve(self, problem: Problem) -> Result:
+        """Return the best design, at a better fidelity if the method judges that and the design needs it."""
+        return solve_within(problem, self.solver) if self.judges_fidelity else self.solver(problem)

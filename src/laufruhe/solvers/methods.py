@@ -12,7 +12,6 @@ from functools import cache, partial
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.processes import call_by_name
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
@@ -40,15 +39,16 @@ from laufruhe.solvers.conclusion import (
     build_result,
     evaluate_design,
     infeasible_result,
+    state,
     with_limits,
 )
 from laufruhe.solvers.cones.equal_designs import free_decisions
-from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
+from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_polished
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
 from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.lexicographic import solve_in_order
-from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, by_home, is_no_number, is_pointwise
-from laufruhe.solvers.mounts.convex import CONVEX, is_convex
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
+from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
@@ -67,16 +67,12 @@ def solve_separable(problem: Problem) -> Result:
 
 
 def solve_with_places(problem: Problem) -> Result:
-    """Places, and what else is open by the method of that alone."""
+    """Return the best positions of shafts, with a bound by the method that decides all other numbers."""
+    from laufruhe.solvers.boxes.places import solve_places_with
+
     method = _method(without_places(problem))
-    # fidelity is judged once, of all
-    return by_home(
-        ".boxes.places:solve_places_with",
-        problem,
-        partial(by_home, method.home),
-        method.name,
-        solve_all_numbers,
-    )
+    # `Method.solve` judges the fidelity of all numbers, so the inner solver does not
+    return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
 
 
 def _closes_without_places(problem: Problem) -> bool:
@@ -84,8 +80,58 @@ def _closes_without_places(problem: Problem) -> bool:
 
 
 def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
-    """Numbers that nothing better decides, by local programs; what loads are affine in by cones within them."""
-    return by_home(".general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES, near)
+    """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
+    from laufruhe.solvers.general import solve_generally
+
+    return solve_generally(problem, _decided, lambda part: _method(part).solver is solve_polished, near)
+
+
+def _solve_flywheel(problem: Problem) -> Result:
+    from laufruhe.solvers.boxes.flywheel import solve_flywheel
+
+    return solve_flywheel(problem)
+
+
+def _solve_leads(problem: Problem) -> Result:
+    from laufruhe.solvers.boxes.leads import solve_leads
+
+    return solve_leads(problem)
+
+
+def _solve_shared_leads(problem: Problem) -> Result:
+    from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
+
+    return solve_shared_leads(problem)
+
+
+def _solve_places(problem: Problem) -> Result:
+    from laufruhe.solvers.boxes.places import solve_places
+
+    return solve_places(problem)
+
+
+def _solve_phasing(problem: Problem) -> Result:
+    from laufruhe.solvers.stars.phasing_solver import solve_phasing
+
+    return solve_phasing(problem)
+
+
+def _refuse_long_cranks(problem: Problem) -> None:
+    from laufruhe.solvers.stars.even_search import refuse_long
+
+    refuse_long(problem)
+
+
+def _solve_joint(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.nonlinear import solve_joint
+
+    return solve_joint(problem)
+
+
+def _solve_star_mounts(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.stars import solve_star_mounts
+
+    return solve_star_mounts(problem)
 
 
 def _is_rigid(problem: Problem) -> bool:
@@ -103,53 +149,53 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
-_CONES, _JOINT = ".cones.unbalances:solve_polished", ".mounts.nonlinear:solve_joint"
-_STARS = ".stars.phasing_solver:solve_phasing"
 _OWN: tuple[Method, ...] = (
-    Method("evaluation", {}, ProofStrength.WHOLE, ".conclusion:state", norms=lambda _: True,
+    Method("evaluation", {}, ProofStrength.WHOLE, state, norms=lambda _: True,
            proves="the value itself"),
-    Method("boxes of the flywheel", {_F: ()}, ProofStrength.WHOLE, ".boxes.flywheel:solve_flywheel",
+    Method("boxes of the flywheel", {_F: ()}, ProofStrength.WHOLE, _solve_flywheel,
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.WHOLE, _CONES, True,
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.WHOLE, solve_polished, True,
            proves="the optimum"),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.WHOLE, _CONES, True,
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.WHOLE, solve_polished, True,
            proves="the optimum"),
-    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE, ".boxes.leads:solve_leads", True,
+    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE, _solve_leads, True,
            frozenset({IRREGULARITY}), is_pointwise, is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.WHOLE,
-           ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
+           _solve_shared_leads, True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
            is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
     Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, ProofStrength.WHOLE,
-           ".boxes.places:solve_places", True, OF_SHAFT_PLACES, is_pointwise,
+           _solve_places, True, OF_SHAFT_PLACES, is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.WHOLE, _STARS, True,
+    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.WHOLE, _solve_phasing, True,
            norms=is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
-    Method("linear matrix inequalities", {_K: ()}, ProofStrength.WHOLE, ".mounts.convex:solve_convex_mounts",
+    Method("linear matrix inequalities", {_K: ()}, ProofStrength.WHOLE, solve_convex_mounts,
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.NEAR, _JOINT, False, OF_MOUNTS, is_pointwise,
+    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.NEAR, _solve_joint, False, OF_MOUNTS,
+           is_pointwise,
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE, _JOINT, False, OF_MOUNTS, is_pointwise,
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE, _solve_joint, False, OF_MOUNTS,
+           is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart",
            dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.ASIDE,
-           ".methods:solve_separable", norms=lambda _: True, also=is_separable,
+           solve_separable, norms=lambda _: True, also=is_separable,
            proves="what each of them proves"),
     Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE,
-           ".mounts.stars:solve_star_mounts", False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,
+           _solve_star_mounts, False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
            {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE,
-           ".methods:solve_with_places", True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
+           solve_with_places, True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
            also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
     Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), ProofStrength.ASIDE,
-           ".methods:solve_all_numbers", norms=lambda _: True,
+           solve_all_numbers, norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
 
@@ -255,8 +301,8 @@ def refuse(problem: Problem) -> None:
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
-    if problem.phasing is not None and _method(problem).home == _STARS:
-        call_by_name("laufruhe.solvers.stars.even_search:refuse_long", problem)
+    if problem.phasing is not None and _method(problem).solver is _solve_phasing:
+        _refuse_long_cranks(problem)
 
 
 def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
@@ -277,9 +323,9 @@ def _by_method(problem: Problem) -> Result:
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
     closing = _closing(problem, kinds, method)
     if closing is None:
-        return method.decided(problem)
+        return method.solve(problem)
     other, fewer = closing
-    return solve_by_relaxation(problem, fewer, other.decided, method.decided)
+    return solve_by_relaxation(problem, fewer, other.solve, method.solve)
 
 
 def _refuse_any_rank(problem: Problem) -> None:

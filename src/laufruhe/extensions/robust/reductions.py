@@ -2,21 +2,38 @@
 
 from __future__ import annotations
 
-from functools import partial
-
 from laufruhe.extensions.robust.assembly import Assembly
 from laufruhe.extensions.robust.tolerance import Robust
-from laufruhe.numerics.processes import call_by_name
-from laufruhe.solvers.methods import Reduction
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.methods import Decide, Reduction
+from laufruhe.solvers.result import Result
 
-_HOME, _NEXT = "laufruhe.extensions.robust", "limits that nothing open moves"
+_NEXT = "limits that nothing open moves"
 
-ASSEMBLY = Reduction(
-    "assembly", lambda p: p.extra(Assembly) is not None,
-    partial(call_by_name, f"{_HOME}.assembly_solver:solve_assembly"),
-    partial(call_by_name, f"{_HOME}.assembly_solver:refuse"), _NEXT,
-)  # fmt: skip
-TOLERANCES = Reduction(
-    "tolerances", lambda p: p.extra(Robust) is not None, partial(call_by_name, f"{_HOME}.solver:solve_built"),
-    partial(call_by_name, f"{_HOME}.solver:refuse"), _NEXT,
-)  # fmt: skip
+
+def _solve_assembly(problem: Problem, decide: Decide, rest: Decide) -> Result:
+    from laufruhe.extensions.robust.assembly_solver import solve_assembly
+
+    return solve_assembly(problem, decide, rest)
+
+
+def _refuse_assembly(problem: Problem) -> None:
+    from laufruhe.extensions.robust.assembly_solver import refuse
+
+    refuse(problem)
+
+
+def _solve_built(problem: Problem, decide: Decide, rest: Decide) -> Result:
+    from laufruhe.extensions.robust.solver import solve_built
+
+    return solve_built(problem, decide, rest)
+
+
+def _refuse_built(problem: Problem) -> None:
+    from laufruhe.extensions.robust.solver import refuse
+
+    refuse(problem)
+
+
+ASSEMBLY = Reduction("assembly", lambda p: p.extra(Assembly) is not None, _solve_assembly, _refuse_assembly, _NEXT)
+TOLERANCES = Reduction("tolerances", lambda p: p.extra(Robust) is not None, _solve_built, _refuse_built, _NEXT)

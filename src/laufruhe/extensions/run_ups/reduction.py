@@ -1,7 +1,6 @@
 """Reduction: what else is asked is decided first, and run-ups after it."""
 
 from laufruhe.load_models.simulated import simulated_measures
-from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import kinds_of
 from laufruhe.problem.problem import Problem
@@ -14,8 +13,9 @@ def _applies(problem: Problem) -> bool:
 
 
 def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:
-    result: Result = call_by_name("laufruhe.extensions.run_ups.solver:solve_runs", problem, kinds_of(problem), decide)
-    return result
+    from laufruhe.extensions.run_ups.solver import solve_runs
+
+    return solve_runs(problem, kinds_of(problem), decide)
 
 
 REDUCTION = Reduction("run-ups", _applies, _solve, before="an objective that nothing open moves")

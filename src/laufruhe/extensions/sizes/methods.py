@@ -8,8 +8,8 @@ from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
+from laufruhe.solvers.result import Result
 
-_HERE = "laufruhe.extensions.sizes"
 _ALONE = {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}
 
 
@@ -21,19 +21,37 @@ def _minimises_loads(problem: Problem) -> bool:
     return any(not term.measure.is_mounting for term in problem.objective)
 
 
+def _solve_sizes(problem: Problem) -> Result:
+    from laufruhe.extensions.sizes.solver import solve_sizes
+
+    return solve_sizes(problem)
+
+
+def _solve_star_sizes(problem: Problem) -> Result:
+    from laufruhe.extensions.sizes.stars import solve_star_sizes
+
+    return solve_star_sizes(problem)
+
+
+def _solve_mounted_sizes(problem: Problem) -> Result:
+    from laufruhe.extensions.sizes.mounted import solve_mounted_sizes
+
+    return solve_mounted_sizes(problem)
+
+
 ALONE = Method(
-    "boxes of sizes", _ALONE, ProofStrength.WHOLE, f"{_HERE}.solver:solve_sizes", True, OF_SIZES_ALONE, _is_of_lengths,
+    "boxes of sizes", _ALONE, ProofStrength.WHOLE, _solve_sizes, True, OF_SIZES_ALONE, _is_of_lengths,
     is_no_number, before="linear matrix inequalities",
     proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move with it (Z13)",
 )  # fmt: skip
 WITH_STARS = Method(
     "stars, each with boxes of sizes", {Kind.STAR: BUILT, **_ALONE}, ProofStrength.WHOLE,
-    f"{_HERE}.stars:solve_star_sizes", True, OF_SIZES_ALONE, _is_of_lengths, is_no_number,
+    _solve_star_sizes, True, OF_SIZES_ALONE, _is_of_lengths, is_no_number,
     before="linear matrix inequalities", proves="the optimum, of 60 even stars or firing orders at most",
 )  # fmt: skip
 WITH_MOUNTS = Method(
     "local programs of sizes and mounts", {**_ALONE, Kind.STIFFNESS: (), Kind.MOUNT: ()}, ProofStrength.ASIDE,
-    f"{_HERE}.mounted:solve_mounted_sizes", False, OF_SIZES_ALONE | OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
+    _solve_mounted_sizes, False, OF_SIZES_ALONE | OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
     before="stars, each with a smooth program",
     proves="a local optimum, with the bound of any masses that the sizes may have (Z15)",
 )  # fmt: skip

@@ -61,7 +61,7 @@ def solve_torsion(problem: Problem) -> Result:
 
 METHOD = Method(
     "boxes of discs and shafts", {TORSION: ()}, ProofStrength.NEAR,
-    "laufruhe.extensions.torsion.solver:solve_torsion", True,
+    solve_torsion, True,
     frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
     proves="the optimum of root mean squares of two or three; else a local one",
     before="flywheel, crankshaft and the rest apart",
