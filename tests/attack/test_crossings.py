@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,17 +13,20 @@ import numpy as np
 import pytest
 
 from attack.claims import Verdict, judge, solved
+from attack.plain_scene import Table
 from attack.run_attack import attacked, drawn, summary
 from laufruhe.solvers.result import Result
 
 SEED = 500000
-QUICK = ("pistons and stars", "stars on mounts", "ranks with limits", "optional shafts and uneven throws")
+SEEDS = {"transmissibility and weights": 500004}
+"""Of a family whose first one takes long."""
+QUICK = ("stars on mounts", "optional shafts and uneven throws")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("family", [*QUICK, "transmissibility and weights", "robust and star"])
 def test_no_claim_falls(family: str) -> None:
-    verdict = attacked(family, SEED, 1)
+    verdict = attacked(family, SEEDS.get(family, SEED), 1)
     assert verdict.wrong == []
     assert verdict.status in ("optimal", "feasible", "infeasible", "refused")
 
@@ -35,14 +40,21 @@ def raised(result: Result) -> Result:
     return replace(result, certificate=replace(result.certificate, lower_bound=bound), ranks=ranks)
 
 
+@cache
+def solution(family: str) -> tuple[Table, Result]:
+    table, _ = drawn(family, SEED)
+    with tempfile.TemporaryDirectory(prefix="attack-") as folder:
+        return table, solved(table, Path(folder))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ["pistons and stars", "ranks with limits"])
 @pytest.mark.parametrize(("change", "is_true"), [(raised, False), (lambda result: result, True)], ids=["lie", "truth"])
-def test_a_lie_is_heard(family: str, change: Callable[[Any], Any], is_true: bool, tmp_path: Path) -> None:
-    table, _ = drawn(family, SEED)
+def test_a_lie_is_heard_and_nothing_else(family: str, change: Callable[[Any], Any], is_true: bool) -> None:
+    table, result = solution(family)
     verdict = Verdict(family, SEED)
-    judge(verdict, table, change(solved(table, tmp_path)), np.random.default_rng(0), 1)
-    assert any("bound" in line for line in verdict.wrong) is not is_true
+    judge(verdict, table, change(result), np.random.default_rng(0), 1)
+    assert verdict.wrong == [] if is_true else any("bound" in line for line in verdict.wrong)
 
 
 def test_a_summary_counts_what_is_false_and_what_is_unknown() -> None:

@@ -227,7 +227,7 @@ def test_what_is_wrongly_taken_for_a_constant_is_found_out(monkeypatch: pytest.M
     problem = load(RESULTANT)
     known = at(problem, BETTER)
     assert known == pytest.approx(37.21, abs=0.01)
-    assert claims_no_more_than(solve(problem), known)
+    assert claims_no_more_than(solve(problem.changed(search=replace(problem.search, starts=1))), known)
 
 
 @pytest.mark.slow
@@ -237,5 +237,5 @@ def test_a_norm_and_a_channel_that_nobody_knows_are_claimed_nothing_false_of(mon
     monkeypatch.setitem(NORMS, norm.name, norm)  # type: ignore[arg-type]
     monkeypatch.setitem(MEASURES, f"{norm.name} {channel}", (CHANNELS[channel], norm))  # type: ignore[arg-type]
     problem = load(RESULTANT.read_text().replace("rms transmitted force", f"{norm.name} {channel}"))
-    found = solve(problem)
+    found = solve(problem.changed(search=replace(problem.search, starts=1)))
     assert claims_no_more_than(found, at(problem, BETTER))

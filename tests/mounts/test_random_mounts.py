@@ -12,7 +12,7 @@ from mounts.random_mounts import FAMILIES, complaints, drawn_problem
 
 # the cheapest of each family
 FIRST = {
-    "two": 100, "one": 101, "four": 102, "convex": 100, "tied": 102, "lossy": 100, "placed": 100, "joint": 102,
+    "two": 100, "one": 101, "four": 102, "convex": 100, "tied": 102, "lossy": 103, "placed": 100, "joint": 102,
     "gas": 101,
 }  # fmt: skip
 CASES = [(seed, family) for family, seed in FIRST.items()]

@@ -247,7 +247,7 @@ def test_bound_and_design_enclose_the_best_of_a_grid(tmp_path, rest):
     problem = engines.problem(tmp_path, 3, "two-stroke", BOUNDED, "", rest + "[search]\nboxes = 100\n", samples=96)
     result = solve(problem)
     phasing, values = problem.phasing, []
-    for second, third in itertools.product(np.linspace(60, 180, 9), np.linspace(170, 300, 10)):
+    for second, third in itertools.product(np.linspace(60, 180, 5), np.linspace(170, 300, 6)):
         throws = (0.0, math.radians(second), math.radians(third))
         order = next(lap_orders(phasing.cycle, phasing.layout(None, None), throws), None)
         try:

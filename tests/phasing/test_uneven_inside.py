@@ -49,6 +49,7 @@ VEE = {
 TWIN = {
     "layout": "vee", "throws": "open", "firing_order": [1, 2], "bank_angle": {"between": [60, 120]}, "cylinders": 2
 }  # fmt: skip
+COARSE = {"samples": 96}
 WIDE = {"intervals": {"largest_deviation": "100 deg"}}
 LOADS = (
     "main-bearing force", "main-bearing pressure", "crank-pin force", "side force", "rod force", "hammer blow",
@@ -161,7 +162,7 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     """Every throw on its arc in steps, the weight at its optimum there."""
     problem, result = decided(quantity)
     weights = bool(problem.unbalances)
-    phasing, steps = problem.phasing, 3 if weights else 9
+    phasing, steps = problem.phasing, 3 if weights else 6
     bounds = [np.linspace(*pair, steps if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds]
     minimum = math.inf
     for throws in itertools.product(*bounds):
@@ -201,13 +202,15 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
     maximum = 0.3 * even.objective.initial + 0.7 * even.objective.value
     limit = [{"limit": "degree of irregularity", "max": maximum}]
     result = laufruhe.solve(
-        problem := problem_of(BETWEEN, "rms main-bearing force", counterweights=None, constraints=limit)
+        problem := problem_of(
+            BETWEEN, "rms main-bearing force", counterweights=None, constraints=limit, fidelity=COARSE
+        )
     )
     assert result.limits[0].value <= maximum * (1.0 + 1e-6)
     assert result.limits[0].value >= 0.95 * maximum
     phasing, start, minimum = problem.phasing, starts_of(problem.phasing, None, True)[0], math.inf
     for throws in itertools.product(
-        *(np.linspace(*pair, 8 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
+        *(np.linspace(*pair, 6 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
     ):
         own = replace(phasing.realise(replace(start, throws=tuple(map(float, throws)))), phasing=None)
         found = evaluate(own)
@@ -221,6 +224,7 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
             "rms main-bearing force",
             counterweights=None,
             constraints=[{"limit": "degree of irregularity", "max": 0.5 * even.objective.value}],
+            fidelity=COARSE,
         )
     )
     assert told.status is Status.INFEASIBLE
@@ -294,10 +298,10 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     assert result.status is Status.FEASIBLE
     values = []
     start = starts_of(problem.phasing, None, True)[0]
-    for angle in np.radians(np.linspace(100, 140, 9)):
+    for angle in np.radians(np.linspace(100, 140, 5)):
         own = problem.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
         decision = own.mount_decisions[0]
-        for stiffness in np.linspace(decision.lower, decision.upper, 9):
+        for stiffness in np.linspace(decision.lower, decision.upper, 6):
             found = evaluate(own, own.design([float(stiffness)], [decision]))
             if found.violation(own.limits) <= 0.0:
                 values.append(objective_value(own, found))

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from lanes import first_fast
 from laufruhe.errors import LaufruheError, ModelError
 from laufruhe.extension import Extension
 from laufruhe.problem import dependence as module
@@ -145,10 +146,10 @@ def test_few_engines_refute_no_entry() -> None:
     assert len(_check(FEW, 1)) > 160
 
 
-@pytest.mark.slow
+@pytest.mark.parametrize("rounds", first_fast((1, 2), 0, 1))
 @pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
-def test_no_engine_refutes_an_entry() -> None:
-    seen = _check(_ready(), 2)
+def test_no_engine_refutes_an_entry(rounds: int) -> None:
+    seen = _check(_ready(), rounds)
     assert len(seen) > 370
     sampled = {kind for _, kind in seen}
     assert sampled == set(KINDS.values()) - {Kind.STAR, Kind.NUMBER}
@@ -201,12 +202,12 @@ def test_leads_shift_what_each_shaft_carries() -> None:
 @pytest.mark.slow
 def test_no_star_moves_what_is_constant() -> None:
     seen = set()
-    for name in ("inline-five", "tractor-four-open", "two-stroke-four-open", "inline-nine-uneven"):
+    for name in ("inline-five", "tractor-four-open", "two-stroke-four-open", "inline-seven-uneven"):
         path = PROBLEMS / f"{name}.toml"
         problem = laufruhe.load(path) if path.exists() else None
         if problem is None or problem.phasing is None or problem.phasing.throws is not None:
             continue
-        stars = [star for star, _ in even_stars(problem.phasing)][:3]
+        stars = [star for star, _ in even_stars(problem.phasing)][:2]
         at = [evaluate(whole := problem.phasing.realise(star), whole.engine) for star in stars]
         for channel in CHANNELS.values():
             told = [_numbers(channel, evaluation) for evaluation in at]

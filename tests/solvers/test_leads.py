@@ -151,7 +151,7 @@ def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path:
     assert result.certificate.kind is Proof.GLOBAL
     # at as many angles as it was told at
     fine = result.problem.fidelity
-    fixed = [loaded(tmp_path, turned(text, angle)).at(fine) for angle in np.linspace(0.0, 354.0, 60)]
+    fixed = [loaded(tmp_path, turned(text, angle)).at(fine) for angle in np.linspace(0.0, 345.0, 24)]
     minimum = min(objective_value(each, evaluate(each)) for each in fixed)
     value = objective_value(result.problem, result.final)
     assert result.certificate.lower_bound <= value <= minimum * (1.0 + 1e-6)

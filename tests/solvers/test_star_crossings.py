@@ -10,10 +10,12 @@ from open_four import FOUR, solved_each
 from problem_files import PROBLEMS, changed
 from ready import solved
 
+FEW = "[search]\nstarts = 2\n[fidelity]\nsamples = 90\n"
+
 
 @pytest.mark.slow
 def test_a_stroke_beside_an_open_crank_is_searched_for_each() -> None:
-    text = changed(FOUR, 'stroke = "80 mm"', 'stroke = { between = ["70 mm", "90 mm"] }')
+    text = changed(FOUR, 'stroke = "80 mm"', 'stroke = { between = ["70 mm", "90 mm"] }') + FEW
     found = laufruhe.solve(text)
     assert found.certificate.kind is Proof.LOCAL
     assert found.objective.value == pytest.approx(min(one.objective.value for one in solved_each(text)), rel=1e-6)
@@ -35,9 +37,9 @@ def test_optional_shafts_with_open_places_are_decided_set_by_set() -> None:
 def test_throws_that_leave_the_even_steps_move_with_a_stroke() -> None:
     """A short stroke is best, and at it the crank is that of the method of uneven throws, which proves it."""
     text = changed(changed(FOUR, "cylinders = 4", "cylinders = 3"), 'rotating_mass = "0.3 kg"\n', "")
-    text += '[phasing]\nintervals = { largest_deviation = "40 deg" }\n'
+    text += '[phasing]\nintervals = { largest_deviation = "40 deg" }\n' + FEW
     found = laufruhe.solve(changed(text, '"80 mm"', '{ between = ["70 mm", "90 mm"], start = "80 mm" }'))
     given = laufruhe.solve(changed(text, '"80 mm"', '"70 mm"'))
     assert found.certificate.kind is Proof.LOCAL
-    assert found.objective.value == pytest.approx(given.objective.value, rel=1e-4)
+    assert found.objective.value == pytest.approx(given.objective.value, rel=2e-4)
     assert found.objective.value >= given.certificate.lower_bound * (1.0 - 1e-6)

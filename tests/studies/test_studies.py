@@ -322,7 +322,7 @@ def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.slow
 def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -> None:
-    path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(12)))
+    path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(4)))
     one = computed(path, small, 1, tmp_path / "1" / FINISHED_POINTS)
     two = computed(path, small, 2, tmp_path / "2" / FINISHED_POINTS)
     assert one.identical(two)

@@ -56,7 +56,7 @@ def norms_of(problem: Problem, family: Family) -> CoupleNorms | None:
 def even_stars(family: Family) -> Stars:
     first = family.first
     found = {(0, *rest) for rest in itertools.islice(itertools.permutations(first[1:]), 2000)}
-    return np.array(sorted(found)[:: max(1, len(found) // 60)], dtype=np.uint8)
+    return np.array(sorted(found)[:: max(1, len(found) // 30)], dtype=np.uint8)
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -55,12 +55,12 @@ def figure() -> Callable[[str], xr.Dataset]:
 
 
 @pytest.fixture(scope="session")
-def finished() -> Callable[[str, Path], None]:
-    """Put the finished points of a whole replication into a folder: its command goes on from there."""
+def finished() -> Callable[..., None]:
+    """Put the finished points of a replication, or of some parts, into a folder: its command goes on from there."""
 
-    def fill(file: str, folder: Path) -> None:
+    def fill(file: str, folder: Path, names: Collection[str] = ()) -> None:
         folder.mkdir(parents=True)
-        for part in parts_of(file):
+        for part in names or parts_of(file):
             points = shared_part(file, part) / FINISHED_POINTS
             if points.exists():
                 with (folder / FINISHED_POINTS).open("ab") as kept:

@@ -137,7 +137,7 @@ def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
 def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> None:
     travel = {"name": "travel", "limit": "run-up travel", "max": "1 m"}
     asked = on_open_mounts(
-        0, run_up={"up_to": "3000 rpm", "time": "0.5 s"}, objective={"minimise": "rms mount force"},
+        0, run_up={"up_to": "1500 rpm", "time": "0.2 s"}, objective={"minimise": "rms mount force"},
         constraints=[second(1.0001), travel],
     )  # fmt: skip
     assert not excludes(asked, asked.limits)

@@ -450,10 +450,8 @@ def test_a_ranking_says_what_it_is_about(page: Page) -> None:
 
 
 def test_a_trace_that_changes_is_solved_again(page: Page, tmp_path: Path) -> None:
-    text = (INPUTS / "rank-all-cranks.toml").read_text(encoding="utf-8")
-    # with the shafts where they are
-    for open_one, closed in (("60", "100"), ("-120", "-100"), ("-230", "-200")):
-        text = re.sub(r"\{ between = \[\"" + open_one + r" mm\", \"[-\d]+ mm\"\] \}", f'"{closed} mm"', text)
+    text = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
+    text = re.sub(r"\[gas\]\n(?:.+\n)+", '[gas]\nmodel = "trace"\nfile = "page-trace.csv"\n', text)
     (tmp_path / "own.toml").write_text(text, encoding="utf-8")
     trace = (INPUTS / "page-trace.csv").read_text(encoding="utf-8")
     (tmp_path / "page-trace.csv").write_text(trace, encoding="utf-8")

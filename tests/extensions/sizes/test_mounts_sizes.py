@@ -78,7 +78,7 @@ def test_a_local_optimum_keeps_its_limits_and_no_random_design_is_better(solved:
     assert solved.certificate.kind is Proof.LOCAL
     assert solved.final.violation(problem.limits) <= 1e-5
     rng = np.random.default_rng(1)
-    for _ in range(150):
+    for _ in range(60):
         evaluation = evaluate(problem, problem.design(placed(problem, random_design(problem, rng))))
         if evaluation.violation(problem.limits) <= 0.0:
             assert objective_value(problem, evaluation) >= solved.objective.value * (1.0 - 1e-6)

@@ -124,7 +124,7 @@ def test_boxes_exclude_no_pendulum_that_keeps_its_limit(order: float) -> None:
     (limit,) = problem.limits
     rng, told = np.random.default_rng(5), {True: 0, False: 0}
     initial = evaluate(problem)
-    for _ in range(60):
+    for _ in range(45):
         own = replace(limit, outside=tuple(sorted(rng.uniform(1000.0, 9000.0, 2) / RPM)))
         boxes = TwistBoxes(problem.changed(limits=(own,)), initial)
         ends = np.sort(rng.uniform(boxes.coordinates.lower, boxes.coordinates.upper, (2, 2)), axis=0)
