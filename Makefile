@@ -19,7 +19,7 @@ SMOKE := tests/problem/test_units.py tests/files/test_reader.py tests/report/tes
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
 	@echo "make study      sweeps and comparisons that STUDY describes ($(STUDY))"
-	@echo "make test-fast  tests of every room, under a minute on two cores"
+	@echo "make test-fast  tests of every room, and of the extensions that a change reaches; under a minute on two cores"
 	@echo "make test       all tests, minutes"
 	@echo "make test-long  the long tail of random families, which make test leaves out"
 	@echo "make test-lowest  a smoke part of the tests with the lowest versions that pyproject.toml allows, about a minute"
@@ -67,7 +67,7 @@ test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)
 
 test-fast: $(STAMP)
-	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast $(TESTS)
+	$(BIN)/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast --changed $(TESTS)
 
 test-long: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) --long $(TESTS)

@@ -11,7 +11,9 @@ import typer.testing
 from hypothesis import settings
 from hypothesis.configuration import set_hypothesis_home_dir
 
+import changed
 import core_seconds
+import lanes
 import shared
 
 # Tests run in a process for each core: none of them starts further ones unless it says how many.
@@ -37,11 +39,17 @@ settings.load_profile("laufruhe")
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--long", action="store_true", help="run what is marked long, and only that")
     core_seconds.add_options(parser)
+    changed.add_options(parser)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    return True if changed.ignores(collection_path, config) else None
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     core_seconds.mark_listed(config, items)
+    lanes.mark_long(items)
     wanted = bool(config.getoption("--long"))
     sorted_out: dict[bool, list[pytest.Item]] = {True: [], False: []}
     for item in items:

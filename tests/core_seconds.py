@@ -88,11 +88,11 @@ class CoreSeconds:
                 terminalreporter.write_line(f"and {len(further)} further")
 
     def _relist(self, over: set[str]) -> None:
-        kept = {name for name in listed_now() if name not in self.spent and _is_there(name)}
+        kept = {name for name in listed_now() if name not in self.spent and is_there(name)}
         LISTED.write_text(_HEAD + "".join(f"{name}\n" for name in sorted(kept | over)), encoding="utf-8")
 
 
-def _is_there(name: str) -> bool:
+def is_there(name: str) -> bool:
     file, _, rest = name.partition("::")
     path = LISTED.parents[1] / file
     function = rest.partition("[")[0].rpartition("::")[2]

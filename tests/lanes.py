@@ -4,9 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import pytest
+
+LONG = Path(__file__).with_name("long.txt")
+"""Costly tests of `make test-long`, each with the test of `make test` that shows the same."""
+
+
+def long_and_shorter() -> dict[str, str]:
+    """Return the listed tests, a whole function or one of its cases, and what stands in for each."""
+    lines = LONG.read_text(encoding="utf-8").splitlines()
+    return dict(line.split(" <- ") for line in lines if line and not line.startswith("#"))
+
+
+def mark_long(items: Iterable[pytest.Item]) -> None:
+    listed = long_and_shorter()
+    for item in items:
+        if item.nodeid in listed or item.nodeid.partition("[")[0] in listed:
+            item.add_marker("long")
 
 
 def first_fast(values: Iterable[Any], fast: int, usual: int | None = None, long: Collection[Any] = ()) -> list[Any]:

@@ -9,7 +9,9 @@ from typing import Any
 import pytest
 
 import core_seconds
-from core_seconds import CoreSeconds, listed_now, mark_listed
+from changed import reached
+from core_seconds import CoreSeconds, is_there, listed_now, mark_listed
+from lanes import long_and_shorter
 
 HERE = "tests/structure/test_lanes.py"
 OWN = f"{HERE}::test_a_run_lists_what_took_longer"
@@ -49,3 +51,27 @@ def test_what_is_listed_is_marked_unless_it_is_measured_anew(told: CoreSeconds) 
         config: Any = SimpleNamespace(getoption=lambda name, relist=relist: relist)
         mark_listed(config, items)
         assert marked == ([] if relist == "anew" else ["slow"])
+
+
+def test_a_listed_long_test_has_a_cheaper_one_that_make_test_runs() -> None:
+    listed = long_and_shorter()
+    for costly, shorter in listed.items():
+        assert is_there(costly), costly
+        assert is_there(shorter), shorter
+        assert not {shorter, shorter.partition("[")[0]} & set(listed), shorter
+
+
+@pytest.mark.parametrize(
+    ("path", "names"),
+    [
+        ("src/laufruhe/extensions/sizes/model.py", {"sizes"}),
+        ("tests/extensions/torsion/inputs/pendulum.toml", {"torsion"}),
+        ("src/laufruhe/prove/certificate.py", {"sizes", "torsion"}),
+        ("src/laufruhe/machine/layouts/radial.py", set()),
+        ("docs/index.rst", set()),
+        ("tests/conftest.py", {"rotary", "sizes", "torsion"}),
+        ("problems/tractor-four.toml", {"rotary", "sizes", "torsion"}),
+    ],
+)
+def test_a_change_reaches_its_extension_and_those_that_import_it(path: str, names: set[str]) -> None:
+    assert reached(["rotary", "sizes", "torsion"], [path]) == names
