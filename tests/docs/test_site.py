@@ -57,6 +57,18 @@ def test_pages_say_all_without_the_site() -> None:
             assert place in filled or not re.search(r"^(```|:::)\{|project:", text, re.MULTILINE), place
 
 
+PLAIN_TABLES = {"how-to/what-is-proven.md", "reference/keys.md"}
+"""Pages of tables, in which a reader looks up one row."""
+LONGEST = 1500
+
+
+def test_pages_are_read_in_one_sitting() -> None:
+    """A page that outgrows its subject is divided; pages of theory follow their derivations."""
+    paths = [path for folder in ("how-to", "tutorials", "reference") for path in (DOCS / folder).glob("*.md")]
+    lengths = {str(path.relative_to(DOCS)): len(path.read_text(encoding="utf-8").split()) for path in paths}
+    assert not {page for page, words in lengths.items() if words > LONGEST} - PLAIN_TABLES
+
+
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_pictures_of_the_gallery_are_of_ready_problems(path: Path) -> None:
     texts = [

@@ -1,4 +1,4 @@
-"""Every command of tutorials and how-to pages runs, and says what the page says."""
+"""Every command of tutorials, how-to and reference pages runs, and says what the page says."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
+from laufruhe.files.ready import copies
 
 DOCS = Path(__file__).parents[2] / "docs"
 FILE = re.compile(r"^Save this as `([\w.-]+\.toml)`.*:\n\n```toml\n((?:.*\n)*?)```", re.MULTILINE)
@@ -34,7 +35,9 @@ def commands(text: str) -> list[tuple[list[str], list[str]]]:
 
 
 TUTORIALS = sorted(DOCS.glob("tutorials/*.md"))
-PAGES = [*TUTORIALS, *sorted(DOCS.glob("how-to/*.md"))]
+REFERENCE = [page for page in sorted(DOCS.glob("reference/*.md")) if page.stem != "python"]
+"""Pages of reference but the one of Python, whose calls tests/docs/test_reference.py makes."""
+PAGES = [*TUTORIALS, *sorted(DOCS.glob("how-to/*.md")), *REFERENCE]
 
 
 def pages(kind: str) -> list[Path]:
@@ -48,10 +51,11 @@ def name_of(page: Path) -> str:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder of a user who saved the files of the pages."""
+    """A folder of a user who saved the files of the pages and copied a ready problem."""
     for page in TUTORIALS:
         for name, text in FILE.findall(page.read_text(encoding="utf-8")):
             (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "tractor-single.toml").write_text(copies(["tractor-single"])["tractor-single.toml"], encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
     return tmp_path

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import re
+import textwrap
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+import laufruhe
 from laufruhe import units
 from laufruhe.files.reader import load
 from laufruhe.files.ready import schema_file
@@ -20,7 +22,23 @@ from schemas import WORDS, schema, study_schema
 
 LANCHESTER = next(path for path in READY if path.stem == "tractor-four-lanchester")
 STUDIES = [path for path in sorted(PROBLEMS.glob("*.toml")) if path not in READY]
+DOCS = Path(__file__).parents[2] / "docs"
+REFERENCE = DOCS / "reference"
+EXAMPLE = re.compile(r"^ *```toml\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+# a page on packages shows a pyproject.toml and words that its package adds
+EXAMPLES = [
+    path
+    for folder in ("how-to", "reference", "tutorials")
+    for path in sorted((DOCS / folder).glob("*.md"))
+    if path.stem != "extend" and EXAMPLE.search(path.read_text(encoding="utf-8"))
+]
 NUMBERS = ("m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "N s/m", "Hz", "rad", "rad/s", "m/s", "s")
+
+
+def problem_pages() -> list[str]:
+    """Pages that explain the tables of problem files: the overview, and those that its table names."""
+    overview = (REFERENCE / "problem-files.md").read_text(encoding="utf-8")
+    return ["problem-files.md", *dict.fromkeys(re.findall(r"^\| `.*\]\(([\w-]+\.md)\) \|$", overview, re.MULTILINE))]
 
 
 @pytest.fixture(scope="module")
@@ -92,14 +110,40 @@ def test_damaged_problems_do_not(change: Any, validator: jsonschema.Draft7Valida
 
 def test_every_key_of_a_problem_file_is_explained() -> None:
     """In code, not in prose: between backticks, in a fence, or indented."""
-    docs = Path(__file__).parents[2] / "docs"
-    names = ("reference/problem-files", "reference/quantities")
-    text = "\n".join((docs / f"{name}.md").read_text(encoding="utf-8") for name in names)
+    text = "\n".join((REFERENCE / name).read_text(encoding="utf-8") for name in problem_pages())
     code = re.findall(r"`[^`\n]+`|^(?:    |```)[^\n]*$|^\[[^\n]*$|^[a-z_]+ *=[^\n]*$", text, re.MULTILINE)
     known = set(re.findall(r"[a-z_]+", "\n".join(code)))
     tables = json.loads(schema_file()[1])
     keys = {key for table in (tables, *tables["definitions"].values()) for key in table.get("properties", {})}
     assert not keys - known
+
+
+def test_every_page_of_keys_is_read() -> None:
+    """The overview leads to a page for each group of tables."""
+    assert {"engine.md", "mounts-and-block.md", "crankshaft.md", "quantities.md"} < set(problem_pages())
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_examples_of_the_pages_fit_the_schema(path: Path) -> None:
+    """A block with a title is a complete file; another one may lack keys, but has no wrong key or value."""
+    for text in EXAMPLE.findall(path.read_text(encoding="utf-8")):
+        tables = tomllib.loads(textwrap.dedent(text))
+        is_study = "study" in tables
+        found = json.loads(schema_file(is_study=is_study)[1])
+        jsonschema.Draft7Validator(found if "title" in tables else _partial(found)).validate(tables)
+        if "title" in tables and not is_study:
+            assert laufruhe.load(tables).title == tables["title"]
+
+
+def _partial(schema: Any) -> Any:
+    """Return the schema without the keys that a table must have, except those that choose its kind."""
+    if isinstance(schema, dict):
+        return {
+            key: value if key == "if" else _partial(value)
+            for key, value in schema.items()
+            if key != "required" or not isinstance(value, list)
+        }
+    return [_partial(value) for value in schema] if isinstance(schema, list) else schema
 
 
 @pytest.mark.parametrize("is_study", [False, True], ids=["problem", "study"])
