@@ -20,7 +20,7 @@ from attack.plain_loads import number
 from attack.plain_scene import Table, norm_and_channel, smallest_ball, terms_of
 
 Plane = tuple[float, np.ndarray]
-STEPS = {"mean": 8, "worst mean": 8, "rms": 8, "maximum": 2, "peak to peak": 2}
+STEPS = {"mean": 8, "worst mean": 8, "rms": 8, "rmq": 8, "maximum": 2, "peak to peak": 2}
 LEVEL = 0.4
 
 
@@ -60,6 +60,10 @@ class Load:
             return [
                 (float((each * length).sum()), np.einsum("kjn,kjnd,kjndq->q", each + 0 * length, along, self.slopes))
             ]
+        if self.norm == "rmq":
+            value = float((each * length**4).sum()) ** 0.25
+            slope = np.einsum("kjn,kjnd,kjndq->q", each * length**2, rows, self.slopes)
+            return [(value, slope / (value**3 or 1.0))]
         value = math.sqrt(float((each * length**2).sum()))
         slope = np.einsum("kjn,kjnd,kjndq->q", each + 0 * length, rows, self.slopes)
         return [(value, slope / (value or 1.0))]

@@ -886,6 +886,24 @@ def worst_means(rng: Generator) -> Table:
     return {**table, "objective": terms[0] if "minimise" in told else {"terms": terms}}
 
 
+def root_mean_quads(rng: Generator) -> Table:
+    """Another family with the root mean quad of its loads in place of their norms."""
+    table = FAMILIES[str(rng.choice(OF_ROOT_MEAN_QUADS))](rng)
+    objective = dict(table["objective"])
+    terms = [objective] if "minimise" in objective else [dict(term) for term in objective["terms"]]
+    for term in terms:
+        key = "minimise" if "minimise" in term else "quantity"
+        norm, channel = norm_and_channel(term[key])
+        if norm and channel in (*LOADS, *ELASTIC):
+            term[key] = f"rmq {channel}"
+    return {**table, "objective": terms[0] if "minimise" in objective else {"terms": terms}}
+
+
+OF_ROOT_MEAN_QUADS = (
+    "inline", "vee", "boxer", "radial", "points", "gas", "crankcase", "stars", "open-vees", "elastic-few", "joint",
+    "elastic-balance", "uneven", "places", "leads", "bank angle", "shared leads", "sizes",
+)  # fmt: skip
+
 OF_WORST_MEANS = ("inline", "vee", "boxer", "radial", "points", "gas", "elastic-balance")
 """Unbalances alone are decided for it."""
 
@@ -917,6 +935,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "shared leads": shared_leads,
     "sizes": sizes,
     "worst means": worst_means,
+    "root mean quads": root_mean_quads,
 }
 
 

@@ -332,6 +332,8 @@ class Designs:
             return length.mean(axis=(2, 3)) @ share
         if norm == "worst mean":
             return length.mean(axis=(2, 3)).max(axis=1)
+        if norm == "rmq":
+            return ((length**4).mean(axis=(2, 3)) @ share) ** 0.25
         assert norm == "maximum"
         return self._largest(c[:, w > 0.0], length[:, w > 0.0])
 

@@ -29,6 +29,7 @@ FAMILIES = {
         "gas",
         "places",
         "worst means",
+        "root mean quads",
     ),
     "crank stars": ("stars",),
     "staggered and split vees": ("open-vees",),

@@ -17,7 +17,7 @@ from attack import plain_crankcase, plain_gear, plain_loads, plain_mounts, plain
 from attack.plain_loads import SAMPLES, number
 
 Table = dict[str, Any]
-NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean")
+NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean", "rmq")
 ON_BLOCK = {"shaking force": slice(0, 3), "rocking couple": slice(4, 6), "roll moment": slice(3, 4)}
 
 
@@ -86,6 +86,8 @@ def norm_of(norm: str, signal: np.ndarray, weights: np.ndarray) -> float:
         return float(length.mean(axis=(1, 2)).max())
     if norm == "rms":
         return math.sqrt(float(share @ (length**2).mean(axis=(1, 2))))
+    if norm == "rmq":
+        return float(share @ (length**4).mean(axis=(1, 2))) ** 0.25
     return float(length.max())
 
 

@@ -25,7 +25,7 @@ SEEDS = {
     "elastic-few": (1,), "convex-mounts": (0, 1), "elastic-balance": (4, 1, 2),
     "yokes": (3, 4), "chambers": (2, 5), "rotary": (4, 8),
     "uneven": (0, 2), "places": (0,), "leads": (22, 25), "bank angle": (2, 3), "sizes": (100009, 100013),
-    "uneven crankcase": (1101, 101001), "worst means": (0, 2),
+    "uneven crankcase": (1101, 101001), "worst means": (0, 2), "root mean quads": (9, 11),
     "prices of elastic-balance": (1,), "prices of convex-mounts": (1,),
     "monotony of inline": (2,), "invariance of convex-mounts": (1,), "invariance of inline": (2,),
 }  # fmt: skip
@@ -37,7 +37,7 @@ MORE = {
     ("elastic-balance", 1), ("elastic-balance", 2),
     ("uneven", 2), ("leads", 25), ("bank angle", 3), ("gas", 0), ("crankcase", 0), ("boxer", 0), ("rotary", 8),
     ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101), ("vee", 3), ("radial", 5), ("parts", 5),
-    ("yokes", 4), ("chambers", 5), ("worst means", 2), ("convex-mounts", 1),
+    ("yokes", 4), ("chambers", 5), ("worst means", 2), ("root mean quads", 11), ("convex-mounts", 1),
 }  # fmt: skip
 """Costly ones, of families that keep another."""
 DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]
