@@ -21,7 +21,7 @@ ALLOWED = {
     # what is shown of designs under a level is so of all up to it, and parts that are cut off are not under theirs
     "min(looked[0], first.level)",
     "min(best, self.level)",
-    "min(self._minimum, found.level)",
+    "min(self._minimum, child.level)",
     "min(queue[0].bound if queue else math.inf, self._minimum, self.level)",
     # the least of the bounds of several stars
     "min(known, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",

@@ -18,7 +18,7 @@ from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, gap_of, room_of
+from laufruhe.prove.certificate import Proof, gap_of, gap_tolerance_of
 from laufruhe.solvers import Result, Status
 from matrix.cells import Document, Open, OpenThrows, document_of, written
 
@@ -98,11 +98,11 @@ def _broken(document: Document, problem: Problem, result: Result, folder: Path) 
     nothing = numerical_zero(problem, result.final.engine)
     # the design told is measured at its own angles
     missed = 2.0 * result.error_estimate * value
-    if best < bound - room_of(value, SAME, nothing) - missed:
+    if best < bound - gap_tolerance_of(value, SAME, nothing) - missed:
         yield f"a design of {best:.9g} lies under the bound {bound:.9g}"
     if (
         result.certificate.kind is Proof.GLOBAL
-        and best < value - room_of(value, 2.0 * problem.tolerance, nothing) - missed
+        and best < value - gap_tolerance_of(value, 2.0 * problem.tolerance, nothing) - missed
     ):
         yield f"called global at {value:.9g}, and {best:.9g} is allowed"
 
@@ -139,11 +139,11 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
     given = evaluate(problem, samples=result.final.samples)
     worth = objective_value(problem, given)
     fires = problem.phasing is None or problem.phasing.intervals.holds(problem.engine.firing_intervals)
-    if fires and given.violation(problem.limits) <= ALLOWED and value > worth + room_of(value, SAME, nothing):
+    if fires and given.violation(problem.limits) <= ALLOWED and value > worth + gap_tolerance_of(value, SAME, nothing):
         yield f"worse than the design as given: {value:.9g} against {worth:.9g}"
     again = _loaded(document, _values(result), _order(result), folder)
     found = evaluate(again, samples=result.final.samples)
-    if abs(objective_value(again, found) - value) > room_of(value, 1e-5, nothing):
+    if abs(objective_value(again, found) - value) > gap_tolerance_of(value, 1e-5, nothing):
         yield f"its design is worth {objective_value(again, found):.9g}, and {value:.9g} is told"
     if found.violation(again.limits) > 2.0 * ALLOWED:
         yield f"its design breaks a limit by {found.violation(again.limits):.3g}"

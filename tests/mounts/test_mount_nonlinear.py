@@ -19,7 +19,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import evaluate_design

@@ -23,9 +23,9 @@ from laufruhe.prove.certificate import (
     Proof,
     ProofStrength,
     best_bound,
-    certified,
     kkt_residual,
     lower_bound,
+    make_certificate,
 )
 from mounts.files import problem_of
 
@@ -108,14 +108,14 @@ def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Arra
 
 class TestGap:
     def test_is_a_share_of_the_value(self) -> None:
-        found = certified(2.0, 1.5, 1e-9, 1e-4, ProofStrength.WHOLE, 0.0, "")
+        found = make_certificate(2.0, 1.5, 1e-9, 1e-4, ProofStrength.EXACT, 0.0, "")
         assert found.gap == pytest.approx(0.25)
         assert found.kind is Proof.WITHIN_GAP
 
     def test_what_is_nothing_beside_the_loads_counts_as_zero(self) -> None:
-        assert certified(1e-10, 0.0, 1e-9, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.GLOBAL
-        assert certified(0.0, 0.0, 0.0, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.GLOBAL
-        assert certified(1e-6, 0.0, 1e-9, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.LOCAL
+        assert make_certificate(1e-10, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
+        assert make_certificate(0.0, 0.0, 0.0, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.GLOBAL
+        assert make_certificate(1e-6, 0.0, 1e-9, 1e-4, ProofStrength.RELAXED, 0.0, "").kind is Proof.LOCAL
 
     def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""

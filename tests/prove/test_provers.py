@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.budget import limited
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts import provers
 from laufruhe.prove.mounts.provers import Prover, Question, proven
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of

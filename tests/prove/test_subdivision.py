@@ -15,13 +15,13 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import under
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bounds, divides
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.mounts.places import evaluate_design_at
@@ -47,7 +47,7 @@ orders = 24
 """
 
 
-def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> BoxResult:
+def divided_bound(problem: Problem, value: float, room: float, known: Witness | None = None) -> BoxResult:
     """Return the bound by all boxes that are worth it; of no boxes zero."""
     return next(divided_bounds(problem, value, room, (1.0,), known), BoxResult(0.0, 0))
 

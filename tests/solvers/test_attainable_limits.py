@@ -320,7 +320,7 @@ def test_what_nothing_open_changes_stays() -> None:
 def test_a_design_that_breaks_a_limit_proves_nothing() -> None:
     problem = SCENES["vee"]
     design = evaluate_design(problem, problem.start)
-    shown = ProofData(0.9 * design.value, ProofStrength.WHOLE, 0.0, "a bound")
+    shown = ProofData(0.9 * design.value, ProofStrength.EXACT, 0.0, "a bound")
     result = build_result(design, design.evaluation, shown, {})
     assert result.status is Status.FAILED
     assert result.certificate.kind is Proof.NONE

@@ -168,7 +168,7 @@ def test_prices_within_the_accuracy_are_none() -> None:
     scale = design.value / 2.0
     for slope, priced in ((1e-10, False), (5e-5, False), (1e-2, True)):
         shown = ProofData(
-            design.value * (1.0 - 1e-4), ProofStrength.WHOLE, 0.0, "", {}, {"web.mass": Price.both(slope * scale)}
+            design.value * (1.0 - 1e-4), ProofStrength.EXACT, 0.0, "", {}, {"web.mass": Price.both(slope * scale)}
         )
         (told,) = build_result(design, design.evaluation, shown, {}).decisions
         assert told.at_bound

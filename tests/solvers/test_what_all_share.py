@@ -111,7 +111,7 @@ def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
     worse = evaluate_design(problem, [-decision.upper for decision in problem.decisions])
     value = objective_value(problem, given)
     assert worse.value > value
-    shown = ProofData(0.5 * value, ProofStrength.WHOLE, 0.0, "a guess")
+    shown = ProofData(0.5 * value, ProofStrength.EXACT, 0.0, "a guess")
     result = build_result(worse, given, shown, {})
     assert result.objective is not None
     assert result.certificate is not None

@@ -269,11 +269,11 @@ class Watched:
 
     def _values(self, step: Step) -> Iterator[str]:
         from laufruhe.present.numbers import figure
-        from laufruhe.prove.certificate import USELESS
+        from laufruhe.prove.certificate import USELESS_GAP
 
         if math.isfinite(step.value):
             yield f"best {figure(step.value, self._unit)}"
         if math.isfinite(step.bound) and step.bound > 0.0:
             yield f"bound {figure(step.bound, self._unit)}"
-        if step.gap < USELESS:
+        if step.gap < USELESS_GAP:
             yield f"gap {100.0 * step.gap:.2g} %"

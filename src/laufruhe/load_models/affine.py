@@ -65,7 +65,7 @@ class AffineNorm:
         """Dual rows along the rows at x (P2)."""
         return self.norm.subgradient(self.grid, self.rows(x))
 
-    def pulled(self, z: Array) -> Array:
+    def pullback(self, z: Array) -> Array:
         """Slope of <Z, V> in the decision vector, shape (n,)."""
         return np.asarray(z.ravel() @ self.slope.reshape(z.size, -1))
 

@@ -1,9 +1,8 @@
-"""Proof of how good a design is, computed from the exact model alone (P4-P6).
+"""Lower bound, gap and certificate of a design, computed from the exact model (P4-P6).
 
-A norm is at least <Z, V> for every Z in the unit ball of its dual norm. With multipliers
-mu >= 0 on the limits the sum of such inequalities bounds the objective from below by an
-affine function of the decisions, whose least value over their sets is known in closed
-form. Any Z and mu give a valid bound; the solver only proposes good ones.
+A norm of rows V is at least <Z, V> for every Z in the unit ball of its dual norm. With multipliers mu >= 0 on the
+limits, the sum of these inequalities is an affine lower bound of the objective. Its minimum over the sets of the
+decisions has a closed form. Any Z and mu give a valid bound, so a solver only has to propose good ones.
 """
 
 from __future__ import annotations
@@ -20,9 +19,9 @@ from laufruhe.numerics.witness import check_bound, is_over
 
 
 def gap_of(value: float, bound: float, zero_level: float) -> float:
-    """Share of a value by which a bound lies under it, what counts as zero left out.
+    """Return the relative gap (value - bound) / value, or 0 if the difference is at most `zero_level`.
 
-    Gaps are counted here and nowhere else.
+    A value that is zero, negative or infinite is returned as it is. All gaps of the package are computed here.
     """
     if not 0.0 < value < math.inf:
         return value
@@ -30,12 +29,13 @@ def gap_of(value: float, bound: float, zero_level: float) -> float:
 
 
 ROUNDING = 1e-12
-# rounds of levelling, and the share of a bound from which it is worth one
-LEVELLINGS, LEVEL = 2, 1e-6
+"""Relative rounding error of a sum."""
+# rounds of `flatten_interior`, and the relative gap from which a round pays
+CORRECTIONS, WORTHWHILE_GAP = 2, 1e-6
 
 
-def room_of(value: float, tolerance: float, zero_level: float) -> float:
-    """Return the improvement on `value` that still counts as a gap within the tolerance."""
+def gap_tolerance_of(value: float, tolerance: float, zero_level: float) -> float:
+    """Return the improvement on `value` that counts as none [SI], from the relative tolerance and the zero level."""
     return tolerance * value + zero_level
 
 
@@ -48,49 +48,69 @@ class Proof(StrEnum):
     NONE = "none"
 
 
-STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL).index
-"""Of a proof: of several together the weakest counts."""
+PROOF_RANK = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL).index
+"""Sort key of a `Proof`, weakest first: several proofs together are as strong as the weakest."""
 
 
 class ProofStrength(StrEnum):
-    """Degree of optimality that the bound of a method can prove."""
+    """Degree of optimality that the bound of a method can prove.
 
-    WHOLE = "closes on the optimum, however long that takes"
-    NEAR = "closes where it comes near"
-    ASIDE = "holds, and is not made to meet the design"
+    Attributes
+    ----------
+    EXACT
+        The bound reaches the optimum if the search runs long enough, so any gap is a proof within that gap.
+    PARTIAL
+        The bound need not reach the optimum. A gap of at most `SMALL_GAP` is a proof within that gap.
+    RELAXED
+        The bound is valid, but of a relaxation that is not refined; it proves the optimum or nothing.
+    """
+
+    EXACT = "reaches the optimum in enough time"
+    PARTIAL = "may come near the optimum"
+    RELAXED = "valid, not refined"
 
 
-USELESS = 0.99
-"""Gap from which a bound says nothing that a user can act on."""
-NEAR = 0.05
-"""Gap at which a bound that need not close is called a proof within its gap."""
+USELESS_GAP = 0.99
+"""Relative gap from which a bound helps no user."""
+SMALL_GAP = 0.05
+"""Largest relative gap of an approximate bound that is called a proof within its gap."""
 
 
-def certified(
-    value: float, bound: float, zero_level: float, tolerance: float, reach: ProofStrength, kkt_residual: float,
+def make_certificate(
+    value: float, bound: float, zero_level: float, tolerance: float, strength: ProofStrength, kkt_residual: float,
     method: str, doubt: float = 0.0,
 ) -> Certificate:  # fmt: skip
-    """Return the certificate of a design; a bound that contradicts its value is reported, and proves nothing.
+    """Return the certificate of a design from its objective and a lower bound.
+
+    A bound above the objective is a contradiction: it is reported, and the certificate then claims nothing.
 
     Parameters
     ----------
     value
-        Objective of a design that keeps all limits.
+        Objective of a feasible design [SI].
     bound
-        What no design goes under, raw: it is never brought to the value.
+        Lower bound over all feasible designs as computed [SI]; nothing may lower it to the value before.
     zero_level
-        Difference that counts as zero.
+        Difference that counts as zero [SI].
+    tolerance
+        Relative gap that counts as closed.
+    strength
+        Degree of optimality that the bound can prove.
+    kkt_residual
+        Largest relative violation of the optimality conditions.
+    method
+        Description of the method that computed the bound.
     doubt
-        By how much the value may be read too low: between samples, and where limits are exceeded by a rounding.
+        Largest error by which the objective may be too low [SI]: between samples, and by accepted violations of limits.
     """
-    # no norm lies under zero
+    # a norm is never negative
     value, bound = float(value), max(float(bound), 0.0)
     if not check_bound(method, bound, value, zero_level + doubt):
         return unproven_certificate(value, kkt_residual, method)
     gap = gap_of(value, bound, zero_level)
     if gap <= tolerance:
         kind = Proof.GLOBAL
-    elif reach is ProofStrength.WHOLE or (reach is ProofStrength.NEAR and gap <= NEAR):
+    elif strength is ProofStrength.EXACT or (strength is ProofStrength.PARTIAL and gap <= SMALL_GAP):
         kind = Proof.WITHIN_GAP
     else:
         kind = Proof.LOCAL
@@ -98,7 +118,7 @@ def certified(
 
 
 def unproven_certificate(value: float, kkt_residual: float, method: str) -> Certificate:
-    """Return the certificate of a design of which nothing is claimed."""
+    """Return a certificate that claims nothing: no proof, and zero as the lower bound."""
     return Certificate(Proof.NONE, 0.0, gap_of(value, 0.0, 0.0), kkt_residual, method)
 
 
@@ -109,16 +129,16 @@ class Certificate:
     Attributes
     ----------
     kind
-        What was proven.
+        Degree of optimality proven.
     lower_bound
-        No design allowed has a smaller objective [SI].
+        Lower bound of the objective over all feasible designs [SI].
     gap
-        Objective less lower bound, over the objective; what loads that cancel leave as a rounding counts as zero.
+        Objective less lower bound, over the objective; differences below the zero level count as zero.
     kkt_residual
         Largest violation of stationarity, feasibility and complementarity, each
         relative to its own scale.
     method
-        How the bound was found.
+        Description of the method that computed the bound.
     """
 
     kind: Proof
@@ -129,25 +149,43 @@ class Certificate:
 
     @property
     def is_useful(self) -> bool:
-        """Tell if the bound is more than a hundredth of the value, or closes."""
-        return self.kind is Proof.GLOBAL or self.gap < USELESS
+        """Return True if the optimum is proven, or the gap is below `USELESS_GAP`."""
+        return self.kind is Proof.GLOBAL or self.gap < USELESS_GAP
 
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Dual rows: Z of every term, and mu Z of every limit, shapes (k, d)."""
+    """Dual rows of an affine problem.
+
+    Attributes
+    ----------
+    terms
+        Z of every term of the objective, shape (k, d) each.
+    limits
+        Multiplier times Z, mu Z, of every limit, shape (k, d) each.
+    """
 
     terms: tuple[Array, ...]
     limits: tuple[Array, ...]
 
     def shadow_prices(self, problem: AffineProblem) -> tuple[float, ...]:
-        """Fall of the objective per unit by which a limit is relaxed (P5)."""
+        """Return the fall of the objective per unit by which each limit is relaxed (P5)."""
         return tuple(norm.dual_norm(z) for (_, norm), z in zip(problem.limits, self.limits, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
 class Bound:
-    """An affine lower bound of the objective, constant + gradient . x, for every x allowed."""
+    """Lower bound of the objective from an affine lower bound.
+
+    Attributes
+    ----------
+    value
+        Minimum of the affine lower bound over the sets of the decisions [SI], at least zero.
+    gradient
+        Its gradient in the decision vector, shape (n,).
+    multipliers
+        Dual rows that give it.
+    """
 
     value: float
     gradient: Array
@@ -156,14 +194,16 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class Minorant:
-    """An affine function of the decision vector that the objective of no allowed design lies under.
+    """Affine function constant + gradient . x that no feasible design's objective is below.
 
     Attributes
     ----------
-    constant, gradient
-        Of it.
+    constant
+        Value at the zero decision vector [SI].
+    gradient
+        Gradient in the decision vector, shape (n,).
     multipliers
-        That it is made of.
+        Dual rows that give the function.
     """
 
     constant: float
@@ -172,193 +212,235 @@ class Minorant:
 
 
 def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
-    """Return the affine lower bound by these multipliers, valid for every decision vector in any set (P4).
+    """Return the affine lower bound of the objective that multipliers give, valid for every feasible x (P4).
 
     Parameters
     ----------
     problem
-        Rows on the grid on which it is to hold.
+        Norms on the grid of samples on which the bound is to hold.
     multipliers
-        Any dual rows on that grid; terms are scaled into the dual unit ball.
+        Any dual rows on that grid; the rows of terms are scaled into the dual unit ball.
     """
     norms = [norm for _, norm in (*problem.terms, *problem.limits)]
     gradient, constant = np.zeros(norms[0].slope.shape[-1] if norms else problem.size), 0.0
     terms = []
-    for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
-        # a term that nothing open acts on is its own bound
-        z = norm.dual_feasible(given) if is_moved(norm) else norm.subgradient(np.zeros(len(gradient)))
+    for (weight, norm), proposal in zip(problem.terms, multipliers.terms, strict=True):
+        # the best bound of a term that no decision changes is its value
+        z = norm.dual_feasible(proposal) if is_moved(norm) else norm.subgradient(np.zeros(len(gradient)))
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
-        gradient += weight * norm.pulled(z)
-    held = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
-    for (maximum, norm), z in zip(problem.limits, held, strict=True):
+        gradient += weight * norm.pullback(z)
+    limits = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
+    for (maximum, norm), z in zip(problem.limits, limits, strict=True):
         price = norm.dual_norm(z)
         constant += float(np.vdot(z, norm.constant)) - price * maximum
-        gradient += norm.pulled(z)
-    return Minorant(constant, gradient, Multipliers(tuple(terms), tuple(held)))
+        gradient += norm.pullback(z)
+    return Minorant(constant, gradient, Multipliers(tuple(terms), tuple(limits)))
 
 
 def is_moved(norm: AffineNorm) -> bool:
-    """Return True if any decision changes a norm; the first row is tested first."""
+    """Return True if any decision changes the rows of a norm."""
+    # the first row mostly decides, and saves a look at all
     return bool(norm.slope[:1].any() or norm.slope.any())
 
 
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
-    """Least objective that these multipliers leave possible (P4).
+    """Return the lower bound of the objective that multipliers give (P4).
 
     Parameters
     ----------
     problem
-        Rows on the grid on which the bound is to hold.
+        Norms on the grid of samples on which the bound is to hold.
     multipliers
-        Any dual rows on that grid; terms are scaled into the dual unit ball.
+        Any dual rows on that grid; the rows of terms are scaled into the dual unit ball.
     """
-    under = minorant(problem, multipliers)
-    minimum = under.constant + sum(domain.minimum(under.gradient) for domain in problem.domains)
-    # every term is a norm, so nothing lies under zero
-    return Bound(max(minimum, 0.0), under.gradient, under.multipliers)
+    affine = minorant(problem, multipliers)
+    minimum = affine.constant + sum(domain.minimum(affine.gradient) for domain in problem.domains)
+    # a sum of norms is never negative
+    return Bound(max(minimum, 0.0), affine.gradient, affine.multipliers)
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
-    """Return True if these dual rows of the limits prove that no design keeps all limits (P4)."""
+    """Return True if these dual rows of the limits, shape (k, d) each, prove the limits infeasible (P4)."""
     proof = lower_bound(replace(problem, terms=()), Multipliers((), limits))
     sizes = [maximum + norm.value(np.zeros(problem.size)) for maximum, norm in problem.limits]
-    whole = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
-    return proof.value > ROUNDING * whole
+    scale = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
+    return proof.value > ROUNDING * scale
 
 
-def best_bound(fine: AffineProblem, x: Array, found: Multipliers) -> Bound:
-    """The best of the bounds that a solution on a coarser grid suggests (P6).
+def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound:
+    """Return the best lower bound that a solution on the same or a coarser grid suggests (P6).
 
-    One takes the solver's dual rows between the coarse angles; one takes the direction
-    of every row of the design itself, and the solver's only where a row vanishes.
+    Two proposals are compared. One interpolates the solver's dual rows between the coarse samples. The other takes the
+    subgradient of every term at x, and the solver's dual row only where a row of the term vanishes.
+
+    Parameters
+    ----------
+    problem
+        Norms on the grid of samples on which the bound is to hold.
+    x
+        Decision vector of the solution, shape (n,).
+    solution
+        Dual rows of the solution, on its own grid.
     """
-    own = spread(fine, found)
-    direct = Multipliers(
+    interpolated = interpolate_duals(problem, solution)
+    aligned = Multipliers(
         tuple(
-            norm.norm.aligned(norm.grid, norm.rows(x), z) for (_, norm), z in zip(fine.terms, own.terms, strict=True)
+            norm.norm.aligned(norm.grid, norm.rows(x), z)
+            for (_, norm), z in zip(problem.terms, interpolated.terms, strict=True)
         ),
-        own.limits,
+        interpolated.limits,
     )
-    best, value = max((lower_bound(fine, m) for m in (own, direct)), key=lambda bound: bound.value), fine.objective(x)
-    for _ in range(LEVELLINGS):
-        if value - best.value > LEVEL * best.value:
-            best = max(best, lower_bound(fine, levelled(fine, x, best)), key=lambda bound: bound.value)
-    check_dual("dual rows", best.value, fine, x, best)
+    proposals = (lower_bound(problem, rows) for rows in (interpolated, aligned))
+    best, value = max(proposals, key=lambda bound: bound.value), problem.objective(x)
+    for _ in range(CORRECTIONS):
+        if value - best.value > WORTHWHILE_GAP * best.value:
+            corrected = lower_bound(problem, flatten_interior(problem, x, best))
+            best = max(best, corrected, key=lambda bound: bound.value)
+    check_dual("dual rows", best.value, problem, x, best)
     return best
 
 
 def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound: Bound) -> None:
-    """Report a value of dual rows over what they say of a decision vector, whatever limits that keeps (P4).
+    """Report a lower bound that exceeds the Lagrangian of its own dual rows at a decision vector (P4).
+
+    The check needs no feasible design: violations of limits are priced.
 
     Parameters
     ----------
+    what
+        Name of the bound in messages.
     value
-        What the rows of a bound are said to prove of every design [SI].
+        Lower bound over all feasible designs that the dual rows are said to prove [SI].
+    problem
+        Norms on the grid of the dual rows.
     x
-        Decision vector, in its sets but for a rounding.
+        Decision vector, inside the sets of the decisions except for rounding, shape (n,).
+    bound
+        Dual rows and gradient.
     """
     maximum = problem.objective(x)
     if not is_over(value, maximum):
         return
     prices = bound.multipliers.shadow_prices(problem)
-    maximum += sum(price * (norm.value(x) - edge) for price, (edge, norm) in zip(prices, problem.limits, strict=True))
-    inside = np.concatenate([np.zeros(0), *(domain.project(x) for domain in problem.domains)])
+    maximum += sum(price * (norm.value(x) - limit) for price, (limit, norm) in zip(prices, problem.limits, strict=True))
+    projected = np.concatenate([np.zeros(0), *(domain.project(x) for domain in problem.domains)])
     sizes = [weight * _size(norm, x) for weight, norm in problem.terms]
-    sizes += [price * (edge + _size(norm, x)) for price, (edge, norm) in zip(prices, problem.limits, strict=True)]
-    check_bound(what, value, maximum, float(np.abs(bound.gradient) @ np.abs(inside - x)) + ROUNDING * sum(sizes))
+    sizes += [price * (limit + _size(norm, x)) for price, (limit, norm) in zip(prices, problem.limits, strict=True)]
+    check_bound(what, value, maximum, float(np.abs(bound.gradient) @ np.abs(projected - x)) + ROUNDING * sum(sizes))
 
 
 def _size(norm: AffineNorm, x: Array) -> float:
-    # norm of rows of which no parts cancel
+    # norm of the rows if none of their parts cancelled
     return norm.norm.value(norm.grid, np.abs(norm.constant) + np.abs(norm.slope) @ np.abs(x))
 
 
-def spread(fine: AffineProblem, found: Multipliers) -> Multipliers:
-    """Dual rows of a solution on a coarser grid between its angles (P6); terms that it has none of are left out."""
+def interpolate_duals(problem: AffineProblem, solution: Multipliers) -> Multipliers:
+    """Interpolate the dual rows of a solution on a coarser grid to the grid of a problem (P6).
+
+    Terms of the problem beyond those of the solution are left out.
+    """
     return Multipliers(
-        tuple(_spread(norm, z) for (_, norm), z in zip(fine.terms, found.terms, strict=False)),
-        tuple(_spread(norm, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
+        tuple(_interpolate(norm, z) for (_, norm), z in zip(problem.terms, solution.terms, strict=False)),
+        tuple(_interpolate(norm, z) for (_, norm), z in zip(problem.limits, solution.limits, strict=True)),
     )
 
 
-def levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
-    """Dual rows of the terms, changed by as little as makes the bound level along what is inside its set.
+def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
+    """Return dual rows of the terms, corrected as little as possible, so that the gradient vanishes in the interior.
 
-    A slope that is a rounding of the solver, times a bound far from what is needed, would else be all that is left.
-    """
-    inside = _inside(problem, x)
-    slopes = [norm.slope @ inside for _, norm in problem.terms]
-    weighed = [norm.grid.weights[:, None, None] * slope for (_, norm), slope in zip(problem.terms, slopes, strict=True)]
-    parts = zip(problem.terms, slopes, weighed, strict=True)
-    pull = sum(weight * np.einsum("kdm,kdn->mn", slope, by) for (weight, _), slope, by in parts)
-    if not inside.size or not np.any(pull):
-        return bound.multipliers
-    sizes = np.sqrt(np.where(np.diag(pull) > 0.0, np.diag(pull), 1.0))
-    steps = np.linalg.lstsq(pull / np.outer(sizes, sizes), -(bound.gradient @ inside) / sizes)[0] / sizes
-    terms = zip(bound.multipliers.terms, weighed, strict=True)
-    return replace(bound.multipliers, terms=tuple(z + by @ steps for z, by in terms))
-
-
-def _inside(problem: AffineProblem, x: Array) -> Array:
-    # directions in which every decision is inside its set, shape (n, m)
-    columns = [np.zeros((problem.size, 0))]
-    for domain in problem.domains:
-        own = np.zeros((problem.size, domain.width))
-        own[domain.columns] = np.eye(domain.width)
-        columns.append(own @ domain.set.inside(x[domain.columns]))
-    return np.concatenate(columns, axis=1)
-
-
-def _spread(fine: AffineNorm, z: Array) -> Array:
-    """Dual rows of a coarser grid on a finer one; masses have no angles and stay."""
-    signals, bends = len(fine.grid.weights) // fine.grid.steps, fine.grid.bends
-    times, rest = divmod(len(fine.grid.weights) - signals * bends, max(len(z) - signals * bends, 1))
-    if rest:
-        # rows of another basis say nothing here
-        return np.zeros_like(fine.constant)
-    if times <= 1:
-        return z
-    # rows where the signals bend stay
-    own = z.reshape(signals, -1, z.shape[-1])
-    steps, kept = own[:, : own.shape[1] - bends], own[:, own.shape[1] - bends :]
-    spread = fine.norm.spread(steps.reshape(-1, z.shape[-1]), steps.shape[1], times).reshape(signals, -1, z.shape[-1])
-    return np.concatenate([spread, kept], axis=1).reshape(-1, z.shape[-1])
-
-
-def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | None = None) -> float:
-    """Largest violation of the optimality conditions, each relative to its own scale (P5).
+    The interior directions are those in which no decision of x is on a bound. A slope along one of them, even a
+    rounding error of the solver, costs slope times distance to the bound, which may be all of the lower bound.
 
     Parameters
     ----------
-    whole
-        What parts of the objective are relative to; the objective itself when left out,
-        which a perfectly balanced engine does not have.
+    problem
+        Norms on the grid of the dual rows.
+    x
+        Decision vector, shape (n,).
+    bound
+        Dual rows to correct, and their gradient.
+    """
+    interior = _interior_directions(problem, x)
+    slopes = [norm.slope @ interior for _, norm in problem.terms]
+    weighted = [
+        norm.grid.weights[:, None, None] * slope for (_, norm), slope in zip(problem.terms, slopes, strict=True)
+    ]
+    parts = zip(problem.terms, slopes, weighted, strict=True)
+    gram = sum(weight * np.einsum("kdm,kdn->mn", slope, rows) for (weight, _), slope, rows in parts)
+    if not interior.size or not np.any(gram):
+        return bound.multipliers
+    sizes = np.sqrt(np.where(np.diag(gram) > 0.0, np.diag(gram), 1.0))
+    steps = np.linalg.lstsq(gram / np.outer(sizes, sizes), -(bound.gradient @ interior) / sizes)[0] / sizes
+    terms = zip(bound.multipliers.terms, weighted, strict=True)
+    return replace(bound.multipliers, terms=tuple(z + rows @ steps for z, rows in terms))
+
+
+def _interior_directions(problem: AffineProblem, x: Array) -> Array:
+    # directions in which no decision is on a bound of its set, shape (n, m)
+    columns = [np.zeros((problem.size, 0))]
+    for domain in problem.domains:
+        embedding = np.zeros((problem.size, domain.width))
+        embedding[domain.columns] = np.eye(domain.width)
+        columns.append(embedding @ domain.set.inside(x[domain.columns]))
+    return np.concatenate(columns, axis=1)
+
+
+def _interpolate(fine: AffineNorm, z: Array) -> Array:
+    """Interpolate dual rows of a coarser grid, shape (k, d), to the grid of a norm; rows of masses stay."""
+    signals, kinks = len(fine.grid.weights) // fine.grid.steps, fine.grid.bends
+    factor, remainder = divmod(len(fine.grid.weights) - signals * kinks, max(len(z) - signals * kinks, 1))
+    if remainder:
+        # rows of a grid that this one does not refine
+        return np.zeros_like(fine.constant)
+    if factor <= 1:
+        return z
+    # rows at kinks of the signals stay
+    by_signal = z.reshape(signals, -1, z.shape[-1])
+    coarse, at_kinks = by_signal[:, : by_signal.shape[1] - kinks], by_signal[:, by_signal.shape[1] - kinks :]
+    rows = fine.norm.spread(coarse.reshape(-1, z.shape[-1]), coarse.shape[1], factor).reshape(signals, -1, z.shape[-1])
+    return np.concatenate([rows, at_kinks], axis=1).reshape(-1, z.shape[-1])
+
+
+def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, scale: float | None = None) -> float:
+    """Return the largest violation of the optimality conditions, each relative to its own scale (P5).
+
+    Parameters
+    ----------
+    problem
+        Norms on the grid of the dual rows.
+    x
+        Decision vector, shape (n,).
+    bound
+        Dual rows and gradient.
+    scale
+        Objective to which violations are relative [SI], given where the objective itself may be zero, as of a
+        perfectly balanced engine; the objective at x if None.
     """
     scales = problem.scales
-    steps = [0.0]
-    reach = float(np.abs(_gradient_size(problem, bound) * scales).max(initial=0.0)) or 1.0
+    violations = [0.0]
+    gradient_scale = float(np.abs(_gradient_size(problem, bound) * scales).max(initial=0.0)) or 1.0
     for domain in problem.domains:
-        part = domain.columns
+        columns = domain.columns
         # a step against the gradient, projected back, must not move: P_D(x - g) = x
-        step = bound.gradient[part] * scales[part] ** 2 / reach
+        step = bound.gradient[columns] * scales[columns] ** 2 / gradient_scale
         moved = x.copy()
-        moved[part] = x[part] - step
-        steps.append(float(np.abs((domain.project(moved) - x[part]) / scales[part]).max(initial=0.0)))
+        moved[columns] = x[columns] - step
+        violations.append(float(np.abs((domain.project(moved) - x[columns]) / scales[columns]).max(initial=0.0)))
     prices = bound.multipliers.shadow_prices(problem)
-    whole = whole or problem.objective(x) or 1.0
+    scale = scale or problem.objective(x) or 1.0
     for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
-        # the dual row of an optimum points along its row: <Z, V> = norm(V)
-        steps.append(weight * (norm.value(x) - float(np.vdot(z, norm.rows(x)))) / whole)
+        # at an optimum the dual row points along its row: <Z, V> = norm(V)
+        violations.append(weight * (norm.value(x) - float(np.vdot(z, norm.rows(x)))) / scale)
     for (maximum, norm), price in zip(problem.limits, prices, strict=True):
         value = norm.value(x)
-        steps.append(max(0.0, value - maximum) / (maximum or 1.0))
-        steps.append(price * abs(maximum - value) / whole)
-    return max(steps)
+        violations.append(max(0.0, value - maximum) / (maximum or 1.0))
+        violations.append(price * abs(maximum - value) / scale)
+    return max(violations)
 
 
 def _gradient_size(problem: AffineProblem, bound: Bound) -> Array:
-    # sum of the sizes of what adds up to the gradient, shape (n,)
+    # sum of the absolute parts of the gradient, shape (n,)
     total = np.zeros(problem.size)
     for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
         total += weight * np.einsum("kd,kdn->n", np.abs(z), np.abs(norm.slope))

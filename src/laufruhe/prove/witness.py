@@ -1,8 +1,7 @@
-"""Bounds around a known design: whoever bounds is also asked about a thin part that holds the best design.
+"""Check bounds against a known design: no lower bound of a set of designs exceeds the objective of a design in it.
 
-A bound that is right is nowhere over the objective of a design that exists. So each bounder states a part around a
-design and bounds it raw, and what it says is compared with the objective. Parts of a division that hold the design are
-compared too, and so is what a certificate says of all designs.
+Every method states a thin part around a known design and bounds it without any correction. The bound is compared with
+the objective of that design. Parts of a search that contain the design are compared too, and so is every certificate.
 """
 
 from __future__ import annotations
@@ -21,62 +20,77 @@ D = TypeVar("D", contravariant=True)
 P = TypeVar("P")
 
 THIN = 1e-6
-"""Share of each side by which a part around a design reaches to either side."""
+"""Distance from a design to either end of a thin part, as a share of each side."""
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
-    """A design that keeps all limits, the witness of bounds.
+class Witness:
+    """Known feasible design whose objective no bound may exceed.
 
     Attributes
     ----------
     place
-        Open numbers, in the coordinates of the bounds.
+        Open numbers in the coordinates of the bounds, shape (n,).
     value
-        Objective [SI].
-    read
-        Objective with what its samples may have missed and what counts as zero, where it takes time to tell.
+        Objective at the samples of the problem [SI].
+    evaluate_upper
+        Function that returns `upper_value`, evaluated on demand because it is slow; None if that is `value`.
     """
 
     place: Array
     value: float
-    read: Callable[[], float] | None = None
+    evaluate_upper: Callable[[], float] | None = None
 
     @cached_property
-    def maximum(self) -> float:
-        """Return the value, read finely where `read` is given, that no bound of a part with the design exceeds."""
-        return self.value if self.read is None else self.read()
+    def upper_value(self) -> float:
+        """Objective with its sampling error and numerical zero added, which no valid bound exceeds [SI]."""
+        return self.value if self.evaluate_upper is None else self.evaluate_upper()
 
     def check(self, what: str, bound: float) -> None:
-        """Report a bound that lies over the design."""
-        if is_over(bound, self.value) and is_over(bound, self.maximum):
-            check_bound(what, bound, self.maximum)
+        """Report a bound [SI] that exceeds the objective of the design; `what` names the bound."""
+        if is_over(bound, self.value) and is_over(bound, self.upper_value):
+            check_bound(what, bound, self.upper_value)
 
 
 class Bounder(Protocol[D, P]):
-    """Whoever bounds parts of what is open."""
+    """Method that bounds parts of the set of designs."""
 
     @property
     def what(self) -> str:
-        """Name of the parts that are bounded."""
+        """Name of the parts in messages."""
 
     def around(self, design: D) -> P | None:
-        """Return a thin part that holds a design; None where it cannot be stated."""
+        """Return a thin part that contains a design, or None if the method cannot state one."""
 
     def bound(self, part: P) -> float:
-        """Return what no design of a part goes under, raw: infinite where it says that none is allowed."""
+        """Return the lower bound of the objective in a part [SI]; infinite if the part has no feasible design."""
 
 
-def check_around(bounder: Bounder[D, P], design: D, known: Known) -> bool:
-    """Return whether a bounder can state a part around a known design; report a bound of it that is over the design."""
+def check_near_witness(bounder: Bounder[D, P], design: D, witness: Witness) -> bool:
+    """Bound a thin part around a known design, and report a bound above the objective of the design.
+
+    Parameters
+    ----------
+    bounder
+        Method to check.
+    design
+        Known design in the terms of the method.
+    witness
+        Objective of that design.
+
+    Returns
+    -------
+    bool
+        False if the method can state no part around the design, so that nothing was checked.
+    """
     part = bounder.around(design)
     if part is None:
         return False
-    known.check(f"{bounder.what}, around the known design", bounder.bound(part))
+    witness.check(f"{bounder.what}, around the known design", bounder.bound(part))
     return True
 
 
-def thin(place: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return a thin box around a place, inside bounds."""
-    reach = THIN * (upper - lower)
-    return np.clip(place - reach, lower, upper), np.clip(place + reach, lower, upper)
+def thin_box(place: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+    """Return the bounds of a thin box around a place, cut to the box between `lower` and `upper`, all of shape (n,)."""
+    margin = THIN * (upper - lower)
+    return np.clip(place - margin, lower, upper), np.clip(place + margin, lower, upper)

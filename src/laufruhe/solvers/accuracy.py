@@ -13,7 +13,7 @@ from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Proof, gap_of
+from laufruhe.prove.certificate import PROOF_RANK, Proof, gap_of
 from laufruhe.solvers.result import Result, Status
 
 _ROUNDS = 4
@@ -69,7 +69,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
         return result
     bound, zero_level = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
-        proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=STRENGTH), lower_bound=bound,
+        proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
         gap=gap_of(told.value, bound, zero_level), method=f"{proof.method}, less what the gas may miss",
     )  # fmt: skip
     status = Status.FEASIBLE if result.status is Status.OPTIMAL else result.status

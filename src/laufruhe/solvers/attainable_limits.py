@@ -21,7 +21,7 @@ from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, ProofStrength, certified
+from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import (
     KEPT,
@@ -246,7 +246,9 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     read = read_under(problem, result.final, objective_value(problem, result.final), bound, zero_level)
     result, value = replace(result, final=read.evaluation), read.value
     how = f"found while {result.problem.objective_name} was minimised"
-    proof = certified(value, bound, zero_level, problem.tolerance, ProofStrength.ASIDE, math.inf, how, read.doubt)
+    proof = make_certificate(
+        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, how, read.doubt
+    )
     own = result.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
         result,

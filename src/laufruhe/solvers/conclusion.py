@@ -21,8 +21,8 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, certified, gap_of
-from laufruhe.prove.witness import Known
+from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate
+from laufruhe.prove.witness import Witness
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
 from laufruhe.solvers.result import Result, Status
@@ -82,7 +82,7 @@ class ProofData:
     ----------
     bound
         What no design allowed goes under.
-    reach
+    strength
         What such a bound can prove.
     kkt_residual, method
         As in a certificate.
@@ -93,7 +93,7 @@ class ProofData:
     """
 
     bound: float
-    reach: ProofStrength
+    strength: ProofStrength
     kkt_residual: float
     method: str
     prices: Mapping[Side, Price] = field(default_factory=dict)
@@ -172,7 +172,7 @@ def result_under(result: Result, bound: float, zero_level: float) -> tuple[Resul
     return replace(result, final=read.evaluation, objective=replace(result.objective, value=read.value)), read.doubt
 
 
-def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Known | None:
+def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
     """Return a design as a witness of bounds in coordinates of theirs; None where it exceeds a limit by more."""
     if design.violation > violation:
         return None
@@ -183,7 +183,7 @@ def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Known
         found = read_under(problem, evaluation, design.value, math.inf, zero_level)
         return found.value * (1.0 + STEEP * max(design.violation, 0.0)) + found.doubt + zero_level
 
-    return Known(place, design.value, read)
+    return Witness(place, design.value, read)
 
 
 def is_sampled(measure: Measure) -> bool:
@@ -215,8 +215,8 @@ def build_result(design: Design, initial: Evaluation, shown: ProofData, timing: 
     if met:
         read = read_under(problem, design.evaluation, design.value, shown.bound, zero_level, shown.prices)
         design = replace(design, evaluation=read.evaluation, value=read.value)
-        certificate = certified(
-            design.value, shown.bound, zero_level, problem.tolerance, shown.reach, shown.kkt_residual, shown.method,
+        certificate = make_certificate(
+            design.value, shown.bound, zero_level, problem.tolerance, shown.strength, shown.kkt_residual, shown.method,
             read.doubt,
         )  # fmt: skip
     else:

@@ -18,7 +18,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, unproven_certificate
+from laufruhe.prove.certificate import PROOF_RANK, Certificate, Proof, unproven_certificate
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.conclusion import infeasible_result
 from laufruhe.solvers.result import Result, Status
@@ -118,7 +118,7 @@ def _together(found: list[Result], value: float) -> Certificate:
     shown = [(r.certificate, r.objective.value if r.objective else 0.0) for r in found]
     bound = sum(own if certificate is None else certificate.lower_bound for certificate, own in shown)
     told = [certificate for certificate, _ in shown if certificate is not None]
-    kind = min((certificate.kind for certificate in told), key=STRENGTH)
+    kind = min((certificate.kind for certificate in told), key=PROOF_RANK)
     residual = max(certificate.kkt_residual for certificate in told)
     method = "; beside it ".join(certificate.method for certificate in told)
     if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in found)):

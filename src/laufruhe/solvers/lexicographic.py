@@ -21,7 +21,7 @@ from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_s
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
+from laufruhe.prove.certificate import PROOF_RANK, Certificate, Proof
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.cones.equal_designs import equal_designs
 from laufruhe.solvers.result import Result, Status
@@ -98,7 +98,7 @@ def _together(
         # the last design keeps all limits of this one
         why = "was not decided: time was over" if passed() else "found no design under the limits of those before it"
         message = f"objective {len(stages) + 1}, {name}, {why}"
-    weakest = min((rank.proof for rank in ranks), key=STRENGTH)
+    weakest = min((rank.proof for rank in ranks), key=PROOF_RANK)
     whole = not message and all(stage.status is Status.OPTIMAL for stage in stages)
     first = stages[0]
     shown = last.problem.changed(objective=problem.objective, ranks=problem.ranks, limits=problem.limits)

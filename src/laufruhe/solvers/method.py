@@ -48,7 +48,7 @@ class Method:
         In words.
     needs
         Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
-    reach
+    strength
         What its bounds can prove.
     solver
         Return the best design with its certificate. The function imports its module when it is first called.
@@ -70,7 +70,7 @@ class Method:
 
     name: str
     needs: Mapping[Kind, Collection[Dependence]]
-    reach: ProofStrength
+    strength: ProofStrength
     solver: Callable[[Problem], Result]
     judges_fidelity: bool = False
     knows: frozenset[Channel] = frozenset()

@@ -76,7 +76,7 @@ def solve_with_places(problem: Problem) -> Result:
 
 
 def _closes_without_places(problem: Problem) -> bool:
-    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is ProofStrength.WHOLE
+    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).strength is ProofStrength.EXACT
 
 
 def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
@@ -150,51 +150,51 @@ _Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
 _OWN: tuple[Method, ...] = (
-    Method("evaluation", {}, ProofStrength.WHOLE, state, norms=lambda _: True,
+    Method("evaluation", {}, ProofStrength.EXACT, state, norms=lambda _: True,
            proves="the value itself"),
-    Method("boxes of the flywheel", {_F: ()}, ProofStrength.WHOLE, _solve_flywheel,
+    Method("boxes of the flywheel", {_F: ()}, ProofStrength.EXACT, _solve_flywheel,
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.WHOLE, solve_polished, True,
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, solve_polished, True,
            proves="the optimum"),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.WHOLE, solve_polished, True,
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.EXACT, solve_polished, True,
            proves="the optimum"),
-    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE, _solve_leads, True,
+    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, _solve_leads, True,
            frozenset({IRREGULARITY}), is_pointwise, is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
-    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.WHOLE,
+    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT,
            _solve_shared_leads, True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
            is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
-    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, ProofStrength.WHOLE,
+    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, ProofStrength.EXACT,
            _solve_places, True, OF_SHAFT_PLACES, is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.WHOLE, _solve_phasing, True,
+    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.EXACT, _solve_phasing, True,
            norms=is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
-    Method("linear matrix inequalities", {_K: ()}, ProofStrength.WHOLE, solve_convex_mounts,
+    Method("linear matrix inequalities", {_K: ()}, ProofStrength.EXACT, solve_convex_mounts,
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.NEAR, _solve_joint, False, OF_MOUNTS,
+    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.PARTIAL, _solve_joint, False, OF_MOUNTS,
            is_pointwise,
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE, _solve_joint, False, OF_MOUNTS,
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.RELAXED, _solve_joint, False, OF_MOUNTS,
            is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart",
-           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.ASIDE,
+           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.RELAXED,
            solve_separable, norms=lambda _: True, also=is_separable,
            proves="what each of them proves"),
-    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE,
+    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.RELAXED,
            _solve_star_mounts, False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
-           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE,
+           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT,
            solve_with_places, True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
            also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
-    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), ProofStrength.ASIDE,
+    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), ProofStrength.RELAXED,
            solve_all_numbers, norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
@@ -264,7 +264,7 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
                 problem.phasing is None
                 and max(given.violation, violation_at_fine_sampling(problem, given.evaluation)) <= KEPT
             ):
-                shown = ProofData(0.0, ProofStrength.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
+                shown = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {CUT_SHORT}")
                 return build_result(given, given.evaluation, shown, {})
     if found is None:
         raise SolverError("no design was found within the time limit; raise it")
@@ -362,7 +362,7 @@ def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Resul
     design = evaluate_design(problem, problem.start)
     if design.violation > KEPT:
         return rest(problem)
-    shown = ProofData(design.value, ProofStrength.WHOLE, 0.0, "nothing open changes what is minimised")
+    shown = ProofData(design.value, ProofStrength.EXACT, 0.0, "nothing open changes what is minimised")
     return build_result(design, design.evaluation, shown, {})
 
 
@@ -410,10 +410,10 @@ def reductions() -> tuple[Reduction, ...]:
 
 def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
     """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
-    if method.reach is ProofStrength.WHOLE or not problem.search.proves:
+    if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None
     for other in METHODS:
-        if other.reach is not ProofStrength.WHOLE or not kinds <= other.decides:
+        if other.strength is not ProofStrength.EXACT or not kinds <= other.decides:
             continue
         free = problem.changed(limits=())
         terms = tuple(term for term in problem.objective if other.suits(free.changed(objective=(term,))))

@@ -169,8 +169,8 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
     # the last number is what is left of the balance
     each, last = np.eye(len(columns) + 1), len(columns)
     totals = np.array([each[own].sum(axis=0) for own in numbers[::2]])
-    pulled = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
-    above = [pulled - each[last], -pulled - each[last], *(-each[own] for own in numbers[::2]), -each[last:]]
+    pullback = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
+    above = [pullback - each[last], -pullback - each[last], *(-each[own] for own in numbers[::2]), -each[last:]]
     maximum = [np.zeros(sum(map(len, above)))]
     for k, own in enumerate(numbers[1::2]):
         # a segment of the objective is added once, that of a limit as often as its price
@@ -309,7 +309,7 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
     kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
     if kinks is None or len(kinks.vanishing) > MOST_VANISHING:
         return None
-    hull = np.array([norm.pulled(own) for own in (kinks.base, *kinks.others)])
+    hull = np.array([norm.pullback(own) for own in (kinks.base, *kinks.others)])
     if len(kinks.longest):
         own = rows[kinks.longest]
         hull = np.einsum("ad,adn->an", own / np.linalg.norm(own, axis=1)[:, None], norm.slope[kinks.longest])

@@ -13,7 +13,7 @@ from dataclasses import replace
 from laufruhe.errors import counted
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, ProofStrength, certified
+from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
 from laufruhe.solvers.conclusion import KEPT, limit_values, result_under, with_limits
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
@@ -66,8 +66,8 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     zero_level = numerical_zero(result.problem, result.final.engine)
     result, doubt = result_under(result, bound, zero_level)
     value, text = (result.objective or told).value, f"{own.method}; {source}"
-    proof = certified(
-        value, bound, zero_level, result.problem.tolerance, ProofStrength.NEAR, own.kkt_residual, text, doubt
+    proof = make_certificate(
+        value, bound, zero_level, result.problem.tolerance, ProofStrength.PARTIAL, own.kkt_residual, text, doubt
     )
     status = Status.OPTIMAL if proof.kind is Proof.GLOBAL else result.status
     return replace(result, certificate=proof, status=status)

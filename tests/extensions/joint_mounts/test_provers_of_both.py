@@ -11,7 +11,7 @@ import pytest
 import laufruhe
 from attack.own_problem import Own
 from laufruhe.extensions.joint_mounts import prover
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.provers import Question
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of

@@ -17,7 +17,7 @@ from laufruhe.extensions.robust.assembly import Assembly, assemble
 from laufruhe.extensions.robust.result import AssemblyResult
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove import certificate
-from laufruhe.prove.best_first import Over
+from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve, walk
 from laufruhe.solvers.result import Status
@@ -100,13 +100,13 @@ def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture
 def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts of the assemblies that may hold a better one are left out, and the others are kept."""
-    right = assembly_solver._Search.parts
+    right = assembly_solver._Search.branch
 
     def turned(self: Any, taken: Any) -> Iterator[Any]:
         for part in right(self, taken):
-            yield Over(self.cutoff) if isinstance(part, tuple) and part[0] < self.cutoff else part
+            yield FathomedPart(self.cutoff) if isinstance(part, tuple) and part[0] < self.cutoff else part
 
-    monkeypatch.setattr(assembly_solver._Search, "parts", turned)
+    monkeypatch.setattr(assembly_solver._Search, "branch", turned)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from laufruhe.errors import BoundError
 from laufruhe.extensions.torsion.boxes import TwistBoxes
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import divide
+from laufruhe.prove.branch_and_bound import bisect_box
 from laufruhe.prove.certificate import Proof
 from problem_files import PROBLEMS
 
@@ -57,7 +57,7 @@ def test_orders_that_answer_most_choose_the_sides_of_three_numbers() -> None:
     low, high = boxes.coordinates.lower, boxes.coordinates.upper
     draws = [low + (high - low) * generator.random(3) for _ in range(400)]
     minimum = min(objective_value(problem, evaluate(problem, problem.design(list(map(float, x))))) for x in draws)
-    bound = divide(boxes, low, high, minimum, problem.tolerance * minimum, 600).bound
+    bound = bisect_box(boxes, low, high, minimum, problem.tolerance * minimum, 600).bound
     # by the gain of any order the same boxes left four fifths
     assert 0.7 * minimum <= bound <= minimum
 

@@ -30,12 +30,12 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Around, BoundedBoxes, Box, BoxResult
+from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult, ThinBoxBounder
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, divides
-from laufruhe.prove.witness import Known, check_around
+from laufruhe.prove.witness import Witness, check_near_witness
 
 MOST_OPEN = 5
 """Largest number n of open numbers of mounts: a box has 2^n vertices and 4^n coefficients."""
@@ -106,7 +106,7 @@ class DesignBoxes:
         Exact objective of a design; infinite if it violates a limit.
     """
 
-    what, at_once = "boxes of mounts, with unbalances", 2
+    what, batch_size = "boxes of mounts, with unbalances", 2
 
     def __init__(self, problem: Problem, value: float, exact_objective: ExactObjective) -> None:
         problem = with_default_sampling(problem)
@@ -337,27 +337,27 @@ def _concavity(values: Array) -> Array:
     return np.array(distances)
 
 
-class _VertexBranching(BoundedBoxes):
+class _VertexBranching(BatchBisection):
     """Branch and bound with designs at vertices as incumbents."""
 
-    def __init__(self, search: DesignBoxes, gap_tolerance: float, known: Known | None = None) -> None:
+    def __init__(self, search: DesignBoxes, gap_tolerance: float, known: Witness | None = None) -> None:
         super().__init__(search, search.value, gap_tolerance, known)
         self._boxes = search
 
-    def look(self, _: Box) -> None:
+    def propose(self, _: Box) -> None:
         """Lower the objective of the incumbent to that of the best vertex."""
         self.value = min(self.value, self._boxes.value)
 
 
-def designed_bound(boxes: DesignBoxes, gap_tolerance: float, known: Known | None = None) -> BoxResult:
+def designed_bound(boxes: DesignBoxes, gap_tolerance: float, known: Witness | None = None) -> BoxResult:
     """Return the bound of a problem that `mixes_corners`, by boxes until the gap tolerance or the budget is reached."""
     branching = _VertexBranching(boxes, gap_tolerance, known)
     maximum = boxes.max_boxes
     if not maximum:
         return BoxResult(0.0, 0)
-    result = branching.run(branching.bounded([(boxes.lower, boxes.upper)])[0], maximum)
+    result = branching.run(branching.bound_boxes([(boxes.lower, boxes.upper)])[0], maximum)
     if known is not None:
-        check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)
+        check_near_witness(ThinBoxBounder(boxes, boxes.lower, boxes.upper), known.place, known)
     return result
 
 

@@ -30,7 +30,7 @@ from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import BoxResult, divide_in_rounds
+from laufruhe.prove.branch_and_bound import BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, line_weights, norm_under
 from laufruhe.prove.mounts.box_response import LoadedOrders, is_travel
@@ -38,7 +38,7 @@ from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, Sides, b
 from laufruhe.prove.mounts.named import is_named
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 
 MOST_NUMBERS = 8
 """Largest number of open numbers; an unbalance of any angle has two."""
@@ -71,7 +71,7 @@ def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
 
 
 def load_bounds(
-    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], known: Known | None = None,
+    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], known: Witness | None = None,
     throws: OpenThrows | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
     """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance`.
@@ -93,7 +93,7 @@ def load_bounds(
     maximum = boxes.max_boxes
     if maximum and boxes.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
-        yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, known)
+        yield from bisect_in_stages(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, known)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
@@ -178,7 +178,7 @@ class LoadBoxes:
         )
 
     @property
-    def at_once(self) -> int:
+    def batch_size(self) -> int:
         """Count of boxes in one round."""
         return int(np.clip(ROUND_WORK / self._cost, 2, 32))
 
@@ -370,7 +370,7 @@ class _Boxes:
         value, slopes = np.zeros(len(near)), np.zeros((len(near), self.count))
         for k, t in enumerate(near[:, columns]):
             z = norm.dual_feasible(norm.subgradient(centres[k] + halves[k] * t))
-            gradient = norm.pulled(z)
+            gradient = norm.pullback(z)
             value[k] = float(np.vdot(z, norm.constant)) + gradient @ centres[k]
             slopes[k, columns] = gradient * halves[k]
         return LinearBound(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))

@@ -178,7 +178,7 @@ class MountedLoads:
                 sums[is_travel(measure.channel)] += weight * self._sums(measure, z, averaged)
             else:
                 constant += weight * float(np.vdot(z, norm.constant))
-                slopes = slopes + weight * norm.pulled(z)
+                slopes = slopes + weight * norm.pullback(z)
         return Pairing(sums[0], sums[1], constant, slopes)
 
     def _sums(self, measure: Measure, z: Array, averaged: bool) -> ComplexArray:

@@ -10,7 +10,7 @@ import numpy as np
 from laufruhe.extensions.joint_mounts.mounted_loads import coarser
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread
+from laufruhe.prove.certificate import Bound, Multipliers, best_bound, interpolate_duals, lower_bound
 from laufruhe.solvers.cones.conic import restrict_rows, rows_near, solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
@@ -54,7 +54,7 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
         coarse = coarser(problem, factor)
         solution = solve_cones(coarse)
         if solution.x is None:
-            limits = spread(
+            limits = interpolate_duals(
                 problem, refine_multipliers(coarse, problem, replace(solution.multipliers, terms=()))
             ).limits
             return None, replace(best, multipliers=replace(best.multipliers, limits=limits))

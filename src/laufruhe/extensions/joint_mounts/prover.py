@@ -13,10 +13,10 @@ from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.open_throws import throws_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of, vector_of
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 from laufruhe.solvers.mounts.places import started_at
 from laufruhe.solvers.sampling_refinement import over_read
 
@@ -65,7 +65,7 @@ def throw_answers(question: Question) -> Iterator[BoxResult]:
         yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), known, throws)
 
 
-def _known(question: Question) -> Known | None:
+def _known(question: Question) -> Witness | None:
     # place of the known design: numbers of mounts, then columns of unbalances
     known, problem = question.known, question.problem
     if known is None:

@@ -25,7 +25,7 @@ def _solve_long_cranks(problem: Problem) -> Result:
 LONG_CRANKS = Method(
     "stars of long cranks, each with cones",
     {Kind.STAR: BUILT, Kind.UNBALANCE: (Dependence.AFFINE,)},
-    ProofStrength.WHOLE,
+    ProofStrength.EXACT,
     _solve_long_cranks,
     True,
     norms=is_pointwise,

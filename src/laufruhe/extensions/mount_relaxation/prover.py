@@ -18,11 +18,21 @@ from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import EMPTY, NEARLY, Box, BoxBisection, BoxResult, OpenNode, Over, Parts, halves
+from laufruhe.prove.branch_and_bound import (
+    GAP_SAFETY,
+    INFEASIBLE_PART,
+    BoundedParts,
+    Box,
+    BoxBisection,
+    BoxResult,
+    FathomedPart,
+    OpenNode,
+    halves,
+)
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.prove.witness import Known, check_around, thin
+from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
 # relative gaps to prove, one after the other
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
@@ -67,7 +77,7 @@ SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds,
 
 def spring_bound(
     problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], in_batch: bool = False,
-    root_only: bool = False, known: Known | None = None,
+    root_only: bool = False, known: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
     """Return the bound of branch and bound, stopped at the gap tolerance or at the budget of relaxations.
 
@@ -114,39 +124,39 @@ class _Around:
     """Bounds of thin boxes around the best design, all mode shapes in them, to check the relaxation."""
 
     relaxation: SdpRelaxation
-    known: Known
+    known: Witness
     what: str = "spring forces"
 
     def around(self, place: Array) -> tuple[Array, Array]:
         """Return a thin box about numbers of mounts; the sides of modes keep their bounds."""
         lower, upper = self.relaxation.lower.copy(), self.relaxation.upper.copy()
         sides = slice(0, len(place))
-        lower[sides], upper[sides] = thin(place, lower[sides], upper[sides])
+        lower[sides], upper[sides] = thin_box(place, lower[sides], upper[sides])
         return lower, upper
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the lower bound over designs of a box that are not worse than the best by more than rounding."""
-        return self.relaxation.up_to(self.known.maximum * (1.0 + EXCESS)).bound(*box)[0]
+        return self.relaxation.up_to(self.known.upper_value * (1.0 + EXCESS)).bound(*box)[0]
 
 
 def _prove_levels(
-    relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, known: Known | None
+    relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, known: Witness | None
 ) -> BoxResult:
     """Prove lower bounds of the objective that rise level by level towards the best design (E59)."""
 
     def level_of(share: float) -> float:
-        return relaxation.value - max(share * relaxation.value, NEARLY * gap_tolerance)
+        return relaxation.value - max(share * relaxation.value, GAP_SAFETY * gap_tolerance)
 
     def under(share: float) -> SdpRelaxation:
         # the last level includes the best design itself
         search = relaxation.under(level_of(share))
-        return search if share or known is None else search.up_to(known.maximum * (1.0 + EXCESS))
+        return search if share or known is None else search.up_to(known.upper_value * (1.0 + EXCESS))
 
     # the first level near the best design bounds the root box
     root_share = next(share for share in shares if share <= LEVELS[0])
     root_search = under(root_share)
     root_bound = root_search.bound(relaxation.lower, relaxation.upper)
-    if known is not None and root_search.value > known.maximum:
+    if known is not None and root_search.value > known.upper_value:
         known.check(_Narrowing.what, root_bound[0])
     # a bound holds only for designs up to the level
     bound, spent, places = min(root_bound[0], root_search.value), 1, tuple[Array, ...]()
@@ -168,7 +178,7 @@ def _prove_levels(
             break
     if known is not None and 0.0 < bound < relaxation.cutoff:
         # at the last level the best design checked the bounds of its boxes
-        check_around(_Around(root_search, known), known.place, known)
+        check_near_witness(_Around(root_search, known), known.place, known)
     count = relaxation.mount_numbers
     candidates = (*relaxation.candidates, *places) if bound < relaxation.cutoff else ()
     return BoxResult(bound, spent, tuple(place[:count] for place in candidates))
@@ -186,9 +196,9 @@ class _Narrowing(BoxBisection):
     what = "boxes of mounts and modes, by spring forces"
 
     def __init__(
-        self, search: SdpRelaxation, maximum: int, known: Known | None, root_bound: tuple[float, Array] | None
+        self, search: SdpRelaxation, maximum: int, known: Witness | None, root_bound: tuple[float, Array] | None
     ) -> None:
-        super().__init__(search.value, 0.0, known if known is not None and search.value > known.maximum else None)
+        super().__init__(search.value, 0.0, known if known is not None and search.value > known.upper_value else None)
         self._search, self._maximum, self._root_bound, self.spent = search, maximum, root_bound, 0
 
     @property
@@ -201,28 +211,28 @@ class _Narrowing(BoxBisection):
         """Objective up to which bounds hold [SI]."""
         return self._search.value
 
-    def holds(self, box: Box) -> bool:
+    def contains_witness(self, box: Box) -> bool:
         """Return True if the known design lies in a box that spans all mode shapes."""
         mount_sides, mode_sides = slice(0, self._search.mount_numbers), slice(self._search.mount_numbers, None)
         has_all_modes = np.array_equal(box.lower[mode_sides], self._search.lower[mode_sides])
         has_all_modes = has_all_modes and np.array_equal(box.upper[mode_sides], self._search.upper[mode_sides])
-        return has_all_modes and super().holds(Box(box.lower[mount_sides], box.upper[mount_sides], 0))
+        return has_all_modes and super().contains_witness(Box(box.lower[mount_sides], box.upper[mount_sides], 0))
 
-    def narrow(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | Over:
-        """Return the bound and the narrowed box, or `Over` if it has no better design."""
+    def narrow(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | FathomedPart:
+        """Return the bound and the narrowed box, or `FathomedPart` if it has no better design."""
         previous = best = -math.inf
         while True:
             part = self._search.contracted(lower, upper)
             if part is None:
-                return EMPTY
+                return INFEASIBLE_PART
             lower, upper = part
             (bound, scores), self._root_bound = self._root_bound or self._search.bound(lower, upper), None
             self.spent += 1
             previous, best = best, max(best, bound)
-            if self.known is not None and self.holds(Box(lower, upper, 0)):
-                self.known.check(self.what, best)
+            if self.witness is not None and self.contains_witness(Box(lower, upper, 0)):
+                self.witness.check(self.what, best)
             if best >= self.cutoff:
-                return Over(min(best, self.level))
+                return FathomedPart(min(best, self.level))
             if previous > -math.inf:
                 narrows = best - previous >= PROGRESS * (self.cutoff - previous)
             if self.spent >= self._maximum or passed() or not scores.any() or not narrows:
@@ -230,17 +240,17 @@ class _Narrowing(BoxBisection):
             box, solved = narrowed(self._search, lower, upper, scores)
             self.spent += solved
             if box is None:
-                return Over(self.level)
+                return FathomedPart(self.level)
             lower, upper = box
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
+    def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the halves of boxes, each narrowed if narrowing paid for its parent."""
         return [self.narrow(*half, box.narrows) for box in boxes for half in halves(box)]
 
-    def parts(self, taken: Sequence[OpenNode[Box]]) -> Parts[Box]:
+    def branch(self, nodes: Sequence[OpenNode[Box]]) -> BoundedParts[Box]:
         """Return the halves of nodes; relaxations solved count as boxes seen."""
-        parts = [*super().parts(taken)]
-        self.seen = self.spent
+        parts = [*super().branch(nodes)]
+        self.node_count = self.spent
         return parts
 
 

@@ -37,7 +37,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import NEARLY
+from laufruhe.prove.branch_and_bound import GAP_SAFETY
 from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
 
@@ -77,7 +77,7 @@ class SdpRelaxation:
     def __init__(
         self, problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], ahead: Ahead | None = None
     ) -> None:
-        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - NEARLY * gap_tolerance, ahead
+        self.problem, self.value, self.cutoff, self.ahead = problem, value, value - GAP_SAFETY * gap_tolerance, ahead
         lower, upper = sides_of(problem.mount_decisions)
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._frames = number_ranges(problem, self._near, self._near)[0]

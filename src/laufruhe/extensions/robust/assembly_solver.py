@@ -30,9 +30,9 @@ from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import BranchAndBound, OpenNode, Parts
-from laufruhe.prove.certificate import Proof, ProofStrength, certified, unproven_certificate
-from laufruhe.prove.witness import Known, check_around
+from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, OpenNode
+from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate, unproven_certificate
+from laufruhe.prove.witness import Witness, check_near_witness
 from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
@@ -73,9 +73,9 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     value = objective_value(problem, final)
     certificate = unproven_certificate(value, math.inf, "a walk by exact evaluations, which proves nothing")
     if witness is None:
-        certificate = certified(
-            value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.WHOLE, 0.0,
-            f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
+        certificate = make_certificate(
+            value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0,
+            f"branch and bound over assignments, {search.node_count} parts bounded by dual rows",
         )  # fmt: skip
     met = final.violation(problem.limits) <= KEPT
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
@@ -175,7 +175,7 @@ class _Search(BranchAndBound[Chosen]):
         """Return the bound that no assembly goes under."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
         found = self.divide((self.bound(free), free), MOST_NODES)
-        check_around(self, self.best, Known(self._mass(self.best), self.value))
+        check_near_witness(self, self.best, Witness(self._mass(self.best), self.value))
         return found
 
     def around(self, chosen: Chosen) -> Chosen:
@@ -190,19 +190,19 @@ class _Search(BranchAndBound[Chosen]):
         """Bound from which no assembly of a node is better by half the tolerance."""
         return self.value * (1.0 - 0.5 * self.tolerance)
 
-    def is_fathomed(self, one: OpenNode[Chosen]) -> bool:
+    def is_fathomed(self, node: OpenNode[Chosen]) -> bool:
         """Return whether no assembly of it is better by half the tolerance."""
-        return one.bound >= self.cutoff
+        return node.bound >= self.cutoff
 
-    def parts(self, taken: Sequence[OpenNode[Chosen]]) -> Parts[Chosen]:
+    def branch(self, nodes: Sequence[OpenNode[Chosen]]) -> BoundedParts[Chosen]:
         """Yield the parts left for the cylinder that counts most of those without one."""
-        ((under, _, node),) = taken
-        lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
+        ((under, _, chosen),) = nodes
+        lot, cylinder = next((at for at in self.order if chosen[at[0]][at[1]] < 0), (-1, -1))
         for part in range(len(self.more[lot])) if lot >= 0 else ():
-            if part in node[lot]:
+            if part in chosen[lot]:
                 continue
-            own = tuple(part if k == cylinder else old for k, old in enumerate(node[lot]))
-            child = (*node[:lot], own, *node[lot + 1 :])
+            own = tuple(part if k == cylinder else old for k, old in enumerate(chosen[lot]))
+            child = (*chosen[:lot], own, *chosen[lot + 1 :])
             yield max(self.bound(child), under), child
 
     def _mass(self, chosen: Chosen) -> Array:
@@ -275,7 +275,7 @@ class _Search(BranchAndBound[Chosen]):
         )  # fmt: skip
         return AssemblyResult(
             tuple(lot.kind for lot in self.lots), places,
-            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.seen,
+            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.node_count,
             tuple(float(q) for q in np.quantile(values, SHARES)), float(values.max()),
             value_at(self.terms, np.zeros(2 * self.cylinders)), RANDOM,
         )  # fmt: skip

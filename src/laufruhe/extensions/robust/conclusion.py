@@ -31,7 +31,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Proof, certified
+from laufruhe.prove.certificate import Proof, make_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import (
     KEPT,
@@ -217,8 +217,8 @@ def robust_result(
     """Return the result of a design for built engines; `given` is of the one given."""
     met = max(found.violation, design.violation) <= KEPT
     zero_level = numerical_zero(problem, design.evaluation.engine)
-    certificate = certified(
-        found.bound, shown.bound, zero_level, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
+    certificate = make_certificate(
+        found.bound, shown.bound, zero_level, problem.tolerance, shown.strength, shown.kkt_residual, shown.method
     )
     prices: dict[Limit, float] = {}
     for limit, price in (priced for own in active.prices for priced in own):

@@ -128,9 +128,9 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     if minimum.conflict:
         return infeasible_robust_result(problem, as_given, minimum.conflict, {"solve": time.perf_counter() - started})
     solved = time.perf_counter()
-    reach = ProofStrength.WHOLE if over.share is None else ProofStrength.ASIDE
+    strength = ProofStrength.EXACT if over.share is None else ProofStrength.RELAXED
     design = evaluate_design(problem, minimum.values, minimum.samples)
-    shown = ProofData(minimum.bound, reach, minimum.active.residual, _method(problem, minimum))
+    shown = ProofData(minimum.bound, strength, minimum.active.residual, _method(problem, minimum))
     details = compare_designs(
         problem, adversary, start, minimum.values, minimum.found, minimum.active, minimum.scenarios
     )

@@ -22,8 +22,8 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.witness import is_over, report
-from laufruhe.prove.best_first import BranchAndBound, OpenNode, Over, Parts
-from laufruhe.prove.witness import THIN, Known, check_around
+from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
+from laufruhe.prove.witness import THIN, Witness, check_near_witness
 
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
 """Weights and norms, whose decision vector is that of the errors."""
@@ -96,12 +96,12 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
     value, errors = search.best
     if is_over(bound, -value):
         report(BoundError("errors that no engine exceeds", -bound, value))
-    return WorstCase(errors, value, -bound, search.seen)
+    return WorstCase(errors, value, -bound, search.node_count)
 
 
 def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
     """Report a bound of a thin part around the worst errors that is under their value."""
-    check_around(_Around(terms, columns), worst.errors, Known(worst.errors, -worst.value))
+    check_near_witness(_Around(terms, columns), worst.errors, Witness(worst.errors, -worst.value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class _Part:
 class _ErrorSearch(BranchAndBound[_Part]):
     """Branch and bound over errors; it minimises the negative of the sum."""
 
-    what, of_objective = "boxes of errors", False
+    what, reports_bounds = "boxes of errors", False
 
     def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
         self._terms, self._tolerance, self.best = terms, tolerance, best
@@ -143,13 +143,13 @@ class _ErrorSearch(BranchAndBound[_Part]):
         """Keep a value and its errors if they are worse than the worst so far."""
         self.best = max(self.best, point, key=lambda each: each[0])
 
-    def is_fathomed(self, one: OpenNode[_Part]) -> bool:
+    def is_fathomed(self, node: OpenNode[_Part]) -> bool:
         """Return whether no errors of a part are worse by the tolerance."""
-        return -one.bound <= self.best[0] * (1.0 + self._tolerance)
+        return -node.bound <= self.best[0] * (1.0 + self._tolerance)
 
-    def parts(self, taken: Sequence[OpenNode[_Part]]) -> Parts[_Part]:
+    def branch(self, nodes: Sequence[OpenNode[_Part]]) -> BoundedParts[_Part]:
         """Yield parts with one interval fixed at either end, or one circle parted."""
-        ((above, _, own),) = taken
+        ((above, _, own),) = nodes
         rest = [block for k, block in enumerate(own.blocks) if k != own.split]
         for centre, free in own.blocks[own.split].parts(own.centre):
             blocks = rest if free is None else [*rest, free]
@@ -157,7 +157,7 @@ class _ErrorSearch(BranchAndBound[_Part]):
             self.improve((value_at(self._terms, part.errors), part.errors))
             # a part is never worse than the whole
             bound = min(part.bound, -above)
-            yield (-bound, _Part(centre, blocks, part.split)) if blocks else Over(-bound)
+            yield (-bound, _Part(centre, blocks, part.split)) if blocks else FathomedPart(-bound)
 
 
 def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:

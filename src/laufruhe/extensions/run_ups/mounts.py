@@ -14,7 +14,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, ProofData, broken_limits, build_result, infeasible_result
@@ -70,7 +70,7 @@ def _best_result(
     optimum = best.optimum
     facts = ProofData(
         bound=max(relaxed_bound, divided.bound),
-        reach=ProofStrength.NEAR if divided.boxes else ProofStrength.ASIDE,
+        strength=ProofStrength.PARTIAL if divided.boxes else ProofStrength.RELAXED,
         kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
         method=_method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, divided),
         prices={} if optimum is None else best.joint.prices(optimum),

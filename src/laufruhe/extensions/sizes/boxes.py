@@ -25,8 +25,8 @@ from laufruhe.extensions.sizes.rod_series import RodSeries, rod_series
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.best_first import Box, BoxBisection, BoxResult, Over, halves, widest
-from laufruhe.prove.witness import Known, check_around, thin
+from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
+from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
 MOST_BOXES = 3000
 # a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
@@ -278,7 +278,7 @@ class _Sizes(BoxBisection):
 
     what = "boxes of sizes"
 
-    def __init__(self, boxes: SizeBoxes, value: float, room: float, known: Known | None = None) -> None:
+    def __init__(self, boxes: SizeBoxes, value: float, room: float, known: Witness | None = None) -> None:
         super().__init__(value, room, known)
         self._boxes = boxes
 
@@ -287,18 +287,20 @@ class _Sizes(BoxBisection):
         """Level to which boxes are cut: no design in what is cut off is better."""
         return self.cutoff
 
-    def bounded(self, lower: Array, upper: Array, known: tuple[Together, ...] = ()) -> tuple[float, Box] | Over:
+    def bound_box(
+        self, lower: Array, upper: Array, known: tuple[Together, ...] = ()
+    ) -> tuple[float, Box] | FathomedPart:
         """Return the bound of a box and its rest."""
         cut = self._boxes.cut(lower, upper, self.cutoff, known)
         if cut is None:
-            return Over(self.level)
+            return FathomedPart(self.level)
         box = _SizeBox(cut.lower, cut.upper, cut.side)
         box.known = cut.known
         return cut.bound, box
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
+    def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the bounds of each half."""
-        return [self.bounded(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
+        return [self.bound_box(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,12 +308,12 @@ class _Around:
     """Bounder of thin boxes."""
 
     boxes: SizeBoxes
-    known: Known
+    known: Witness
     what: str = _Sizes.what
 
     def around(self, place: Array) -> tuple[Array, Array]:
         """Return a thin box around sizes."""
-        return thin(place, self.boxes.model.lower, self.boxes.model.upper)
+        return thin_box(place, self.boxes.model.lower, self.boxes.model.upper)
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the bound of a box by the dual rows that it suggests, infinite where it breaks a limit."""
@@ -322,11 +324,11 @@ class _Around:
 
 
 def divided_sizes(
-    boxes: SizeBoxes, value: float, room: float, maximum: int = MOST_BOXES, known: Known | None = None
+    boxes: SizeBoxes, value: float, room: float, maximum: int = MOST_BOXES, known: Witness | None = None
 ) -> BoxResult:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
     division = _Sizes(boxes, value, room, known)
-    bound = division.run(division.bounded(boxes.model.lower, boxes.model.upper), maximum)
+    bound = division.run(division.bound_box(boxes.model.lower, boxes.model.upper), maximum)
     if known is not None:
-        check_around(_Around(boxes, known), known.place, known)
+        check_near_witness(_Around(boxes, known), known.place, known)
     return bound

@@ -22,7 +22,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
-from laufruhe.prove.certificate import ProofStrength, room_of
+from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import KEPT, Design, build_result, evaluate_design
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
@@ -47,7 +47,7 @@ def solve_mounted_sizes(problem: Problem) -> Result:
     design = evaluate_design(problem, program.values(best))
     bound = _bound(problem, design)
     words = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
-    proof = proof_data(program, design, bound, ProofStrength.ASIDE, words)
+    proof = proof_data(program, design, bound, ProofStrength.RELAXED, words)
     return build_result(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
@@ -89,7 +89,7 @@ def _bound(problem: Problem, design: Design) -> float:
     if model.moves_rod or of_sizes or design.violation > KEPT:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
-    room = room_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
+    room = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return max(proven(Question(relaxed, design.value, room, near)).bound, mounts_bound(relaxed, near))
 
 

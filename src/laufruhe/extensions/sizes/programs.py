@@ -22,7 +22,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
-from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, minorant, spread
+from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, interpolate_duals, minorant
 
 Ask: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | None, Multipliers]]
 """A decision vector of a program, None where none is allowed, and dual rows, roughly unless told; none is trusted."""
@@ -80,7 +80,7 @@ class SizePrograms:
         if x is not None:
             return self._together(program, best_bound(program, x, multipliers).multipliers) if program.terms else None
         stripped = replace(program, terms=())
-        return self._together(stripped, minorant(stripped, spread(stripped, multipliers)).multipliers)
+        return self._together(stripped, minorant(stripped, interpolate_duals(stripped, multipliers)).multipliers)
 
     def program(self, lower: Array, upper: Array, reach: SizeReach) -> AffineProblem:
         """Return the program of a box: its masses as decisions beside the unbalances, factors where they are least."""

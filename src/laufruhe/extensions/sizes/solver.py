@@ -19,7 +19,7 @@ from laufruhe.numerics.norms import Grid
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Multipliers, ProofStrength
 from laufruhe.solvers.boxes.box_designs import rebalance
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
@@ -121,8 +121,10 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     else:
         rod = "; nothing bounds what the length of the rod makes of a load"
         words = f"local programs{rod if model.moves_rod else ''}"
-    reach = ProofStrength.ASIDE if boxes is None else ProofStrength.WHOLE if boxes.is_whole else ProofStrength.NEAR
-    proof = proof_data(program, outcome.design, outcome.bound, reach, words)
+    strength = (
+        ProofStrength.RELAXED if boxes is None else ProofStrength.EXACT if boxes.is_whole else ProofStrength.PARTIAL
+    )
+    proof = proof_data(program, outcome.design, outcome.bound, strength, words)
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 

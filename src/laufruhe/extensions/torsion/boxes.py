@@ -98,7 +98,7 @@ class TwistBoxes:
     """
 
     what = "boxes of discs and shafts"
-    at_once = 1
+    batch_size = 1
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.coordinates = problem, TwistCoordinates(problem)

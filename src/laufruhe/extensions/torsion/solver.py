@@ -14,7 +14,7 @@ from laufruhe.extensions.torsion.machine import TORSION
 from laufruhe.problem.channels import FLYWHEEL_INERTIA, IRREGULARITY
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import BoxResult, divide
+from laufruhe.prove.branch_and_bound import BoxResult, bisect_box
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import KEPT, Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.method import Method, is_pointwise
@@ -45,7 +45,7 @@ def solve_torsion(problem: Problem) -> Result:
         coordinates = boxes.coordinates
         place = coordinates.from_decisions(np.array([float(x.real) for x in design.values]))
         known = known_of(design, place) if value < math.inf else None
-        divided = divide(boxes, coordinates.lower, coordinates.upper, value, room, maximum, known)
+        divided = bisect_box(boxes, coordinates.lower, coordinates.upper, value, room, maximum, known)
         return replace(divided, places=tuple(coordinates.decisions(x) for x in divided.places))
 
     outcome = proven(program, best, bounded)
@@ -55,12 +55,14 @@ def solve_torsion(problem: Problem) -> Result:
     method = f"local programs; lower bound on {outcome.divided.boxes} boxes of discs and shafts"
     is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.violation <= KEPT
     bound = outcome.bound if boxes.coordinates.is_exact else 0.0
-    proof = proof_data(program, outcome.design, bound, ProofStrength.NEAR if is_near else ProofStrength.ASIDE, method)
+    proof = proof_data(
+        program, outcome.design, bound, ProofStrength.PARTIAL if is_near else ProofStrength.RELAXED, method
+    )
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 METHOD = Method(
-    "boxes of discs and shafts", {TORSION: ()}, ProofStrength.NEAR,
+    "boxes of discs and shafts", {TORSION: ()}, ProofStrength.PARTIAL,
     solve_torsion, True,
     frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
     proves="the optimum of root mean squares of two or three; else a local one",

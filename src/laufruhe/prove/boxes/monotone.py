@@ -16,8 +16,8 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
 from laufruhe.numerics.witness import EXCESS
-from laufruhe.prove.best_first import Box, BoxBisection, BoxResult, Over, halves, widest
-from laufruhe.prove.witness import Known, check_around, thin
+from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
+from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
 MOST_BOXES = 4000
 # bisections of a side that is cut
@@ -82,7 +82,7 @@ class _MonotoneBoxes(BoxBisection):
 
     what = "boxes"
 
-    def __init__(self, problem: MonotoneProblem, value: float, room: float, known: Known | None = None) -> None:
+    def __init__(self, problem: MonotoneProblem, value: float, room: float, known: Witness | None = None) -> None:
         super().__init__(value, room, known)
         self._uncut, self._problem = problem, problem.with_cutoff(self.cutoff)
 
@@ -91,16 +91,16 @@ class _MonotoneBoxes(BoxBisection):
         """Least objective of designs that cuts remove; infinite if cuts use limits alone."""
         return self.cutoff if self._problem is not self._uncut else math.inf
 
-    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | Over:
+    def bound_box(self, lower: Array, upper: Array) -> tuple[float, Box] | FathomedPart:
         """Return a box without slices that violate limits, and its least sum."""
         rest = _cut(self._problem, lower, upper)
         if rest is None:
-            return Over(self.level)
+            return FathomedPart(self.level)
         return self._problem.minimum_over(*rest), Box(*rest, widest(*rest, self._problem.upper - self._problem.lower))
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
+    def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the halves of boxes across their relatively longest side."""
-        return [self.bounded(*half) for box in boxes for half in halves(box)]
+        return [self.bound_box(*half) for box in boxes for half in halves(box)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,21 +108,21 @@ class _Around:
     """Thin boxes, to check bounds around a known design."""
 
     problem: MonotoneProblem
-    known: Known
+    known: Witness
     what: str = _MonotoneBoxes.what
 
     def around(self, place: Array) -> tuple[Array, Array]:
         """Return a thin box around a place."""
-        return thin(place, self.problem.lower, self.problem.upper)
+        return thin_box(place, self.problem.lower, self.problem.upper)
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the least sum of a box; infinite if limits cut off all of it."""
-        result = _MonotoneBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bounded(*box)
-        return math.inf if isinstance(result, Over) else result[0]
+        result = _MonotoneBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bound_box(*box)
+        return math.inf if isinstance(result, FathomedPart) else result[0]
 
 
 def divided(
-    problem: MonotoneProblem, value: float, room: float, maximum: int = MOST_BOXES, known: Known | None = None
+    problem: MonotoneProblem, value: float, room: float, maximum: int = MOST_BOXES, known: Witness | None = None
 ) -> BoxResult:  # fmt: skip
     """Halve boxes until none may hold a design that is `room` better than `value` (T9).
 
@@ -139,8 +139,8 @@ def divided(
     """
     boxes = _MonotoneBoxes(problem, value, room, known)
     if known is not None:
-        check_around(_Around(problem, known), known.place, known)
-    return boxes.run(boxes.bounded(problem.lower, problem.upper), maximum)
+        check_near_witness(_Around(problem, known), known.place, known)
+    return boxes.run(boxes.bound_box(problem.lower, problem.upper), maximum)
 
 
 def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:

@@ -143,7 +143,7 @@ class SharedGasBoxes:
     """Bounds of boxes of leads for cranks that share gas chambers."""
 
     what = "boxes of leads"
-    at_once = 1
+    batch_size = 1
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem

@@ -15,9 +15,9 @@ from laufruhe.numerics.budget import at_least, passed
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 
 EARLY = 0.2
 """Share of the boxes of stiffness before other provers have their turn."""
@@ -53,7 +53,7 @@ class Question:
     value: float
     room: float
     near: Sequence[Value] = ()
-    known: Known | None = None
+    known: Witness | None = None
     of_many: bool = False
     moves: tuple[Phasing, Candidate] | None = None
     bound: float = 0.0

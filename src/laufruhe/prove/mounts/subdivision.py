@@ -24,7 +24,7 @@ from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import NEARLY, BoxResult, divide_in_rounds
+from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import LinearBound, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
@@ -32,7 +32,7 @@ from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 
 # open numbers up to which boxes are the default, and work of all boxes together
 MOST_OPEN = 6
@@ -55,7 +55,7 @@ def divides(problem: Problem) -> bool:
 
 
 def divided_bounds(
-    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
+    problem: Problem, value: float, room: float, shares: Sequence[float], known: Witness | None = None
 ) -> Iterator[BoxResult]:  # fmt: skip
     """Yield bounds by boxes of stiffness, until no design is more than `room` better than `value`.
 
@@ -72,11 +72,11 @@ def divided_bounds(
     known
         Incumbent, to check bounds.
     """
-    search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
+    search = StiffnessBoxes(problem, LEFT_OUT * room, value - GAP_SAFETY * room if value < math.inf else math.inf)
     maximum = search.max_boxes
     if maximum and search.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
-        yield from divide_in_rounds(search, search.model.lower, search.model.upper, value, room, counts, known)
+        yield from bisect_in_stages(search, search.model.lower, search.model.upper, value, room, counts, known)
 
 
 class SimulatedBoxes(Protocol):
@@ -160,7 +160,7 @@ class StiffnessBoxes:
         return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + simulated
 
     @property
-    def at_once(self) -> int:
+    def batch_size(self) -> int:
         """Number of boxes in one round."""
         return int(np.clip(MEMORY / (3.0 * self._cost), 2, 64))
 

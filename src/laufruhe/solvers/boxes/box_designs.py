@@ -16,9 +16,9 @@ from laufruhe.problem.measure import Side
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Over
+from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.prove.witness import Known
+from laufruhe.prove.witness import Witness
 from laufruhe.solvers.boxes.search import BoxSearch, SearchBox, divided
 from laufruhe.solvers.conclusion import (
     Design,
@@ -80,7 +80,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-    def known(self, design: RebalancedDesign) -> Known | None:
+    def known(self, design: RebalancedDesign) -> Witness | None:
         """Return a design as a witness of bounds, or None if it violates limits."""
         return known_of(design.design, self.place(design))
 
@@ -103,7 +103,9 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         names = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in names)
 
-    def solved(self, root: S | Over, first: RebalancedDesign | None, maximum: int, what: str, how: str) -> Result:
+    def solved(
+        self, root: S | FathomedPart, first: RebalancedDesign | None, maximum: int, what: str, how: str
+    ) -> Result:
         """Return the best design of a branch and bound search, with its certificate.
 
         Parameters
@@ -119,7 +121,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         """
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
-        if not isinstance(root, Over) and first is not None:
+        if not isinstance(root, FathomedPart) and first is not None:
             zero_level = numerical_zero(problem)
             best, bound, boxes = divided(self, root, first, zero_level, problem.tolerance, maximum, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}
@@ -128,7 +130,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         balance, design = best.result, best.design
         proof = ProofData(
             bound=0.0 if design.rank[0] else bound,
-            reach=ProofStrength.WHOLE,
+            strength=ProofStrength.EXACT,
             kkt_residual=balance.certificate.kkt_residual if balance and balance.certificate else math.inf,
             method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
             prices=(balance.prices if balance else {}) | self.prices(design),

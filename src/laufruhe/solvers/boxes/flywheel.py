@@ -17,8 +17,8 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, divided
+from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.conflicts import smallest_conflict
@@ -155,5 +155,5 @@ def solve_flywheel(problem: Problem) -> Result:
     if answer.excludes_all:
         return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
     method = f"monotone quantities, bounded on {answer.divided.boxes} boxes of the flywheel's numbers"
-    proof = proof_data(program, answer.design, answer.bound, ProofStrength.WHOLE, method)
+    proof = proof_data(program, answer.design, answer.bound, ProofStrength.EXACT, method)
     return build_result(answer.design, initial, proof, timing)

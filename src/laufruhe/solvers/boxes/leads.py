@@ -19,10 +19,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
+from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
 from laufruhe.prove.certificate import Multipliers, best_bound
-from laufruhe.prove.witness import thin
+from laufruhe.prove.witness import thin_box
 from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.search import search_from_grid
 from laufruhe.solvers.conclusion import evaluate_design
@@ -73,15 +73,15 @@ class LeadSearch(RebalancedSearch[_Box]):
         self.boxes = LeadBoxes(self.model)
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, RebalancedDesign | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
         """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
         for low, high in halves(Box(box.lower, box.upper, box.side)):
             half = self.box(low, high, box.bound, value)
             level = value * (1.0 - SHARE * self.problem.tolerance)
-            is_worth = not isinstance(half, Over) and half.bound < value and half.at_middle < level
+            is_worth = not isinstance(half, FathomedPart) and half.bound < value and half.at_middle < level
             yield half, self.rebalance_at(0.5 * (low + high)) if is_worth else None
 
-    def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | Over:
+    def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | FathomedPart:
         """Return the bound of a box, or that it has no feasible design; bounds close to `value` use all angles."""
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         result = self._bound(middle, half, COARSE)
@@ -89,7 +89,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             result = self._bound(middle, half, 1)
         if math.isinf(result.value):
             self.add_conflict(result.broken)
-            return EMPTY
+            return INFEASIBLE_PART
         side = int(np.argmax(result.pull + 1e-12 * half))
         bound, room = max(result.value, floor), EXACT * self.problem.tolerance * result.at_middle
         return _Box(lower, upper, bound, result.at_middle, side, result.at_middle - bound <= room < math.inf)
@@ -133,9 +133,9 @@ class LeadSearch(RebalancedSearch[_Box]):
         self.add_conflict([x.name for x, z in zip(self.problem.load_limits, limits, strict=True) if z.any()])
         return bound
 
-    def around(self, design: RebalancedDesign) -> _Box | Over:
+    def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
         """Return a thin box around the leads of a design with its bound."""
-        return self.box(*thin(self.place(design), self.model.lower, self.model.upper), 0.0, design.value)
+        return self.box(*thin_box(self.place(design), self.model.lower, self.model.upper), 0.0, design.value)
 
     def check_acts(self) -> None:
         """Raise ModelError if a lead changes neither the objective nor a limit."""

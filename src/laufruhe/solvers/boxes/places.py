@@ -17,8 +17,8 @@ from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import EMPTY, Box, Over, halves
-from laufruhe.prove.witness import thin
+from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
+from laufruhe.prove.witness import thin_box
 from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.boxes.search import divided
@@ -77,7 +77,7 @@ def solve_places(problem: Problem) -> Result:
     """Return the best positions and unbalances, with a bound by boxes of positions."""
     search = PlaceSearch(problem)
     root = search.box(*search.bounds)
-    first = None if isinstance(root, Over) else search.rebalance_at(root.middle)
+    first = None if isinstance(root, FathomedPart) else search.rebalance_at(root.middle)
     return search.solved(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
 
 
@@ -98,7 +98,7 @@ def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose
 
     search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
-    if isinstance(root, Over):
+    if isinstance(root, FathomedPart):
         return infeasible_result(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
     result = propose(problem, [root.near])
     if not result.status.has_design or not problem.search.proves:
@@ -124,27 +124,30 @@ class PlaceSearch(RebalancedSearch[_Box]):
         """Bounds of all positions [m]."""
         return sides_of(self.places)
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, RebalancedDesign | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
         """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
         side = int(np.argmax(pulled))
         for bounds in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
             half = self.box(*bounds, box.bound)
-            yield half, None if isinstance(half, Over) or half.bound >= value else self.rebalance_at(half.middle)
+            yield (
+                half,
+                None if isinstance(half, FathomedPart) or half.bound >= value else self.rebalance_at(half.middle),
+            )
 
-    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | Over:
+    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | FathomedPart:
         """Return a box with the bound and the positions of its relaxation, or that it has no feasible design."""
         violated = self._violated(lower, upper)
         if violated:
             self.add_conflict(violated)
-            return EMPTY
+            return INFEASIBLE_PART
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = self._solve(relaxed)
         if result.status is Status.INFEASIBLE:
             self.add_conflict(result.conflict)
-            return EMPTY
+            return INFEASIBLE_PART
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
         feasible = self._move_into_limits(middle, lower, upper)
@@ -159,10 +162,10 @@ class PlaceSearch(RebalancedSearch[_Box]):
         values = dict(zip((d.name for d in self.problem.decisions), design.design.values, strict=True))
         return np.array([float(np.real(values[place.name])) for place in self.places])
 
-    def around(self, design: RebalancedDesign) -> _Box | Over:
+    def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
         """Return a thin box around the positions of a design, with its bound by few angles."""
         few = PlaceSearch(self.problem.changed(search=replace(self.problem.search, proves=False)))
-        return few.box(*thin(self.place(design), *self.bounds))
+        return few.box(*thin_box(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
         result = solve_unbalances(relaxed, angles=self.angles)
@@ -282,9 +285,9 @@ class _PlaceSearchByMethod(PlaceSearch):
         super().__init__(problem)
         self._prove = prove
 
-    def around(self, design: RebalancedDesign) -> _Box | Over:
+    def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
         """Return a thin box around the positions of a design with its bound."""
-        return self.box(*thin(self.place(design), *self.bounds))
+        return self.box(*thin_box(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
         return self._prove(relaxed)

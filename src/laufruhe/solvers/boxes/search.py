@@ -13,9 +13,9 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import Speculation, speculation
-from laufruhe.prove.best_first import BranchAndBound, OpenNode, Over, Parts
+from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.certificate import gap_of
-from laufruhe.prove.witness import Bounder, Known, check_around
+from laufruhe.prove.witness import Bounder, Witness, check_near_witness
 
 # share of the tolerance at which the gap counts as closed
 NEARLY = 0.99
@@ -69,7 +69,7 @@ class BoxSearch(Generic[B, D]):
         """Names of limits that boxes without a feasible design violate."""
         raise NotImplementedError
 
-    def parts(self, box: B, value: float) -> Iterator[tuple[B | Over, D | None]]:
+    def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
         """Yield boxes that cover a box, or the level below which a part has no design, each with a design or None."""
         raise NotImplementedError
 
@@ -77,7 +77,7 @@ class BoxSearch(Generic[B, D]):
         """Return the least objective of designs that bounds cut off, for the value of the incumbent."""
         return math.inf
 
-    def known(self, _: D) -> Known | None:
+    def known(self, _: D) -> Witness | None:
         """Return a design as a witness of bounds, or None."""
         raise NotImplementedError
 
@@ -85,7 +85,7 @@ class BoxSearch(Generic[B, D]):
         """Return whether a design lies in a box."""
         return False
 
-    def around(self, _: D) -> B | Over | None:
+    def around(self, _: D) -> B | FathomedPart | None:
         """Return a thin box around a design with its bound, or None."""
         raise NotImplementedError
 
@@ -101,7 +101,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
         ahead: Speculation[Any, Any],
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
-        self.known = search.known(best)
+        self.witness = search.known(best)
         self._search, self._zero_level, self._tolerance, self._ahead = search, zero_level, tolerance, ahead
 
     @property
@@ -109,29 +109,29 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
         """Least objective of designs that bounds cut off; infinite if they cut off none."""
         return self._search.level(self.value)
 
-    def holds(self, box: B) -> bool:
+    def contains_witness(self, box: B) -> bool:
         """Return whether the best design lies in a box."""
         return self._search.holds(box, self.best)
 
-    def is_fathomed(self, one: OpenNode[B]) -> bool:
+    def is_fathomed(self, node: OpenNode[B]) -> bool:
         """Return whether the gap between a box and the incumbent is closed."""
-        gap = gap_of(self.value, one.bound, self._zero_level)
+        gap = gap_of(self.value, node.bound, self._zero_level)
         # the bound of an exact box differs from its best design by no more than the tolerance of its program
-        return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
+        return gap <= NEARLY * self._tolerance or (gap < np.inf and node.part.is_exact)
 
-    def parts(self, taken: Sequence[OpenNode[B]]) -> Parts[B]:
+    def branch(self, nodes: Sequence[OpenNode[B]]) -> BoundedParts[B]:
         """Yield the parts of a box, prepared by workers if the search is shared."""
-        ((bound, name, box),) = taken
+        ((bound, name, box),) = nodes
         search, step = self._search, (self._search, box, self.value)
         if search.is_shared:
-            others = ((number, (search, part, self.value)) for _, number, part in self.coming(AHEAD))
+            others = ((number, (search, part, self.value)) for _, number, part in self.next_nodes(AHEAD))
             self._ahead.prefetch([(name, step), *others])
         parts, conflict = self._ahead.result(name, step)
         search.add_conflict(conflict)
         for part, design in parts:
             if design is not None and design.rank < self.best.rank:
-                self.best, self.value, self.known = design, design.value, search.known(design)
-            yield part if isinstance(part, Over) else (part.bound, part)
+                self.best, self.value, self.witness = design, design.value, search.known(design)
+            yield part if isinstance(part, FathomedPart) else (part.bound, part)
             if not search.is_shared and passed():
                 # the remaining parts have at least the bound of the box
                 yield bound, box
@@ -163,10 +163,10 @@ def divided(
     with speculation(_parted) as ahead:
         boxes = _Branching(search, best, zero_level, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), maximum)
-    if boxes.known is not None:
-        around: Bounder[D, B | Over] = _Around(search, what)
-        check_around(around, boxes.best, boxes.known)
-    return boxes.best, bound, boxes.seen
+    if boxes.witness is not None:
+        around: Bounder[D, B | FathomedPart] = _Around(search, what)
+        check_near_witness(around, boxes.best, boxes.witness)
+    return boxes.best, bound, boxes.node_count
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,13 +176,13 @@ class _Around(Generic[B, D]):
     search: BoxSearch[B, D]
     what: str
 
-    def around(self, design: D) -> B | Over | None:
+    def around(self, design: D) -> B | FathomedPart | None:
         """Return a thin box around a design with its bound."""
         return self.search.around(design)
 
-    def bound(self, box: B | Over) -> float:
+    def bound(self, box: B | FathomedPart) -> float:
         """Return the bound of a box."""
-        return box.level if isinstance(box, Over) else box.bound
+        return box.level if isinstance(box, FathomedPart) else box.bound
 
 
 def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:

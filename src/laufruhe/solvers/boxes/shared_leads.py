@@ -13,8 +13,8 @@ from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import divide
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
+from laufruhe.prove.branch_and_bound import bisect_box
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.boxes.search import search_from_grid
 from laufruhe.solvers.conclusion import (
@@ -46,12 +46,12 @@ def solve_shared_leads(problem: Problem) -> Result:
         value = best.value
         room = SHARE * problem.tolerance * max(value, numerical_zero(problem))
         known = known_of(best, np.array([float(x.real) for x in best.values]))
-    divided = divide(boxes, lower, upper, value, room, problem.search.boxes_or(MOST_BOXES), known)
+    divided = bisect_box(boxes, lower, upper, value, room, problem.search.boxes_or(MOST_BOXES), known)
     timing = {"solve": time.perf_counter() - started}
     if best is None or (known is None and math.isinf(divided.bound)):
         return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
     method = f"local searches; lower bound on {divided.boxes} box{'es' * (divided.boxes > 1)} of leads"
-    return build_result(best, initial, ProofData(divided.bound, ProofStrength.WHOLE, math.inf, method), timing)
+    return build_result(best, initial, ProofData(divided.bound, ProofStrength.EXACT, math.inf, method), timing)
 
 
 def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:

@@ -104,7 +104,7 @@ def refine_multipliers(coarse: AffineProblem, fine: AffineProblem, multipliers: 
     equations = equations_of(fine, zero_limits)
     if equations is None:
         return multipliers
-    slope = sum((coarse.limits[k][1].pulled(multipliers.limits[k]) for k in zero_limits), np.zeros(coarse.size))
+    slope = sum((coarse.limits[k][1].pullback(multipliers.limits[k]) for k in zero_limits), np.zeros(coarse.size))
     rows = equations.dual_rows(equations.matrix @ (equations.units**2 * slope))
     limits = list(multipliers.limits)
     for k, z in zip(zero_limits, rows, strict=True):

@@ -13,7 +13,7 @@ import numpy as np
 
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.prove.certificate import ROUNDING, Bound, Multipliers, gap_of, levelled, lower_bound
+from laufruhe.prove.certificate import ROUNDING, Bound, Multipliers, flatten_interior, gap_of, lower_bound
 from laufruhe.solvers.cones.conic import solve_quadratic
 
 TARGET_GAP = 1e-6
@@ -79,7 +79,7 @@ def polish(model: AffineModel, coarse: Optimum) -> Optimum:
     bound = lower_bound(averaged, Multipliers(tuple(rows), limits))
     value = fine.objective(x)
     if gap_of(value, bound.value, coarse.zero_level) > TARGET_GAP:
-        bound = max(bound, lower_bound(averaged, levelled(averaged, x, bound)), key=lambda proven: proven.value)
+        bound = max(bound, lower_bound(averaged, flatten_interior(averaged, x, bound)), key=lambda proven: proven.value)
     gap, violation = gap_of(value, bound.value, coarse.zero_level), fine.violation(x)
     if gap >= coarse.gap or violation > max(coarse.violation, FEASIBLE):
         return coarse

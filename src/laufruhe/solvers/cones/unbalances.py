@@ -113,7 +113,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     unit = design.value if design.value > optimum.zero_level else optimum.zero_level / ROUNDING
     proof = ProofData(
         bound=bound.value,
-        reach=ProofStrength.WHOLE,
+        strength=ProofStrength.EXACT,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=(
             f"second-order cones at {optimum.samples} angles{optimum.refinement}, "

@@ -13,8 +13,8 @@ from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import NEARLY, BoxResult
-from laufruhe.prove.certificate import ProofStrength, certified, room_of
+from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult
+from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.solvers.conclusion import KEPT, Design, known_of, values_of
@@ -52,7 +52,9 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
             # boxes cannot bound what few samples overestimate
             value = design.value - over_read(problem, design.evaluation)
             known = known_of(design, mount_numbers(design))
-        room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None))
+        room = gap_tolerance_of(
+            value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None)
+        )
         near = design.values if design is not None else ()
         question, count = Question(problem, value, room, near, known), len(problem.mount_decisions)
         divided = proven(question)
@@ -81,18 +83,18 @@ def bounded_under(result: Result, value: float, cutoff: float = math.inf, of_man
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
     zero_level = numerical_zero(problem, result.final.engine)
-    room = max(room_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / NEARLY)
+    room = max(gap_tolerance_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / GAP_SAFETY)
     question = Question(problem, value, room, values_of(problem, result), of_many=of_many)
     divided = proven(question)
     if divided.bound <= certificate.lower_bound:
         return result
     text = f"{certificate.method}; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
-    certificate = certified(
+    certificate = make_certificate(
         result.objective.value,
         divided.bound,
         zero_level,
         problem.tolerance,
-        ProofStrength.NEAR,
+        ProofStrength.PARTIAL,
         certificate.kkt_residual,
         text,
     )

@@ -145,7 +145,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
     bound, gradient = dual_bound(program, x, duals)
     proof = ProofData(
         bound=bound,
-        reach=ProofStrength.WHOLE,
+        strength=ProofStrength.EXACT,
         kkt_residual=_residual(program, x, duals, gradient),
         method="linear matrix inequalities, dual bound over the box of stiffnesses",
         prices=_prices(problem, program, duals),

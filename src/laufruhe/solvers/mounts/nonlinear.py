@@ -22,8 +22,8 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import BoxResult
-from laufruhe.prove.certificate import ProofStrength, gap_of, room_of
+from laufruhe.prove.branch_and_bound import BoxResult
+from laufruhe.prove.certificate import ProofStrength, gap_of, gap_tolerance_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
@@ -206,7 +206,9 @@ def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
         alone = replace(problem, objective=on_mounts)
         evaluation = evaluate(alone, alone.design(list(near)))
         value = objective_value(alone, evaluation)
-        total += proven(Question(alone, value, room_of(value, alone.tolerance, numerical_zero(alone)), near)).bound
+        total += proven(
+            Question(alone, value, gap_tolerance_of(value, alone.tolerance, numerical_zero(alone)), near)
+        ).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
         alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
@@ -237,7 +239,7 @@ def _result(
         bound = max(bound, mounts_bound(problem, () if among else design.values))
     proof = ProofData(
         bound=bound,
-        reach=ProofStrength.NEAR if divided.boxes else ProofStrength.ASIDE,
+        strength=ProofStrength.PARTIAL if divided.boxes else ProofStrength.RELAXED,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
         method=_method(search.optima, max(design.value, zero_level), proven, divided),
         prices=best.joint.prices(optimum) if optimum is not None else {},

@@ -27,8 +27,8 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.best_first import BoxResult
-from laufruhe.prove.certificate import Proof, ProofStrength, certified, room_of
+from laufruhe.prove.branch_and_bound import BoxResult
+from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import contradiction, evaluate_design, known_of, result_under, values_of
 from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
@@ -250,8 +250,8 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     certificate = best.result.certificate
     if certificate is not None:
         text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
-        certificate = certified(
-            best.value, bound, zero_level, problem.tolerance, ProofStrength.NEAR, residual, text, doubt
+        certificate = make_certificate(
+            best.value, bound, zero_level, problem.tolerance, ProofStrength.PARTIAL, residual, text, doubt
         )
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
@@ -263,7 +263,7 @@ def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxResult:
     design = evaluate_design(realised, values_of(realised, best.result))
     known = known_of(design, mount_numbers(design))
     value = design.value - over_read(realised, design.evaluation)
-    room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
+    room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return proven(Question(realised, value, room, design.values, known, moves=(phasing, best.candidate)))
 
 

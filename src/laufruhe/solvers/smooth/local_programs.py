@@ -19,8 +19,8 @@ from laufruhe.problem.measure import Side
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import BoxResult
-from laufruhe.prove.certificate import ProofStrength, room_of
+from laufruhe.prove.branch_and_bound import BoxResult
+from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
 from laufruhe.solvers.conclusion import KEPT, Design, ProofData, evaluate_design
 from laufruhe.solvers.prices import Price, Slopes, bounds_of, edges_at, prices_of
 from laufruhe.solvers.sampling_refinement import over_read
@@ -211,7 +211,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
         value, room = math.inf, 0.0
         if found.design.violation <= KEPT:
             value = found.design.value
-            room = room_of(value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine))
+            room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine))
             # boxes do not make good what few angles read too much
             value -= over_read(problem, found.design.evaluation)
         found = replace(found, divided=bounded(value, room, found.design))
@@ -225,7 +225,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
     return found
 
 
-def proof_data(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
+def proof_data(program: LocalProgram, design: Design, bound: float, strength: ProofStrength, method: str) -> ProofData:
     """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
     from scipy.optimize import nnls
 
@@ -253,7 +253,7 @@ def proof_data(program: LocalProgram, design: Design, bound: float, reach: Proof
         prices[limit, side] = Price.both(float(share) * scale / (steep * (abs(edge) or 1.0)))
         left = left - float(share) * scale / steep * slopes[1 + k]
     bounds = _both_sides(program, best, slopes, left, sides, prices)
-    return ProofData(bound, reach, float(rest), method, prices, bounds)
+    return ProofData(bound, strength, float(rest), method, prices, bounds)
 
 
 def _both_sides(

@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
-from laufruhe.prove.certificate import room_of
+from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.throws.star_cuts import Cut
 from laufruhe.solvers.stars.star_program import Solved, shaft_owners, solve_design
 
@@ -93,7 +93,7 @@ def search_designs(
         lower_bound = min([beyond, *(one.bound for one in solved)])
         values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
-        if not is_open.any() or beyond >= target - room_of(target, tolerance, zero_level):
+        if not is_open.any() or beyond >= target - gap_tolerance_of(target, tolerance, zero_level):
             complete = True
             break
         has_tried = bool(solved or infeasible)

@@ -10,7 +10,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import ProofStrength, certified
+from laufruhe.prove.certificate import ProofStrength, make_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
 from laufruhe.solvers.result import Result
@@ -73,8 +73,8 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     return replace(
         result,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
-        certificate=certified(
-            value, bound, zero_level, problem.tolerance, ProofStrength.WHOLE, proof.kkt_residual, method
+        certificate=make_certificate(
+            value, bound, zero_level, problem.tolerance, ProofStrength.EXACT, proof.kkt_residual, method
         ),
         phasing=details,
         error=partial(error_of, result.problem, result.final),
@@ -90,7 +90,7 @@ def _any_star(problem: Problem, phasing: Phasing) -> Result:
     candidate = family.candidate(phasing, family.first)
     result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
     value = objective_value(result.problem, result.final)
-    proof = certified(value, value, numerical_zero(problem), problem.tolerance, ProofStrength.WHOLE, 0.0, _ALIKE)
+    proof = make_certificate(value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, _ALIKE)
     ranking = [ranked_star(phasing, candidate, family.first, value, value, True)]
     details = ranking_result(phasing, candidate, ranking, sum(each.size for each in families), 1, _ALIKE)
     return with_star(problem, phasing, result, candidate, proof, details)

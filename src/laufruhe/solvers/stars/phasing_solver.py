@@ -19,7 +19,7 @@ from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import ProofStrength, certified, room_of
+from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers.conclusion import quoted, result_under
 from laufruhe.solvers.result import Result, Status
@@ -158,8 +158,8 @@ def _best_of(problem: Problem, phasing: Phasing, answer: EvenStarResult) -> Resu
     bound, zero_level = max(answer.bound, shared), numerical_zero(problem)
     result, doubt = result_under(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
-    certificate = certified(
-        value, bound, zero_level, problem.tolerance, ProofStrength.WHOLE,
+    certificate = make_certificate(
+        value, bound, zero_level, problem.tolerance, ProofStrength.EXACT,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
@@ -179,7 +179,7 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in needed if j != k)
         again, _ = solve_design(model, best.steps, fewer, owners, tolerance, zero_level)
-        if again is not None and again.value <= best.value + room_of(best.value, tolerance, zero_level):
+        if again is not None and again.value <= best.value + gap_tolerance_of(best.value, tolerance, zero_level):
             needed = fewer
     return needed
 
@@ -237,7 +237,7 @@ def solve_every_order(
     zero_level = numerical_zero(problem)
     best = solved[0]
     for design in solved[1:]:
-        if design.value < best.value - room_of(best.value, 0.5 * problem.tolerance, zero_level):
+        if design.value < best.value - gap_tolerance_of(best.value, 0.5 * problem.tolerance, zero_level):
             best = design
     bound = min(design.bound for design in every) if complete else 0.0
     count = sum(map(len, orders.values()))
@@ -247,10 +247,10 @@ def solve_every_order(
         method += f", {len(every)} of all {whole} drawn and decided"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    reach = ProofStrength.WHOLE if maximum is None else ProofStrength.ASIDE
+    strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
     result, doubt = result_under(best.result, bound, zero_level)
     best = replace(best, result=result)
-    certificate = certified(best.value, bound, zero_level, problem.tolerance, reach, residual, how, doubt)
+    certificate = make_certificate(best.value, bound, zero_level, problem.tolerance, strength, residual, how, doubt)
     # the first design of every star, its own firing order before the others of the star
     firsts: dict[Candidate, StarDesign] = {}
     for design in [best, *sorted(solved, key=lambda one: one.value)]:

@@ -23,7 +23,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
-from laufruhe.prove.best_first import EMPTY, Box, Over, halves
+from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 from laufruhe.prove.throws.arcs import ArcBox, Arcs
 from laufruhe.solvers.cones.conic import solve_cones
@@ -219,8 +219,8 @@ class ThrowPrograms:
 
     def box(
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
-    ) -> ThrowBox | Over:
-        """Bound a box, cut down to where a design may be better than `cut`; `Over` where none is.
+    ) -> ThrowBox | FathomedPart:
+        """Bound a box, cut down to where a design may be better than `cut`; `FathomedPart` where none is.
 
         Parameters
         ----------
@@ -231,21 +231,21 @@ class ThrowPrograms:
         is_new
             Whether multipliers of other boxes are tried first.
         """
-        result: ThrowBox | Over = EMPTY
+        result: ThrowBox | FathomedPart = INFEASIBLE_PART
         for _ in range(_ROUNDS):
             within = program.window.within(lower, upper)
             if within is None:
-                return EMPTY
+                return INFEASIBLE_PART
             lower, upper = within
             result = self._bounded(program, lower, upper, floor, cut, is_new)
-            if isinstance(result, Over):
+            if isinstance(result, FathomedPart):
                 return result
             if float(np.sum(result.upper - result.lower)) > _WORTH * float(np.sum(upper - lower)):
                 return result
             lower, upper, floor = result.lower, result.upper, result.bound
         return result
 
-    def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | Over]:
+    def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | FathomedPart]:
         """Yield halves of a box, cut where its mixture is farthest from standing at one angle."""
         width = box.upper - box.lower
         spread = np.where(width > NARROWEST, box.spread, 0.0)
@@ -255,7 +255,7 @@ class ThrowPrograms:
 
     def _bounded(
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
-    ) -> ThrowBox | Over:
+    ) -> ThrowBox | FathomedPart:
         """Bound a box by one program."""
         columns = self._riders.columns(*self.waves.arcs(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._followed], lower, upper)
@@ -263,23 +263,23 @@ class ThrowPrograms:
             value, _ = self._bound(program.rows, columns, known, arc_box)
             if value - self.left_out >= cut or self._is_excluded(program, columns, known, arc_box):
                 self._remember(known)
-                return Over(cut)
+                return FathomedPart(cut)
         mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._followed])
         solution = solve_cones(mixture.problem)
         multipliers = solution.multipliers
         if solution.x is None:
             if self._is_excluded(program, columns, multipliers, arc_box):
                 self._remember(multipliers)
-                return EMPTY
+                return INFEASIBLE_PART
             return ThrowBox(program, lower, upper, floor, 0.5 * (lower + upper), upper - lower)
         value, arcs = self._bound(program.rows, columns, multipliers, arc_box)
         value -= self.left_out
         if value >= cut:
             self._remember(multipliers)
-            return Over(value)
+            return FathomedPart(value)
         ends = arcs.cut(cut - value)
         if ends is None:
-            return Over(cut)
+            return FathomedPart(cut)
         middle, spread = mixture.middle(solution.x)
         middle = np.clip(middle, *ends)
         at, _ = self.waves.arcs(middle, middle)

@@ -22,9 +22,9 @@ from laufruhe.problem.measure import Measure, load_rows, selected
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.best_first import Over
-from laufruhe.prove.certificate import room_of
-from laufruhe.prove.witness import Known, thin
+from laufruhe.prove.branch_and_bound import FathomedPart
+from laufruhe.prove.certificate import gap_tolerance_of
+from laufruhe.prove.witness import Witness, thin_box
 from laufruhe.solvers.boxes.search import BoxSearch, divided
 from laufruhe.solvers.conclusion import FEASIBLE, read_under
 from laufruhe.solvers.result import Result
@@ -203,7 +203,7 @@ def search_throws(
         Local search from throws that look good.
     """
     zero_level = numerical_zero(problem)
-    is_proven = best is not None and best.value - floor <= room_of(best.value, problem.tolerance, zero_level)
+    is_proven = best is not None and best.value - floor <= gap_tolerance_of(best.value, problem.tolerance, zero_level)
     # gas beside a shaft of a ratio that is no whole number does not repeat after a working cycle
     repeats = not problem.feels_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
     if is_proven or not repeats or not problem.objective:
@@ -337,19 +337,19 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         """Return the value under which no design lies in what is cut off boxes."""
         return self.cut(value)
 
-    def known(self, incumbent: _Best) -> Known | None:
+    def known(self, incumbent: _Best) -> Witness | None:
         """Return the best design as a witness of bounds; None where there is none."""
         best = incumbent.design
         if best is None or best.result.final.violation(best.result.problem.limits) > FEASIBLE:
             return None
-        return Known(np.array(best.candidate.throws), best.value, lambda: self._highest_objective(best))
+        return Witness(np.array(best.candidate.throws), best.value, lambda: self._highest_objective(best))
 
     def _highest_objective(self, best: StarDesign) -> float:
         zero_level, result = numerical_zero(self._problem), best.result
         read = read_under(result.problem, result.final, best.value, math.inf, zero_level)
         return read.value + read.doubt + zero_level
 
-    def around(self, incumbent: _Best) -> _Part | Over | None:
+    def around(self, incumbent: _Best) -> _Part | FathomedPart | None:
         """Return a thin box of throws around a design, and its bound; None where it is an image of one that stays."""
         best, stage = incumbent.design, self._finest
         if best is None or stage is None:
@@ -358,11 +358,11 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
             place = place_in(self._phasing, window, best.candidate)
             if left_out == best.candidate.left_out and place is not None:
                 programs, maximum = stage.programs, self._highest_objective(best) * (1.0 + EXCESS)
-                box = programs.box(programs.program(window), *thin(place, *window.box), 0.0, maximum)
-                return box if isinstance(box, Over) else _Part(box.bound, box, stage, left_out)
+                box = programs.box(programs.program(window), *thin_box(place, *window.box), 0.0, maximum)
+                return box if isinstance(box, FathomedPart) else _Part(box.bound, box, stage, left_out)
         return None
 
-    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | Over, _Best | None]]:
+    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, _Best | None]]:
         """Yield windows of all throws, or halves of a box."""
         box, stage, cut = part.box, part.stage, self.cut(value)
         if box is None or stage is None:
@@ -381,12 +381,12 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
                 yield self._examine(stage, half, part.left_out)
 
     def _examine(
-        self, stage: Stage, box: ThrowBox | Over, left_out: tuple[str, ...]
-    ) -> tuple[_Part | Over, _Best | None]:
+        self, stage: Stage, box: ThrowBox | FathomedPart, left_out: tuple[str, ...]
+    ) -> tuple[_Part | FathomedPart, _Best | None]:
         """Return a box, and a better design near its middle."""
         self._not_met |= stage.programs.conflict
         self._finest = stage
-        if isinstance(box, Over):
+        if isinstance(box, FathomedPart):
             return box, None
         self._seen += 1
         moving = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)

@@ -18,7 +18,7 @@ from laufruhe.problem.measure import Term
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Sector
-from laufruhe.prove.witness import thin
+from laufruhe.prove.witness import thin_box
 
 MOST_WINDOWS = 6_000
 
@@ -104,7 +104,7 @@ def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Ar
     throws = throws + math.tau * np.round((0.5 * (low[first] + high[first]) - throws) / math.tau)
     place = np.append(throws, shared)
     is_inside = np.all(place >= low - SLACK) and np.all(place <= high + SLACK)
-    return np.clip(place, low, high) if is_inside and window.within(*thin(place, low, high)) is not None else None
+    return np.clip(place, low, high) if is_inside and window.within(*thin_box(place, low, high)) is not None else None
 
 
 def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:

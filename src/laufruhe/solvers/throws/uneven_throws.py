@@ -25,7 +25,7 @@ from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import ProofStrength, certified
+from laufruhe.prove.certificate import ProofStrength, make_certificate
 from laufruhe.prove.throws.firing_windows_bound import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, result_under, unbalances_of
 from laufruhe.solvers.prices import Price
@@ -102,8 +102,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
     # no norm lies under zero: a design that reaches it is optimal
-    certificate = certified(
-        best.value, floor, zero_level, problem.tolerance, ProofStrength.NEAR, best.kkt_residual, method, doubt
+    certificate = make_certificate(
+        best.value, floor, zero_level, problem.tolerance, ProofStrength.PARTIAL, best.kkt_residual, method, doubt
     )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)

@@ -9,7 +9,17 @@ import pytest
 
 from laufruhe.numerics.budget import limited
 from laufruhe.numerics.progress import Step, progress_listener
-from laufruhe.prove.best_first import EMPTY, Box, BranchAndBound, OpenNode, Over, Parts, divide, halves, widest
+from laufruhe.prove.branch_and_bound import (
+    INFEASIBLE_PART,
+    BoundedParts,
+    Box,
+    BranchAndBound,
+    FathomedPart,
+    OpenNode,
+    bisect_box,
+    halves,
+    widest,
+)
 
 # of random numbers in a row, those between two places bound a part from below
 Part = tuple[int, int]
@@ -20,22 +30,22 @@ class Least(BranchAndBound[Part]):
 
     what = "parts"
 
-    def __init__(self, numbers: np.ndarray, at_once: int = 1) -> None:
-        self.numbers, self.at_once = numbers, at_once
+    def __init__(self, numbers: np.ndarray, batch_size: int = 1) -> None:
+        self.numbers, self.batch_size = numbers, batch_size
         self.looked: list[float] = []
 
     def bound(self, part: Part) -> tuple[float, Part]:
         first, last = part
         return float(self.numbers[first:last].min()) - 0.3 * (last - first - 1), part
 
-    def look(self, part: Part) -> None:
+    def propose(self, part: Part) -> None:
         self.value = min(self.value, float(self.numbers[part[0]]))
 
-    def is_fathomed(self, one: OpenNode[Part]) -> bool:
-        return one.bound >= self.value
+    def is_fathomed(self, node: OpenNode[Part]) -> bool:
+        return node.bound >= self.value
 
-    def parts(self, taken: list[OpenNode[Part]]) -> Parts[Part]:
-        for bound, _, (first, last) in taken:
+    def branch(self, nodes: list[OpenNode[Part]]) -> BoundedParts[Part]:
+        for bound, _, (first, last) in nodes:
             self.looked.append(bound)
             if last - first == 1:
                 # of a round a number may come before its turn
@@ -47,15 +57,15 @@ class Least(BranchAndBound[Part]):
 
 
 @pytest.mark.parametrize("seed", range(20))
-@pytest.mark.parametrize("at_once", [1, 4])
-def test_it_ends_at_the_least_of_all(seed: int, at_once: int) -> None:
+@pytest.mark.parametrize("batch_size", [1, 4])
+def test_it_ends_at_the_least_of_all(seed: int, batch_size: int) -> None:
     numbers = np.random.default_rng(seed).normal(size=40)
-    search = Least(numbers, at_once)
+    search = Least(numbers, batch_size)
     bound = search.divide(search.bound((0, 40)), 10_000)
     assert min(bound, search.value) == search.value == numbers.min()
     assert search.complete
     # one at a time the bounds that are divided never fall
-    assert at_once > 1 or search.looked == sorted(search.looked)
+    assert batch_size > 1 or search.looked == sorted(search.looked)
 
 
 @pytest.mark.parametrize("maximum", [1, 2, 7, 20])
@@ -63,10 +73,10 @@ def test_what_is_left_bounds_all_that_was_not_looked_at(maximum: int) -> None:
     numbers = np.random.default_rng(5).normal(size=64)
     search = Least(numbers)
     bound = search.divide(search.bound((0, 64)), maximum)
-    assert maximum <= search.seen <= maximum + 1
+    assert maximum <= search.node_count <= maximum + 1
     assert not search.complete
     assert min(bound, search.value) <= numbers.min()
-    assert [one.bound for one in search.coming(3)] == sorted(one.bound for one in search.waiting)[:3]
+    assert [one.bound for one in search.next_nodes(3)] == sorted(one.bound for one in search.open_nodes)[:3]
 
 
 def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
@@ -74,13 +84,13 @@ def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
     place = np.array([2.3, 7.1])
 
     class Distance:
-        what, at_once = "boxes", 1
+        what, batch_size = "boxes", 1
 
         def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             nearest = np.clip(place, lower, upper)
             return 1.0 + np.square(nearest - place).sum(axis=1), np.argmax(upper - lower, axis=1)
 
-    found = divide(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
+    found = bisect_box(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
     assert found.bound == 1.0
     assert found.places
     for told in found.places:
@@ -89,9 +99,9 @@ def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
 
 def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
     search = Least(np.arange(8.0))
-    assert search.divide(EMPTY, 10) == math.inf
+    assert search.divide(INFEASIBLE_PART, 10) == math.inf
     assert search.complete
-    assert search.divide(Over(3.0), 10) == 3.0
+    assert search.divide(FathomedPart(3.0), 10) == 3.0
     assert search.complete
     with limited(0.0):
         assert search.divide((-5.0, (0, 8)), 10) == -5.0
@@ -110,7 +120,7 @@ def test_who_listens_hears_bounds_that_rise_under_the_best_value() -> None:
 class Bowl:
     """The sum of |x - c|, bounded on a box exactly."""
 
-    what, at_once = "boxes", 8
+    what, batch_size = "boxes", 8
 
     def __init__(self, centre: np.ndarray) -> None:
         self.centre = centre
@@ -124,12 +134,12 @@ class Bowl:
 
 def test_boxes_are_halved_until_none_is_better_by_the_room() -> None:
     centre = np.array([0.3, 0.7])
-    found = divide(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20_000)
+    found = bisect_box(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20_000)
     assert -1e-2 <= found.bound <= 0.0
-    few = divide(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20)
+    few = bisect_box(Bowl(centre), np.zeros(2), np.ones(2), 0.0, 1e-2, 20)
     assert few.bound < -1e-2
     assert len(few.places) == 3
-    assert divide(Bowl(centre), np.zeros(2), np.ones(2), -10.0, 1e-2, 20).places == ()
+    assert bisect_box(Bowl(centre), np.zeros(2), np.ones(2), -10.0, 1e-2, 20).places == ()
 
 
 def test_halves_cover_a_box() -> None:
