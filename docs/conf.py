@@ -78,15 +78,21 @@ def for_readers_aloud(app, page, template, context, doctree):
 
 HERE = Path(__file__).parent
 MEASURED = HERE / "measured"
+LOGS = ("attack", "faults", "mutants", "proofs")
+"""Folders of results whose README.md is a page of measurements too."""
 
 
 def write_measured_pages(app, config):
     """Write a page for each page of measurements, which stand beside docs/ in the repository."""
     MEASURED.mkdir(exist_ok=True)
-    for path in sorted((HERE.parent / "results" / "benchmarks").glob("*.md")):
+    results = HERE.parent / "results"
+    logs = {f"{name}.md": results / name / "README.md" for name in LOGS}
+    pages = {path.name: path for path in sorted((results / "benchmarks").glob("*.md"))} | logs
+    for name, path in pages.items():
         options = ":relative-images:\n:relative-docs: ../../docs/"
-        text = f"```{{include}} ../../results/benchmarks/{path.name}\n{options}\n```\n"
-        (MEASURED / path.name).write_text(text, encoding="utf-8")
+        place = path.relative_to(HERE.parent).as_posix()
+        text = f"```{{include}} ../../{place}\n{options}\n```\n"
+        (MEASURED / name).write_text(text, encoding="utf-8")
 
 
 def lead_within_the_site(app, *given):
@@ -94,6 +100,7 @@ def lead_within_the_site(app, *given):
     content = given[-1]
     text = content[0].replace("gallery.md)", "gallery/index.rst)").replace("../CHANGELOG.md)", "changes.md)")
     text = re.sub(r"\[([^\]]+)\]\((?:results/README|SECURITY)\.md\)", r"\1", text)
+    text = re.sub(rf"\]\((?:\.\./)+results/({'|'.join(LOGS)})/README\.md", r"](/measured/\1.md", text)
     content[0] = re.sub(r"\]\((?:\.\./)+results/benchmarks/([\w-]+\.md)", r"](/measured/\1", text)
 
 

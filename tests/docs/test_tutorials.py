@@ -37,7 +37,8 @@ def commands(text: str) -> list[tuple[list[str], list[str]]]:
 TUTORIALS = sorted(DOCS.glob("tutorials/*.md"))
 REFERENCE = [page for page in sorted(DOCS.glob("reference/*.md")) if page.stem != "python"]
 """Pages of reference but the one of Python, whose calls tests/docs/test_reference.py makes."""
-PAGES = [*TUTORIALS, *sorted(DOCS.glob("how-to/*.md")), *REFERENCE]
+FRONT = DOCS.parent / "README.md"
+PAGES = [FRONT, *TUTORIALS, *sorted(DOCS.glob("how-to/*.md")), *REFERENCE]
 
 
 def pages(kind: str) -> list[Path]:
@@ -52,7 +53,7 @@ def name_of(page: Path) -> str:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of a user who saved the files of the pages and copied a ready problem."""
-    for page in TUTORIALS:
+    for page in (FRONT, *TUTORIALS):
         for name, text in FILE.findall(page.read_text(encoding="utf-8")):
             (tmp_path / name).write_text(text, encoding="utf-8")
     (tmp_path / "tractor-single.toml").write_text(copies(["tractor-single"])["tractor-single.toml"], encoding="utf-8")

@@ -28,7 +28,7 @@ EXAMPLE = re.compile(r"^ *```toml\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 # a page on packages shows a pyproject.toml and words that its package adds
 EXAMPLES = [
     path
-    for folder in ("how-to", "reference", "tutorials")
+    for folder in ("..", ".", "how-to", "reference", "tutorials")
     for path in sorted((DOCS / folder).glob("*.md"))
     if path.stem != "extend" and EXAMPLE.search(path.read_text(encoding="utf-8"))
 ]

@@ -8,7 +8,10 @@ import pytest
 ROOT = Path(__file__).parents[2]
 # what the commands write is not kept
 WRITTEN = ROOT / "results"
-KEPT = (WRITTEN / "benchmarks", *(WRITTEN / name / "README.md" for name in ("", "attack", "faults", "proofs")))
+KEPT = (
+    WRITTEN / "benchmarks",
+    *(WRITTEN / name / "README.md" for name in ("", "attack", "faults", "mutants", "proofs")),
+)
 PAGES = sorted(
     path
     for pattern in (
