@@ -14,7 +14,7 @@ from scipy.optimize import minimize
 from laufruhe.errors import ModelError
 from laufruhe.extensions.robust.built_engines import BuiltEngines, WorstCaseAdversary, WorstEngines, objective_values
 from laufruhe.extensions.robust.result import RobustResult
-from laufruhe.extensions.robust.solver import SMALL, RobustDesign, _keep_limits, _Program
+from laufruhe.extensions.robust.solver import MAX_MARGIN, RobustDesign, _keep_limits, _Program
 from laufruhe.extensions.robust.tolerance import (
     Population,
     Robust,
@@ -227,10 +227,10 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
     first = RobustDesign(
         solved[0], adversary.at(solved[0], proven=True), 0.0, program.active, 1, angles, adversary.samples
     )
-    assert KEPT < first.found.violation < SMALL
+    assert KEPT < first.worst.violation < MAX_MARGIN
     kept = _keep_limits(program, adversary, first)
-    assert kept.found.violation <= KEPT
-    assert kept.found.value > first.found.value
+    assert kept.worst.violation <= KEPT
+    assert kept.worst.value > first.worst.value
 
 
 def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:

@@ -54,7 +54,7 @@ BAD_TOLERANCES = [
     ('alignment = "0.05 mm"', 'alignment = "-0.05 mm"', "must be at least 0 mm"),
     ('unbalance = "50 g cm"', 'unbalanse = "50 g cm"', "did you mean 'unbalance'"),
     ('unbalance = "50 g cm"', 'unbalance = "50 g"', "is not a unit of an unbalance"),
-    ('reciprocating_mass = "10 g", unbalance = "50 g cm", alignment = "0.05 mm", ', "", "leave nothing to chance"),
+    ('reciprocating_mass = "10 g", unbalance = "50 g cm", alignment = "0.05 mm", ', "", "are all zero"),
     ("engines = 200", "engines = 0", "engines"),
     ('force = "100 kp"', 'force = "0 kp"', "must be more than 0 N"),
     ('claim = "promises nothing"', 'claim = "promises nothin"', "use one of: promises nothing, matters"),

@@ -69,7 +69,7 @@ engines = 200
 
 @pytest.mark.parametrize(
     "broken",
-    [scaled(worst_case, "bound_part", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
+    [scaled(worst_case, "bound_node", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
     ids=["the worst engine", "dual rows"],
 )
 def test_a_broken_bounder_of_built_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, broken: Break) -> None:

@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lanes import first_fast
-from laufruhe.extensions.robust.worst_case import ErrorBlock, bound_part, value_at, worst_case
+from laufruhe.extensions.robust.worst_case import ErrorBlock, bound_node, value_at, worst_case
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import NORMS, Grid
 
@@ -57,7 +57,7 @@ def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
             assert narrow is not None
             assert narrow.arc is not None
             blocks = [whole[0], whole[2], narrow]
-            above = bound_part(terms, middle, blocks, 0.0, [{}]).bound
+            above = bound_node(terms, middle, blocks, 0.0, [{}]).bound
             for _ in range(40):
                 z = np.zeros(5)
                 angle = narrow.arc[0] + random.uniform(-1.0, 1.0) * narrow.arc[1]

@@ -1,4 +1,4 @@
-"""Built engines: designs for the worst that tolerances allow, or for a share, and measured parts that are chosen."""
+"""Design of engines as built: for a worst case within tolerances, for a share of engines, or by choice of parts."""
 
 from laufruhe.extension import Extension
 

@@ -1,4 +1,4 @@
-"""The best assembly beside those at random, and beside parts as they come."""
+"""Picture of the best assembly beside random assemblies, the given one, and parts of mean mass."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ MEAN, WIDE = (0, (1, 2)), 6.4
 
 
 def applies(result: Result) -> bool:
-    """Return whether measured parts were chosen."""
+    """Return True if the result is a choice of measured parts."""
     return isinstance(result.details, AssemblyResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
-    found, objective = result.details, result.objective
-    if not isinstance(found, AssemblyResult) or objective is None:
+    """Draw the share of random assemblies below each objective, with lines at the best, the given and the mean one."""
+    details, objective = result.details, result.objective
+    if not isinstance(details, AssemblyResult) or objective is None:
         raise ValueError("no parts were chosen")
-    drawn = page(1, 1, (WIDE, 3.0))
-    axes = drawn.panels[0]
-    axes.plot(found.quantiles, [100.0 * share for share in SHARES], color=SKY, linewidth=1.8)
+    layout = page(1, 1, (WIDE, 3.0))
+    axes = layout.panels[0]
+    axes.plot(details.quantiles, [100.0 * share for share in SHARES], color=SKY, linewidth=1.8)
     axes.axvline(objective.value, color=AFTER, linewidth=1.8)
     axes.axvline(objective.initial, color=BEFORE, linewidth=1.8)
-    axes.axvline(found.mean_parts, color=INK, linewidth=1.2, linestyle=MEAN)
+    axes.axvline(details.mean_parts, color=INK, linewidth=1.2, linestyle=MEAN)
     axes.margins(x=0.06)
     axes.set(ylim=(0.0, 104.0), ylabel="assemblies below [%]", xlabel=label_of(objective.name, objective.unit, WIDE))
     legend = [
         entry("at random", color=SKY), entry("as they come", color=BEFORE), entry("chosen", color=AFTER),
         entry("parts of mean mass", color=INK, linestyle=MEAN),
     ]  # fmt: skip
-    lines = f"{found.random} of {found.assemblies:,.0f} ways to assemble the measured parts."
-    return finish_page(drawn, result, "What choosing parts buys", lines, legend)
+    lines = f"{details.random} of {details.assemblies:,.0f} ways to assemble the measured parts."
+    return finish_page(layout, result, "What choosing parts buys", lines, legend)

@@ -1,8 +1,8 @@
-"""Selective assembly: which measured piston and rod goes into which cylinder, by branch and bound (R12).
+"""Selective assembly: choose the measured piston and rod of each cylinder by branch and bound (R12).
 
-Loads are affine in the masses, so a norm of them is bounded below by dual rows: for any of these the best of all
-assemblies is a linear assignment, which is solved exactly. What is still free stands at a mixture of all assemblies
-that the bound is drawn to, step by step; every such assignment is an assembly too, and is tried.
+Loads are affine in the masses, so a subgradient bounds a norm from below. The minimum of that bound over all assemblies
+is a linear assignment, solved exactly. Free cylinders have a mixture of parts; the bound moves the mixture towards the
+assignment, step by step. Each assignment is also tried as an assembly.
 """
 
 from __future__ import annotations
@@ -41,21 +41,22 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
 
 MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
-"""Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
+"""Most nodes, steps of each bound, and random assemblies for comparison."""
 FREE = 3
-"""Cylinders that are left without a part around a known assembly."""
+"""Cylinders without a part in the node around a known assembly."""
 LENGTHS = np.linspace(0.0, 1.0, 9)[1:]
+"""Shares of a step towards an assignment that are tried."""
 PER_KILOGRAM = 0.01
-"""Mass that is added to find what a kilogram does [kg]: small beside a piston."""
+"""Mass step for the slopes of loads [kg]: small beside a piston."""
 
 
 def solve_assembly(problem: Problem, *_: object) -> Result:
-    """Return the best assembly, proven.
+    """Return the best assembly with its proof.
 
     Raises
     ------
     ModelError
-        If anything else is open, or is asked that is not affine in the masses.
+        If other numbers are open, or a measure is not affine in the masses.
     """
     assembly = problem.extra(Assembly)
     if assembly is None:
@@ -77,51 +78,51 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
             value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0,
             f"branch and bound over assignments, {search.node_count} parts bounded by dual rows",
         )  # fmt: skip
-    met = final.violation(problem.limits) <= KEPT
+    is_feasible = final.violation(problem.limits) <= KEPT
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    found = Result(
-        problem=problem, status=status if met else Status.FAILED,
+    result = Result(
+        problem=problem, status=status if is_feasible else Status.FAILED,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
         limits=limit_values(problem, final), initial=initial, final=final,
-        message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
+        message="" if is_feasible else "the best assembly breaks a limit, and limits do not choose parts; relax it",
         error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
         details=search.result(chosen, [part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
-    return found if witness is None else without_proof(found, BoundError("a walk", bound, value))
+    return result if witness is None else without_proof(result, BoundError("a walk", bound, value))
 
 
 def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluation:
     return evaluate(problem, assemble(problem.engine, lots, chosen))
 
 
-def _walk(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, seconds: float) -> Chosen | None:
-    """Return an assembly under a bound, found by exact evaluations alone; None where the walk meets none."""
-    random, until = np.random.default_rng(walk.SEED), time.thread_time() + seconds
-    here, own, minimum, left = best, _evaluated(problem, lots, best), math.inf, [best]
+def _walk(problem: Problem, lots: Sequence[Lot], start: Chosen, bound: float, seconds: float) -> Chosen | None:
+    """Return an assembly below a bound that a walk by exact evaluations finds; None if it finds none."""
+    random, deadline = np.random.default_rng(walk.SEED), time.thread_time() + seconds
+    best_known, best_evaluation, minimum, queue = start, _evaluated(problem, lots, start), math.inf, [start]
     for _ in range(walk.MOST):
-        if not left or time.thread_time() > until:
+        if not queue or time.thread_time() > deadline:
             break
-        chosen = left.pop()
-        found = _evaluated(problem, lots, chosen)
-        if objective_value(problem, found) < minimum:
-            here, own, minimum = chosen, found, objective_value(problem, found)
-            near = list(_neighbours(lots, chosen))
-            left = [near[k] for k in random.permutation(len(near))]
-    over = 1.0 + 2.0 * error_of(problem, own) + walk.ROUNDING
-    return here if minimum * over + numerical_zero(problem, own.engine) < bound else None
+        chosen = queue.pop()
+        evaluation = _evaluated(problem, lots, chosen)
+        if objective_value(problem, evaluation) < minimum:
+            best_known, best_evaluation, minimum = chosen, evaluation, objective_value(problem, evaluation)
+            neighbours = list(_neighbours(lots, chosen))
+            queue = [neighbours[k] for k in random.permutation(len(neighbours))]
+    margin = 1.0 + 2.0 * error_of(problem, best_evaluation) + walk.ROUNDING
+    return best_known if minimum * margin + numerical_zero(problem, best_evaluation.engine) < bound else None
 
 
 def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
     for k, (lot, parts) in enumerate(zip(lots, chosen, strict=True)):
         for i, part in itertools.product(range(len(parts)), range(len(lot.masses))):
             if part not in parts[: i + 1]:
-                own = [parts[i] if other == part else other for other in parts]
-                own[i] = part
-                yield (*chosen[:k], tuple(own), *chosen[k + 1 :])
+                exchanged = [parts[i] if other == part else other for other in parts]
+                exchanged[i] = part
+                yield (*chosen[:k], tuple(exchanged), *chosen[k + 1 :])
 
 
 def refuse(problem: Problem) -> None:
-    """Refuse what is not decided with the parts."""
+    """Raise ModelError for problems that [assembly] cannot solve."""
     if problem.decisions or problem.phasing is not None:
         raise ModelError(
             "[assembly] chooses parts of an engine that is fixed; fix what is open, or leave [assembly] out"
@@ -138,7 +139,7 @@ def refuse(problem: Problem) -> None:
 
 
 def _terms(problem: Problem) -> Terms:
-    """Return norms of rows that are affine in the mass that every cylinder has more: to and fro, then turning [kg]."""
+    """Return norms as functions of the added reciprocating mass, then rotating mass, of each cylinder [kg]."""
     parts = problem.engine.slider_cranks
     errors = [Error(part.name, (PistonDrive(k, PER_KILOGRAM),)) for k, part in enumerate(parts)]
     errors += [
@@ -154,59 +155,64 @@ def _terms(problem: Problem) -> Terms:
 
 
 class _Search(BranchAndBound[Chosen]):
-    """Branch and bound over assemblies."""
+    """Branch and bound over assemblies; a node has -1 for each cylinder without a part."""
 
     what = "parts bounded"
 
     def __init__(self, terms: Terms, lots: Sequence[Lot], cylinders: int, tolerance: float) -> None:
         self.terms, self.lots, self.cylinders, self.tolerance = terms, lots, cylinders, tolerance
-        self.more = [lot.differences for lot in lots]
+        self.differences = [lot.differences for lot in lots]
         self.given: Chosen = tuple(tuple(range(cylinders)) for _ in lots)
         self.best, self.value = self.given, self._value(self.given)
-        sizes = [sum(w * n.norm.value(n.grid, n.slope[..., k]) for w, n in terms) for k in range(2 * cylinders)]
-        spread = [np.ptp(more, axis=0) for more in self.more]
+        sizes = [
+            sum(weight * norm.norm.value(norm.grid, norm.slope[..., k]) for weight, norm in terms)
+            for k in range(2 * cylinders)
+        ]
+        spread = [np.ptp(differences, axis=0) for differences in self.differences]
         order = [
-            (-(sizes[k] * s[0] + sizes[cylinders + k] * s[1]), lot, k)
-            for lot, s in enumerate(spread) for k in range(cylinders)
+            (-(sizes[k] * ranges[0] + sizes[cylinders + k] * ranges[1]), lot, k)
+            for lot, ranges in enumerate(spread) for k in range(cylinders)
         ]  # fmt: skip
         self.order = [(lot, k) for _, lot, k in sorted(order)]
 
     def run(self) -> float:
-        """Return the bound that no assembly goes under."""
+        """Return a lower bound of the objective over all assemblies."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
-        found = self.divide((self.bound(free), free), MOST_NODES)
+        bound = self.divide((self.bound(free), free), MOST_NODES)
         check_near_witness(self, self.best, Witness(self._mass(self.best), self.value))
-        return found
+        return bound
 
     def around(self, chosen: Chosen) -> Chosen:
-        """Return assemblies that differ from one in the last few cylinders that are chosen for alone."""
+        """Return the node of assemblies that differ from one in the last FREE cylinders alone."""
         free = set(self.order[-FREE:])
         return tuple(
-            tuple(-1 if (lot, k) in free else part for k, part in enumerate(own)) for lot, own in enumerate(chosen)
+            tuple(-1 if (lot, k) in free else part for k, part in enumerate(parts)) for lot, parts in enumerate(chosen)
         )
 
     @property
     def cutoff(self) -> float:
-        """Bound from which no assembly of a node is better by half the tolerance."""
+        """Bound from which a node is fathomed."""
         return self.value * (1.0 - 0.5 * self.tolerance)
 
     def is_fathomed(self, node: OpenNode[Chosen]) -> bool:
-        """Return whether no assembly of it is better by half the tolerance."""
+        """Return True if no assembly of a node is better by half the tolerance."""
         return node.bound >= self.cutoff
 
     def branch(self, nodes: Sequence[OpenNode[Chosen]]) -> BoundedParts[Chosen]:
-        """Yield the parts left for the cylinder that counts most of those without one."""
-        ((under, _, chosen),) = nodes
-        lot, cylinder = next((at for at in self.order if chosen[at[0]][at[1]] < 0), (-1, -1))
-        for part in range(len(self.more[lot])) if lot >= 0 else ():
+        """Yield bound and child for each free part in the most influential cylinder without a part."""
+        ((bound, _, chosen),) = nodes
+        lot, cylinder = next((position for position in self.order if chosen[position[0]][position[1]] < 0), (-1, -1))
+        for part in range(len(self.differences[lot])) if lot >= 0 else ():
             if part in chosen[lot]:
                 continue
-            own = tuple(part if k == cylinder else old for k, old in enumerate(chosen[lot]))
-            child = (*chosen[:lot], own, *chosen[lot + 1 :])
-            yield max(self.bound(child), under), child
+            parts = tuple(part if k == cylinder else current for k, current in enumerate(chosen[lot]))
+            child = (*chosen[:lot], parts, *chosen[lot + 1 :])
+            yield max(self.bound(child), bound), child
 
     def _mass(self, chosen: Chosen) -> Array:
-        return np.asarray(np.sum([m[list(p)] for m, p in zip(self.more, chosen, strict=True)], axis=0)).T.reshape(-1)
+        return np.asarray(
+            np.sum([m[list(p)] for m, p in zip(self.differences, chosen, strict=True)], axis=0)
+        ).T.reshape(-1)
 
     def _value(self, chosen: Chosen) -> float:
         return value_at(self.terms, self._mass(chosen))
@@ -218,7 +224,7 @@ class _Search(BranchAndBound[Chosen]):
         return value
 
     def bound(self, node: Chosen) -> float:
-        """Return what no assembly of a node goes under; those that come up are tried."""
+        """Return a lower bound over the assemblies of a node; assignments on the way are tried."""
         if all(part >= 0 for parts in node for part in parts):
             return self._try(node)
         point, best = self._middle(node), -math.inf
@@ -227,55 +233,62 @@ class _Search(BranchAndBound[Chosen]):
             for weight, norm in self.terms:
                 value += weight * norm.value(point)
                 slope += weight * np.einsum("kd,kdn->n", norm.subgradient(point), norm.slope)
-            corner = self._assigned(node, slope)
-            end = self._mass(corner)
+            assignment = self._assigned(node, slope)
+            end = self._mass(assignment)
             best = max(best, value + float(slope @ (end - point)))
-            self._try(corner)
+            self._try(assignment)
             if best >= self.cutoff or value - best <= 0.1 * self.tolerance * value:
                 break
-            tried = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
-            point = point + min(tried)[1] * (end - point)
+            candidates = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
+            point = point + min(candidates)[1] * (end - point)
         return best
 
     def _middle(self, node: Chosen) -> Array:
         total = np.zeros((self.cylinders, 2))
-        for more, parts in zip(self.more, node, strict=True):
-            left = [k for k in range(len(more)) if k not in parts]
-            mean = more[left].mean(axis=0) if left else np.zeros(2)
-            total += np.array([more[part] if part >= 0 else mean for part in parts])
+        for differences, parts in zip(self.differences, node, strict=True):
+            free_parts = [k for k in range(len(differences)) if k not in parts]
+            mean = differences[free_parts].mean(axis=0) if free_parts else np.zeros(2)
+            total += np.array([differences[part] if part >= 0 else mean for part in parts])
         return np.asarray(total.T.reshape(-1))
 
     def _assigned(self, node: Chosen, slope: Array) -> Chosen:
-        """Return the assembly of a node that goes farthest down a slope."""
+        """Return the assembly of a node with the smallest sum of slope times mass."""
         from scipy.optimize import linear_sum_assignment
 
-        found = []
-        for more, parts in zip(self.more, node, strict=True):
-            free, left = (
+        result = []
+        for differences, parts in zip(self.differences, node, strict=True):
+            cylinders, free_parts = (
                 [k for k, part in enumerate(parts) if part < 0],
-                [k for k in range(len(more)) if k not in parts],
+                [k for k in range(len(differences)) if k not in parts],
             )
-            cost = np.outer(slope[: self.cylinders][free], more[left, 0])
-            cost += np.outer(slope[self.cylinders :][free], more[left, 1])
-            own = list(parts)
+            cost = np.outer(slope[: self.cylinders][cylinders], differences[free_parts, 0])
+            cost += np.outer(slope[self.cylinders :][cylinders], differences[free_parts, 1])
+            assigned = list(parts)
             for row, column in zip(*linear_sum_assignment(cost), strict=True):
-                own[free[row]] = left[column]
-            found.append(tuple(own))
-        return tuple(found)
+                assigned[cylinders[row]] = free_parts[column]
+            result.append(tuple(assigned))
+        return tuple(result)
 
     def result(self, chosen: Chosen, names: Sequence[str]) -> AssemblyResult:
-        """Return an assembly cylinder by cylinder, beside others at random."""
+        """Return the parts by cylinder, with the objectives of random assemblies."""
         random = np.random.default_rng(0)
-        others = [tuple(tuple(random.permutation(len(m))[: self.cylinders]) for m in self.more) for _ in range(RANDOM)]
-        values = objective_values(self.terms, np.array([self._mass(other) for other in others]))
+        random_assemblies = [
+            tuple(
+                tuple(random.permutation(len(lot_differences))[: self.cylinders])
+                for lot_differences in self.differences
+            )
+            for _ in range(RANDOM)
+        ]
+        values = objective_values(self.terms, np.array([self._mass(assembly) for assembly in random_assemblies]))
         places = tuple(
-            Place(name, tuple(int(p[k]) + 1 for p in chosen),
-                  tuple(lot.masses[int(p[k])] for lot, p in zip(self.lots, chosen, strict=True)))
+            Place(name, tuple(int(lot_parts[k]) + 1 for lot_parts in chosen),
+                  tuple(lot.masses[int(lot_parts[k])] for lot, lot_parts in zip(self.lots, chosen, strict=True)))
             for k, name in enumerate(names)
         )  # fmt: skip
         return AssemblyResult(
             tuple(lot.kind for lot in self.lots), places,
-            math.prod(float(math.perm(len(m), self.cylinders)) for m in self.more), self.node_count,
-            tuple(float(q) for q in np.quantile(values, SHARES)), float(values.max()),
+            math.prod(float(math.perm(len(lot_differences), self.cylinders)) for lot_differences in self.differences),
+            self.node_count,
+            tuple(float(quantile) for quantile in np.quantile(values, SHARES)), float(values.max()),
             value_at(self.terms, np.zeros(2 * self.cylinders)), RANDOM,
         )  # fmt: skip

@@ -1,6 +1,6 @@
-"""Engines as built to one design: their loads (R2, R3), and who seeks the worst of them (R4).
+"""Engines as built to one design: their loads (R2, R3), and searches for the worst of them (R4).
 
-Adversaries seek among all errors that tolerances allow, or among engines that were drawn.
+An adversary searches all errors within tolerances, or a set of random engines.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import KEPT
 
 QUICK = 1
-"""Parts of the errors that are bounded before the design is final."""
+"""Nodes of branch and bound while the design is not final."""
 
 
 class BuiltEngines:
-    """Loads of one design as drawn, and what every error of a whole size adds.
+    """Loads of a design as drawn, and the change by each error of unit size.
 
     Parameters
     ----------
     problem
-        Of built engines, or of one drawing.
-    tolerances
-        Those of the problem where None; loads have to be affine in all errors.
+        Problem of built engines, or of a drawing.
     values
-        Of its decisions.
+        Values of its decisions.
     samples
-        Steps over the cycle.
+        Samples over the cycle.
+    tolerances
+        Tolerances, by default those of the problem; all loads must be affine in the errors.
     """
 
     def __init__(
@@ -52,16 +52,20 @@ class BuiltEngines:
         self._built = [evaluate_built(with_errors(problem, unit, own), values, samples) for unit in units]
 
     def norm(self, measure: Measure) -> AffineNorm:
-        """Return the norm of a measure over the errors."""
-        drawn, finer = self._built[0], measure.norm.refinement
-        bends = None
+        """Return the norm of a measure as a function of the errors."""
+        drawn, refinement = self._built[0], measure.norm.refinement
+        kinks = None
         if measure.is_load:
             signals = over(drawn.engine.cycle.base_order, drawn.signals(measure.load))
-            bends = kinks_of(measure, signals, drawn.engine)
-        rows = [each.rows(measure, finer * self.samples, bends) for each in self._built]
-        bare = rows[0].vectors
-        slope = np.stack([each.vectors - bare for each in rows[1:]], axis=-1) if rows[1:] else bare[..., None][..., :0]
-        return AffineNorm(rows[0].norm, bare, np.ascontiguousarray(slope), rows[0].grid)
+            kinks = kinks_of(measure, signals, drawn.engine)
+        rows = [evaluation.rows(measure, refinement * self.samples, kinks) for evaluation in self._built]
+        constant = rows[0].vectors
+        slope = (
+            np.stack([evaluation.vectors - constant for evaluation in rows[1:]], axis=-1)
+            if rows[1:]
+            else constant[..., None][..., :0]
+        )
+        return AffineNorm(rows[0].norm, constant, np.ascontiguousarray(slope), rows[0].grid)
 
     @property
     def terms(self) -> tuple[tuple[float, AffineNorm], ...]:
@@ -69,13 +73,13 @@ class BuiltEngines:
         return tuple((term.weight, self.norm(term.measure)) for term in self.problem.objective)
 
 
-def evaluate_built(own: Problem, values: Sequence[Value], samples: int) -> Evaluation:
-    """Return a design with the errors of a built problem."""
-    return evaluate(own, own.design(values), samples)
+def evaluate_built(problem: Problem, values: Sequence[Value], samples: int) -> Evaluation:
+    """Return the evaluation of a design of a problem with errors."""
+    return evaluate(problem, problem.design(values), samples)
 
 
 def objective_values(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array:
-    """Return the weighted sum of the norms of many engines, errors of shape (engines, columns)."""
+    """Return the objective of many engines, shape (engines,), from errors of shape (engines, columns)."""
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
     for weight, norm in terms:
@@ -86,26 +90,26 @@ def objective_values(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -
 
 @dataclass(frozen=True, eq=False)
 class WorstEngines:
-    """The worst engines of one design.
+    """Worst engines of one design.
 
     Attributes
     ----------
     value
-        Objective of the worst engine found.
+        Objective of the worst engine found [SI].
     bound
-        What none exceeds.
+        Upper bound of the objective over all engines [SI].
     errors
-        Of engines that are worst in the objective, or break a limit.
+        Errors of the engine with the worst objective, then of engines that violate a limit, shape (columns,) each.
     limits
-        What no engine exceeds of each limit.
+        For each limit, an upper bound over all engines.
     violation
         Largest relative violation of a limit.
-    broken
-        Names of limits that an engine found breaks.
+    violated
+        Names of limits that an engine found violates.
     divisions
-        Parts of the errors that were looked at.
+        Count of nodes.
     proven
-        Whether the bounds are all that they can be.
+        True if the bounds used the whole budget of nodes.
     """
 
     value: float
@@ -113,61 +117,63 @@ class WorstEngines:
     errors: tuple[Array, ...]
     limits: tuple[tuple[Limit, float], ...]
     violation: float
-    broken: tuple[str, ...]
+    violated: tuple[str, ...]
     divisions: int
     proven: bool
 
 
 def load_limits_of(problem: Problem) -> tuple[Limit, ...]:
-    """Return limits that errors move: masses are those of the drawing."""
+    """Return the limits that errors can change; limits of masses concern the drawing alone."""
     return tuple(limit for limit in problem.load_limits if limit.measure.is_load)
 
 
 def largest_violation(limits: Sequence[tuple[Limit, float]]) -> float:
-    """Return the largest relative violation; negative where all have room."""
+    """Return the largest relative violation; negative if all limits are satisfied."""
     return max(((value - limit.maximum) / (limit.maximum or 1.0) for limit, value in limits), default=0.0)
 
 
 def violated_limits(limits: Sequence[tuple[Limit, float]]) -> tuple[str, ...]:
-    """Return the names of limits that are passed by more than counts as kept."""
+    """Return the names of limits that are exceeded by more than the feasibility tolerance."""
     return tuple(limit.name for limit, value in limits if value > limit.maximum * (1.0 + KEPT))
 
 
 @dataclass(frozen=True, eq=False)
 class WorstCaseAdversary:
-    """Seek among all errors within the tolerances, every load affine in them (R4); read limits at many angles (P7)."""
+    """Search of all errors within tolerances, for loads affine in them (R4); limits have finer samples (P7)."""
 
     problem: Problem
     samples: int
     tolerance: float
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
-        """Return the worst engines, by branch and bound."""
+        """Return the worst engines of a design by branch and bound."""
         engines = BuiltEngines(self.problem, values, self.samples)
         columns, maximum = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
-        found = worst_case(engines.terms, columns, self.tolerance, maximum=maximum)
+        worst = worst_case(engines.terms, columns, self.tolerance, maximum=maximum)
         if proven:
-            check_worst(engines.terms, columns, found)
-        errors, limits, divisions = [found.errors], [], found.nodes
-        broken: list[str] = []
-        finely = {self.samples: engines}
+            check_worst(engines.terms, columns, worst)
+        errors, limits, divisions = [worst.errors], [], worst.nodes
+        violated: list[str] = []
+        engines_by_samples = {self.samples: engines}
         for limit in load_limits_of(self.problem):
-            angles = limit_samples(limit.measure, self.samples)
-            finely[angles] = finely.get(angles) or BuiltEngines(self.problem, values, angles)
-            terms: Terms = ((1.0, finely[angles].norm(limit.measure)),)
-            own = worst_case(terms, columns, self.tolerance, maximum=maximum)
-            limits.append((limit, own.bound if proven else own.value))
-            divisions += own.nodes
-            if own.value > limit.maximum:
-                errors.append(own.errors)
-            broken += violated_limits([(limit, own.value)])
+            limit_sampling = limit_samples(limit.measure, self.samples)
+            engines_by_samples[limit_sampling] = engines_by_samples.get(limit_sampling) or BuiltEngines(
+                self.problem, values, limit_sampling
+            )
+            terms: Terms = ((1.0, engines_by_samples[limit_sampling].norm(limit.measure)),)
+            worst_of_limit = worst_case(terms, columns, self.tolerance, maximum=maximum)
+            limits.append((limit, worst_of_limit.bound if proven else worst_of_limit.value))
+            divisions += worst_of_limit.nodes
+            if worst_of_limit.value > limit.maximum:
+                errors.append(worst_of_limit.errors)
+            violated += violated_limits([(limit, worst_of_limit.value)])
         return WorstEngines(
-            found.value,
-            found.bound,
+            worst.value,
+            worst.bound,
             tuple(errors),
             tuple(limits),
             largest_violation(limits),
-            tuple(broken),
+            tuple(violated),
             divisions,
             proven,
         )
@@ -175,12 +181,14 @@ class WorstCaseAdversary:
 
 @dataclass(frozen=True, eq=False)
 class SampledEngines:
-    """Engines that were drawn, or some of them.
+    """Search of a set of random engines.
 
     Attributes
     ----------
     errors
-        Shape (engines, columns).
+        Errors of the engines, shape (engines, columns).
+    models
+        Models of the engines, if loads are not affine in the errors.
     """
 
     problem: Problem
@@ -188,27 +196,27 @@ class SampledEngines:
     samples: int
     models: list[AffineModel] = field(default_factory=list)
 
-    def subset(self, which: NDArray[np.intp]) -> SampledEngines:
-        """Return some of them."""
-        models = [self.models[k] for k in which] if self.models else []
-        return SampledEngines(self.problem, self.errors[which], self.samples, models)
+    def subset(self, indices: NDArray[np.intp]) -> SampledEngines:
+        """Return the engines with these indices."""
+        models = [self.models[k] for k in indices] if self.models else []
+        return SampledEngines(self.problem, self.errors[indices], self.samples, models)
 
     def objective(self, values: Sequence[Value]) -> Array:
-        """Return the objective of every engine."""
+        """Return the objective of each engine, shape (engines,)."""
         return np.asarray(self._values(values, None))
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:  # noqa: ARG002
-        """Return the worst of all of them, exactly."""
-        worst = self._values(values, None)
-        errors, limits = [self.errors[int(np.argmax(worst))]], []
+        """Return the worst engines of a design, exactly."""
+        objectives = self._values(values, None)
+        errors, limits = [self.errors[int(np.argmax(objectives))]], []
         for limit in load_limits_of(self.problem):
-            own = self._values(values, limit)
-            limits.append((limit, float(own.max())))
-            if own.max() > limit.maximum:
-                errors.append(self.errors[int(np.argmax(own))])
-        value, broken = float(worst.max()), violated_limits(limits)
+            limit_values = self._values(values, limit)
+            limits.append((limit, float(limit_values.max())))
+            if limit_values.max() > limit.maximum:
+                errors.append(self.errors[int(np.argmax(limit_values))])
+        value, violated = float(objectives.max()), violated_limits(limits)
         return WorstEngines(
-            value, value, tuple(errors), tuple(limits), largest_violation(limits), broken, len(self.errors), True
+            value, value, tuple(errors), tuple(limits), largest_violation(limits), violated, len(self.errors), True
         )
 
     def _values(self, values: Sequence[Value], limit: Limit | None) -> Array:
@@ -220,12 +228,13 @@ class SampledEngines:
             )
             return objective_values(terms, self.errors)
         if not self.models:
-            self.models.extend(AffineModel(with_errors(self.problem, z)) for z in self.errors)
-        found = (evaluate_built(model.problem, values, samples) for model in self.models)
+            self.models.extend(AffineModel(with_errors(self.problem, errors)) for errors in self.errors)
+        evaluations = (evaluate_built(model.problem, values, samples) for model in self.models)
         return np.array([
-            objective_value(self.problem, each) if limit is None else each.value(limit.measure) for each in found
+            objective_value(self.problem, evaluation) if limit is None else evaluation.value(limit.measure)
+            for evaluation in evaluations
         ])  # fmt: skip
 
 
 Adversary: TypeAlias = WorstCaseAdversary | SampledEngines
-"""Seeks the worst engines of a design; where it is to be proven, with a bound that is worth the time."""
+"""Search for the worst engines of a design; `at(values, proven=True)` spends more time on the bound."""

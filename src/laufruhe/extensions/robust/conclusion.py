@@ -1,4 +1,4 @@
-"""A design for built engines as a result: evaluated, compared with the best drawing, tolerances priced (R10, R11)."""
+"""Result of a design for built engines: comparison with the best drawing, and prices of tolerances (R10, R11)."""
 
 from __future__ import annotations
 
@@ -46,25 +46,25 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
 CHECKED, CHECKED_CURVED = 20_000, 400
-"""Engines of the second sample: where loads are affine in the errors, and where each is built anew."""
+"""Engines of the comparison if loads are affine in the errors, and if each engine has its own model."""
 STEP = 0.05
-"""Share of a tolerance by which it is moved to price it."""
+"""Relative step of a tolerance for its price by central difference."""
 
 
 @dataclass(frozen=True, eq=False)
 class ActiveErrors:
-    """Sets of errors that hold a design, and the multipliers of their objectives and limits.
+    """Sets of errors that determine a design, with multipliers of their objectives and limits.
 
     Attributes
     ----------
     errors
-        Shape (columns,) each.
+        Errors of each set, shape (columns,).
     shares
-        Of each in the largest objective, adding up to one.
+        Multiplier of the objective of each set; the sum is 1.
     prices
-        Of each the multipliers of its limits.
+        Multipliers of the limits of each set.
     residual
-        Of the optimality conditions (P5).
+        Residual of the optimality conditions (P5).
     """
 
     errors: tuple[Array, ...] = ()
@@ -74,36 +74,50 @@ class ActiveErrors:
 
 
 def compare_designs(
-    problem: Problem, adversary: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: WorstEngines,
-    active: ActiveErrors, scenarios: int,
+    problem: Problem, adversary: Adversary, nominal: Sequence[Value], robust: Sequence[Value],
+    robust_worst: WorstEngines, active: ActiveErrors, scenarios: int,
 ) -> RobustResult:  # fmt: skip
-    """Compare the best drawing and the design decided, each built many times, and the price of every tolerance."""
+    """Compare the best drawing with the robust design on random engines, and price each tolerance.
+
+    Parameters
+    ----------
+    adversary
+        Search for the worst engines.
+    nominal, robust
+        Values of the decisions of both designs.
+    robust_worst
+        Worst engines of the robust design.
+    active
+        Error sets that determine it.
+    scenarios
+        Count of error sets in the program.
+    """
     from scipy.stats import beta
 
     over = robust_of(problem).over
     sample = _Sample.of(problem, over, adversary.samples)
     values = sample.values(problem, robust)
     share = SHARE if over.share is None else over.share
-    first = adversary.at(nominal, proven=True)
+    nominal_worst = adversary.at(nominal, proven=True)
     designs = (
-        _design("best drawing", problem, nominal, first, sample.values(problem, nominal), share),
-        _design("decided", problem, robust, found, values, share),
+        _design("best drawing", problem, nominal, nominal_worst, sample.values(problem, nominal), share),
+        _design("decided", problem, robust, robust_worst, values, share),
     )
-    worst = evaluate_built(with_errors(problem, found.errors[0]), robust, adversary.samples)
-    exceeding = int((values > found.bound * (1.0 + 1e-12)).sum())
+    worst = evaluate_built(with_errors(problem, robust_worst.errors[0]), robust, adversary.samples)
+    exceeding = int((values > robust_worst.bound * (1.0 + 1e-12)).sum())
     # Clopper and Pearson (R10)
     at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, len(values) - exceeding)) if exceeding < len(values) else 1.0
     return RobustResult(
         over=over, exact=over.share is None and tolerances_of(problem).is_affine, share=share,
         nominal=designs[0], robust=designs[1], tolerances=_price_tolerances(problem, robust, active, sample, share),
-        scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed, worst_engine=worst,
-        exceeding=exceeding, exceeding_at_most=at_most,
+        scenarios=scenarios, divisions=robust_worst.divisions, engines=len(values), seed=sample.seed,
+        worst_engine=worst, exceeding=exceeding, exceeding_at_most=at_most,
     )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
 class _Sample:
-    """Engines that no decision has seen."""
+    """Random engines that no decision has used."""
 
     errors: Array
     seed: int
@@ -116,7 +130,7 @@ class _Sample:
         return cls(tolerances_of(problem).draw(random, count), over.seed, samples)
 
     def values(self, problem: Problem, values: Sequence[Value]) -> Array:
-        """Return the objective of every engine of a design; errors that loads are affine in are all taken at once."""
+        """Return the objective of each engine of a design, shape (engines,); affine loads are evaluated together."""
         if tolerances_of(problem).is_affine:
             return objective_values(BuiltEngines(problem, values, self.samples).terms, self.errors)
         engines = (evaluate_built(with_errors(problem, z), values, self.samples) for z in self.errors)
@@ -124,40 +138,42 @@ class _Sample:
 
 
 def _design(
-    name: str, problem: Problem, values: Sequence[Value], found: WorstEngines, built: Array, share: float
+    name: str, problem: Problem, values: Sequence[Value], worst_engines: WorstEngines, objectives: Array, share: float
 ) -> BuiltDesign:
     from scipy.stats import binom
 
-    ordered = np.sort(built)
-    low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(built), share)) for side in (-1.0, 1.0))
+    ordered = np.sort(objectives)
+    low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(objectives), share)) for side in (-1.0, 1.0))
     pairs = zip(problem.decisions, values, strict=True)
-    entries = tuple((e.name, e.value, e.unit) for d, v in pairs for e in decision_values(d, v))
-    none = with_errors(problem, np.zeros(tolerances_of(problem).count))
-    drawing = objective_value(problem, evaluate_built(none, values, problem.fidelity.samples))
-    level = float(ordered[min(int(np.ceil(share * len(built))) - 1, len(built) - 1)])
-    worst = found.bound if robust_of(problem).over.share is None else float(ordered[-1])
+    entries = tuple(
+        (entry.name, entry.value, entry.unit) for decision, value in pairs for entry in decision_values(decision, value)
+    )
+    no_errors = with_errors(problem, np.zeros(tolerances_of(problem).count))
+    drawing = objective_value(problem, evaluate_built(no_errors, values, problem.fidelity.samples))
+    level = float(ordered[min(int(np.ceil(share * len(objectives))) - 1, len(objectives) - 1)])
+    worst = worst_engines.bound if robust_of(problem).over.share is None else float(ordered[-1])
     return BuiltDesign(
         name, entries, drawing, worst, level,
-        float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(built) - 1)]),
-        tuple(float(q) for q in np.quantile(built, SHARES)),
+        float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(objectives) - 1)]),
+        tuple(float(quantile) for quantile in np.quantile(objectives, SHARES)),
     )  # fmt: skip
 
 
 def _price_tolerances(
     problem: Problem, values: Sequence[Value], active: ActiveErrors, sample: _Sample, share: float
 ) -> tuple[PricedTolerance, ...]:
-    """Return every tolerance with its price, the dearest first."""
-    told = []
+    """Return the priced tolerances, the most expensive first."""
+    priced = []
     for tolerance in tolerances_of(problem).tolerances:
         wide, narrow = (
-            _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP)
+            _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + step) for step in (STEP, -STEP)
         )
         saving = (wide - narrow) / (2.0 * STEP)
-        told.append(PricedTolerance(
+        priced.append(PricedTolerance(
             tolerance.name, tolerance.size, tolerance.unit, str(tolerance.law), str(tolerance.scope),
             len(tolerance.errors), saving / tolerance.size, saving,
         ))  # fmt: skip
-    return tuple(sorted(told, key=lambda one: -one.saving))
+    return tuple(sorted(priced, key=lambda tolerance_price: -tolerance_price.saving))
 
 
 def _scaled_objective(
@@ -169,74 +185,86 @@ def _scaled_objective(
     tolerance: Tolerance,
     factor: float,
 ) -> float:
-    """Return the objective of what holds the design, with one tolerance so many times as wide (R11)."""
-    moved = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
+    """Return the objective of the active error sets, or of the share, with one tolerance times `factor` (R11)."""
+    scaled_problem = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
     if robust_of(problem).over.share is not None:
-        return float(np.quantile(sample.values(moved, values), share))
+        return float(np.quantile(sample.values(scaled_problem, values), share))
     total = 0.0
-    for errors, own, prices in zip(active.errors, active.shares, active.prices, strict=True):
-        priced = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
-        if own > 0.0 or priced:
-            found = evaluate_built(with_errors(moved, errors), values, sample.samples)
-            total += own * objective_value(problem, found)
-            total += sum(price * found.value(limit.measure) for limit, price in priced)
+    for errors, weight, prices in zip(active.errors, active.shares, active.prices, strict=True):
+        limit_prices = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
+        if weight > 0.0 or limit_prices:
+            evaluation = evaluate_built(with_errors(scaled_problem, errors), values, sample.samples)
+            total += weight * objective_value(problem, evaluation)
+            total += sum(price * evaluation.value(limit.measure) for limit, price in limit_prices)
     return total
 
 
 def infeasible_robust_result(
-    problem: Problem, given: WorstEngines, conflict: tuple[str, ...], timing: dict[str, float]
+    problem: Problem, initial_worst: WorstEngines, conflict: tuple[str, ...], timing: dict[str, float]
 ) -> Result:
-    """Return that no design keeps its limits in every engine, and how the worst engines of the one given stand."""
-    found = infeasible_result(problem, evaluate(problem), conflict, timing)
-    return replace(found, limits=_limits_in_the_worst_case(problem, found.limits, given, {}))
+    """Return the result without a feasible design; limits have their values in the worst engines of the initial one."""
+    result = infeasible_result(problem, evaluate(problem), conflict, timing)
+    return replace(result, limits=_limits_in_the_worst_case(problem, result.limits, initial_worst, {}))
 
 
 def _limits_in_the_worst_case(
-    problem: Problem, limits: Sequence[LimitValue], found: WorstEngines, prices: Mapping[Limit, float]
+    problem: Problem, limits: Sequence[LimitValue], worst_engines: WorstEngines, prices: Mapping[Limit, float]
 ) -> tuple[LimitValue, ...]:
-    # limits of a drawing as its worst engines stand to them
-    worst, own = dict(found.limits), []
+    # values of limits in the worst engines
+    worst_values, result = dict(worst_engines.limits), []
     for limit, value in zip(problem.limits, limits, strict=True):
-        maximum = worst.get(limit, value.value)
+        maximum = worst_values.get(limit, value.value)
         active = maximum >= value.limit * (1.0 - problem.tolerance)
         price = prices.get(limit, 0.0) if active else 0.0
-        own.append(replace(value, value=maximum, active=active, shadow_price=price))
-    return tuple(own)
+        result.append(replace(value, value=maximum, active=active, shadow_price=price))
+    return tuple(result)
 
 
 def robust_result(
     problem: Problem,
     design: Design,
-    given: WorstEngines,
-    found: WorstEngines,
+    initial_worst: WorstEngines,
+    final_worst: WorstEngines,
     active: ActiveErrors,
-    shown: ProofData,
+    proof: ProofData,
     details: RobustResult,
     timing: dict[str, float],
 ) -> Result:
-    """Return the result of a design for built engines; `given` is of the one given."""
-    met = max(found.violation, design.violation) <= KEPT
+    """Return the result of a design for built engines.
+
+    Parameters
+    ----------
+    initial_worst, final_worst
+        Worst engines of the initial design and of the robust design.
+    active
+        Error sets that determine the design.
+    proof
+        Bound of the objective with its method.
+    details
+        Comparison with the best drawing.
+    """
+    is_feasible = max(final_worst.violation, design.violation) <= KEPT
     zero_level = numerical_zero(problem, design.evaluation.engine)
     certificate = make_certificate(
-        found.bound, shown.bound, zero_level, problem.tolerance, shown.strength, shown.kkt_residual, shown.method
+        final_worst.bound, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method
     )
     prices: dict[Limit, float] = {}
-    for limit, price in (priced for own in active.prices for priced in own):
+    for limit, price in (pair for prices_of_set in active.prices for pair in prices_of_set):
         prices[limit] = prices.get(limit, 0.0) + price
-    limits = _limits_in_the_worst_case(problem, limit_values(problem, design.evaluation), found, prices)
+    limits = _limits_in_the_worst_case(problem, limit_values(problem, design.evaluation), final_worst, prices)
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    broken = violated_limits(found.limits)
-    message = f"the best design found breaks {' and '.join(map(repr, broken)) or 'a limit'} in some engines"
+    violated = violated_limits(final_worst.limits)
+    message = f"the best design found breaks {' and '.join(map(repr, violated)) or 'a limit'} in some engines"
     return Result(
         problem=problem,
-        status=status if met else Status.FAILED,
-        objective=ObjectiveValue.of(problem, found.bound, given.value),
+        status=status if is_feasible else Status.FAILED,
+        objective=ObjectiveValue.of(problem, final_worst.bound, initial_worst.value),
         certificate=certificate,
         decisions=decided(design),
         limits=limits,
         initial=evaluate(problem),
         final=design.evaluation,
-        message="" if met else message,
+        message="" if is_feasible else message,
         error=partial(error_of, problem, details.worst_engine),
         timing=timing,
         details=details,

@@ -1,4 +1,4 @@
-"""Built engines in a problem file: "1.25 kg ± 2 %" at a number, [tolerances], [robust], and lots of [assembly]."""
+"""Tolerances in a problem file: "1.25 kg ± 2 %" at a number, [tolerances], [robust], and lots of [assembly]."""
 
 from __future__ import annotations
 
@@ -49,9 +49,9 @@ RESIDUAL = "tolerances.residual_unbalance"
 
 
 class TolerancesTable(Table):
-    """Tolerances of built engines that are not those of a number in this file."""
+    """Tolerances of built engines that belong to no number of this file."""
 
-    closed: ClassVar[str] = "is a tolerance, and none would be least"
+    closed: ClassVar[str] = "is a tolerance, and the optimum would always be zero"
 
     residual_unbalance: str | None = Field(
         default=None, description="Left on the crankshaft by balancing: an unbalance on each plane, or a grade of "
@@ -69,7 +69,7 @@ class TolerancesTable(Table):
 class RobustTable(Table):
     """Design for engines as built: for the worst case within the tolerances, or for a share of them."""
 
-    closed: ClassVar[str] = "says for which engines one is designed"
+    closed: ClassVar[str] = "selects the engines to design for, and is not optimised"
 
     over: str = f.optional('"worst case", or a share of engines such as "95 %".', "worst case")
     engines: int = Field(default=1000, ge=20, le=100_000, description="Number of engines that are drawn.")
@@ -78,18 +78,20 @@ class RobustTable(Table):
 
 @dataclass(frozen=True)
 class Mark:
-    """A tolerance as it stands in a file.
+    """Tolerance as written at a number of a file.
 
     Attributes
     ----------
     path
-        Of the number.
+        Keys of the number.
     text
-        All of it.
+        Whole text.
     number, unit
-        Of the drawing, as written; no number where that is open.
+        Number of the drawing as written, and its unit; None for an open number.
     size
         Largest error as written: with a unit, in percent, or a plain number.
+    law, scope
+        Distribution of errors, and extent if written.
     """
 
     path: Path
@@ -102,21 +104,21 @@ class Mark:
 
     @property
     def where(self) -> str:
-        """Place for the reader of a complaint."""
+        """Key of the number, for messages."""
         return key_path(self.path)
 
     def refused(self, rule: str, remedy: str) -> Refused:
-        """Return one line about it."""
+        """Return an error with a rule and a remedy."""
         return Refused(self.where, self.text, rule, remedy)
 
     @property
     def is_share(self) -> bool:
-        """Return whether it is in percent."""
+        """True if it is in percent."""
         return self.size.endswith("%")
 
     @property
     def error(self) -> float:
-        """Largest error, in the unit of the number, or as a share."""
+        """Largest error in the unit of the number, or as a share."""
         if self.is_share:
             share = self._parsed(self.size[:-1].strip() or "?", "") / 100.0
             if share >= 1.0:
@@ -124,12 +126,14 @@ class Mark:
             return share
         if not self.unit:
             return self._parsed(self.size, "")
-        own = f"1 {self.unit}"
-        dimension = units.dimension_of(own)
+        one_unit = f"1 {self.unit}"
+        dimension = units.dimension_of(one_unit)
         if dimension is None:
             raise self.refused("is no number with a unit known here", _EXAMPLE)
-        bare = _NUMBER.fullmatch(self.size) is not None
-        return self._parsed(f"{self.size} {self.unit}" if bare else self.size, dimension) / units.parse(own, dimension)
+        is_plain = _NUMBER.fullmatch(self.size) is not None
+        return self._parsed(f"{self.size} {self.unit}" if is_plain else self.size, dimension) / units.parse(
+            one_unit, dimension
+        )
 
     def _parsed(self, text: str, dimension: str) -> float:
         try:
@@ -143,43 +147,43 @@ class Mark:
 
 @dataclass(frozen=True)
 class Marks:
-    """Tolerances that stand at numbers of a file."""
+    """Tolerances at numbers of a file."""
 
     written: tuple[Mark, ...]
 
 
 def _split(tables: Mapping[str, Any]) -> tuple[dict[str, Any], Marks | None]:
-    found: list[Mark] = []
-    plain = {key: _strip_marks(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
-    return plain, Marks(tuple(found)) if found or {"tolerances", "robust"} & set(tables) else None
+    marks: list[Mark] = []
+    plain = {key: _strip_marks(value, (key,), marks) if key in _ROOMS else value for key, value in tables.items()}
+    return plain, Marks(tuple(marks)) if marks or {"tolerances", "robust"} & set(tables) else None
 
 
 def _attach(marks: Marks, problem: Problem, file: Any, tables: Mapping[str, Any]) -> Problem:
-    found = [_tolerance(one, problem, tables) for one in marks.written]
-    found += _residual(file.tolerances, problem.engine, max(point.speed for point in problem.points))
+    tolerances = [_tolerance(mark, problem, tables) for mark in marks.written]
+    tolerances += _residual(file.tolerances, problem.engine, max(point.speed for point in problem.points))
     if file.robust is None:
         return problem
-    own = Robust(Tolerances(tuple(found)), _population(file.robust, found))
-    return replace(problem, extras=(*problem.extras, own))
+    robust = Robust(Tolerances(tuple(tolerances)), _population(file.robust, tolerances))
+    return replace(problem, extras=(*problem.extras, robust))
 
 
-def _strip_marks(node: Any, path: Path, found: list[Mark]) -> Any:
+def _strip_marks(node: Any, path: Path, marks: list[Mark]) -> Any:
     if isinstance(node, list):
-        return [_strip_marks(entry, (*path, k), found) for k, entry in enumerate(node)]
+        return [_strip_marks(entry, (*path, k), marks) for k, entry in enumerate(node)]
     if isinstance(node, dict):
-        told = node.get("tolerance")
-        if "between" in node and isinstance(told, str):
-            found.append(_parse_mark(told if any(sign in told for sign in SIGNS) else f"± {told}", path))
+        tolerance = node.get("tolerance")
+        if "between" in node and isinstance(tolerance, str):
+            marks.append(_parse_mark(tolerance if any(sign in tolerance for sign in SIGNS) else f"± {tolerance}", path))
             node = {key: value for key, value in node.items() if key != "tolerance"}
-            if found[-1].number is not None:
-                raise found[-1].refused("gives a number beside its bounds", 'write for example "± 2 %"')
-        return {key: _strip_marks(value, (*path, key), found) for key, value in node.items()}
+            if marks[-1].number is not None:
+                raise marks[-1].refused("gives a number beside its bounds", 'write for example "± 2 %"')
+        return {key: _strip_marks(value, (*path, key), marks) for key, value in node.items()}
     if isinstance(node, str) and any(sign in node for sign in SIGNS) and path[-1] not in ("name", "names"):
-        written = _parse_mark(node, path)
-        if written.number is None:
+        mark = _parse_mark(node, path)
+        if mark.number is None:
             return node
-        found.append(written)
-        return node[: re.search(r"±|\+/-|\+-", node).start()].strip() if written.unit else written.number  # type: ignore[union-attr]
+        marks.append(mark)
+        return node[: re.search(r"±|\+/-|\+-", node).start()].strip() if mark.unit else mark.number  # type: ignore[union-attr]
     return node
 
 
@@ -189,7 +193,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
     if match is None or not match["size"]:
         raise Refused(where, text, "has a sign of a tolerance and none behind it", _EXAMPLE)
     words = match["words"].split()
-    laws, scopes = ([w for w in words if w in list(kind)] for kind in (Law, Scope))
+    laws, scopes = ([word for word in words if word in list(kind)] for kind in (Law, Scope))
     if len(laws) > 1 or len(scopes) > 1:
         raise Refused(where, text, "names two laws or two scopes", "keep one of each")
     number = _NUMBER.match(match["number"])
@@ -200,7 +204,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
 
 
 def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Population:
-    """Return the engines that count: the worst, or a share."""
+    """Return the engines of the objective: the worst case, or a share."""
     if not tolerances:
         raise Refused("robust", None, "has no tolerances to stand", 'give a number one, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
@@ -221,70 +225,70 @@ def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Populati
 _Errors: TypeAlias = tuple[list[Error], float, str]
 
 
-def _tolerance(one: Mark, problem: Problem, tables: Mapping[str, Any]) -> Tolerance:
-    key = one.path[-1]
+def _tolerance(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> Tolerance:
+    key = mark.path[-1]
     pieces = {"reciprocating_mass": _pistons, "rotating_mass": _pins}
-    if one.path[:1] == ("engine",) and len(one.path) == 2 and key in pieces:
-        errors, size, unit = pieces[str(key)](one, problem.engine)
-    elif one.path[0] in ("counterweights", "balancer_shafts") and key in _SIZES:
-        errors, size, unit = _rotor(one, problem, tables)
+    if mark.path[:1] == ("engine",) and len(mark.path) == 2 and key in pieces:
+        errors, size, unit = pieces[str(key)](mark, problem.engine)
+    elif mark.path[0] in ("counterweights", "balancer_shafts") and key in _SIZES:
+        errors, size, unit = _rotor(mark, problem, tables)
     else:
-        return _file_tolerance(one)
-    scope = one.scope or Scope.PIECE
-    name = f"{errors[0].name}.{key}" if one.path[0] != "engine" else one.where
+        return _file_tolerance(mark)
+    scope = mark.scope or Scope.PIECE
+    name = f"{errors[0].name}.{key}" if mark.path[0] != "engine" else mark.where
     if scope is Scope.BATCH:
         errors = [Error(name, tuple(drive for error in errors for drive in error.drives))]
-    return Tolerance(name, unit, size, tuple(errors), one.law, scope)
+    return Tolerance(name, unit, size, tuple(errors), mark.law, scope)
 
 
-def _pistons(one: Mark, engine: Engine) -> _Errors:
-    size = _mass(one)
+def _pistons(mark: Mark, engine: Engine) -> _Errors:
+    size = _mass(mark)
     drives = [(part.name, PistonDrive(k, size)) for k, part in enumerate(engine.slider_cranks)]
     if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
-        raise one.refused("is a tolerance of the whole mass or more", "give less")
+        raise mark.refused("is a tolerance of the whole mass or more", "give less")
     return [Error(name, (drive,)) for name, drive in drives], size, "kg"
 
 
-def _pins(one: Mark, engine: Engine) -> _Errors:
-    size, found, seen = _mass(one), [], set()
+def _pins(mark: Mark, engine: Engine) -> _Errors:
+    size, errors, seen = _mass(mark), [], set()
     for part in engine.slider_cranks:
-        at = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
-        if at in seen:
+        place = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
+        if place in seen:
             continue
-        seen.add(at)
+        seen.add(place)
         pin = Rotor("pin", part.x, part.crank_radius * complex(math.cos(part.throw), math.sin(part.throw)), part.shaft)
-        found.append(
+        errors.append(
             Error(
                 f"throw of {part.name}",
                 (AddedDrive(f"error of the pin of {part.name}", part.x, size * pin.unbalance, part.shaft),),
             )
         )
-    return found, size, "kg"
+    return errors, size, "kg"
 
 
-def _mass(one: Mark) -> float:
-    number = one.number or 0.0
-    return one.error * (abs(number) if one.is_share else 1.0) * units.parse(f"1 {one.unit}", "kg")
+def _mass(mark: Mark) -> float:
+    number = mark.number or 0.0
+    return mark.error * (abs(number) if mark.is_share else 1.0) * units.parse(f"1 {mark.unit}", "kg")
 
 
-def _rotor(one: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
-    """Return the error of the size of one counterweight or balancer."""
-    names = _names(one.path, tables)
+def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
+    """Return the error of the size of a counterweight or a balancer, which is a share."""
+    names = _names(mark.path, tables)
     decided = {drive.rotor: decision for decision in problem.decisions for drive in decision.rotor_drives}
-    if one.is_share:
-        share = one.error
-    elif one.number:
-        share = one.error / abs(one.number)
+    if mark.is_share:
+        share = mark.error
+    elif mark.number:
+        share = mark.error / abs(mark.number)
     else:
         rule = "is open, and an error in its own unit points where it does"
-        raise one.refused(rule, "give the tolerance in percent")
+        raise mark.refused(rule, "give the tolerance in percent")
     if share >= 1.0:
-        raise one.refused("is a tolerance of the whole number or more", "give less")
+        raise mark.refused("is a tolerance of the whole number or more", "give less")
     errors = [Error(name, (ShareDrive(name, share),)) for name in names]
     if not any(
         rotor.name in names and (rotor.unbalance != 0.0 or rotor.name in decided) for rotor in problem.engine.rotors
     ):
-        raise one.refused("has nothing that could be off", "leave the tolerance out")
+        raise mark.refused("has nothing that could be off", "leave the tolerance out")
     return errors, share, ""
 
 
@@ -292,25 +296,27 @@ def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
     table = tables[str(path[0])][path[1]]
     if path[0] == "counterweights":
         return [str(table["name"])]
-    return [name_of_unbalance(table["name"], [one.get("name") for one in table["unbalances"]], int(path[3]))]
+    return [
+        name_of_unbalance(table["name"], [unbalance.get("name") for unbalance in table["unbalances"]], int(path[3]))
+    ]
 
 
-def _file_tolerance(one: Mark) -> Tolerance:
-    # any other number: the engine is put together anew with it
-    if one.number is None:
-        raise one.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
-    if one.scope is Scope.PIECE and not any(isinstance(part, int) for part in one.path):
-        raise one.refused("is one number of the whole engine", "write batch, or leave the word out")
-    gain = one.error * (abs(one.number) if one.is_share else 1.0)
-    dimension = (units.dimension_of(f"1 {one.unit}") or "") if one.unit else ""
-    size = gain * (units.parse(f"1 {one.unit}", dimension) if one.unit else 1.0)
-    drive: ErrorDrive = FileDrive(one.path, one.number, gain, one.unit)
-    scope = one.scope or (Scope.PIECE if any(isinstance(part, int) for part in one.path) else Scope.BATCH)
-    return Tolerance(one.where, dimension, size, (Error(one.where, (drive,)),), one.law, scope)
+def _file_tolerance(mark: Mark) -> Tolerance:
+    # any other number: the problem is rebuilt from the file
+    if mark.number is None:
+        raise mark.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
+    if mark.scope is Scope.PIECE and not any(isinstance(part, int) for part in mark.path):
+        raise mark.refused("is one number of the whole engine", "write batch, or leave the word out")
+    gain = mark.error * (abs(mark.number) if mark.is_share else 1.0)
+    dimension = (units.dimension_of(f"1 {mark.unit}") or "") if mark.unit else ""
+    size = gain * (units.parse(f"1 {mark.unit}", dimension) if mark.unit else 1.0)
+    drive: ErrorDrive = FileDrive(mark.path, mark.number, gain, mark.unit)
+    scope = mark.scope or (Scope.PIECE if any(isinstance(part, int) for part in mark.path) else Scope.BATCH)
+    return Tolerance(mark.where, dimension, size, (Error(mark.where, (drive,)),), mark.law, scope)
 
 
 def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> list[Tolerance]:
-    """Return the unbalance that balancing leaves, at any angle, on planes from the first throw to the last."""
+    """Return the tolerance of residual unbalance on planes from the first throw to the last."""
     if table is None or table.residual_unbalance is None:
         if table is not None and table.rotor_mass is not None:
             raise Refused("tolerances.rotor_mass", None, "needs a grade", "add residual_unbalance, or leave it out")
@@ -318,7 +324,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
     grade = grade_of(table.residual_unbalance)
     if grade is None:
         try:
-            each = units.parse(table.residual_unbalance, "kg m")
+            permitted = units.parse(table.residual_unbalance, "kg m")
         except units.UnitError:
             rule, remedy = "is neither a grade nor an unbalance", 'write for example "G 6.3" or "50 g cm"'
             raise Refused(RESIDUAL, table.residual_unbalance, rule, remedy) from None
@@ -328,15 +334,16 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
         rule = "is missing, and a grade is of a mass"
         raise Refused("tolerances.rotor_mass", None, rule, "add that of crankshaft, flywheel and clutch")
     else:
-        each = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
-    if each < 0.0:
+        permitted = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
+    if permitted < 0.0:
         raise Refused(RESIDUAL, table.residual_unbalance, "is negative", "give its size")
     front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
     places = [front + (rear - front) * k / max(table.planes - 1, 1) for k in range(table.planes)]
     errors = tuple(
-        Error(f"plane {k + 1}", (AddedDrive(f"residual unbalance {k + 1}", x, each),), 2) for k, x in enumerate(places)
+        Error(f"plane {k + 1}", (AddedDrive(f"residual unbalance {k + 1}", x, permitted),), 2)
+        for k, x in enumerate(places)
     )
-    return [Tolerance(RESIDUAL, "kg m", each, errors, Law(table.law))]
+    return [Tolerance(RESIDUAL, "kg m", permitted, errors, Law(table.law))]
 
 
 COLUMNS = {"pistons": ("mass",), "rods": ("mass at the small end", "mass at the big end")}
@@ -344,17 +351,17 @@ MOST_PARTS = 100
 
 
 class AssemblyTable(Table):
-    """Measured pistons and rods: which of them goes into which cylinder is decided."""
+    """Measured pistons and rods; the optimiser decides which goes into which cylinder."""
 
     pistons: str | None = f.optional("CSV file with the mass of each piston.")
     rods: str | None = f.optional("CSV file with the masses of each rod at the small end and at the big end.")
     mass_unit: str = f.optional("Unit of the masses in these files.", "g")
 
 
-def _assembly(table: AssemblyTable, problem: Problem, given: ExtensionContext) -> Problem:
-    """Return the problem with the lots of the files beside its file."""
+def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext) -> Problem:
+    """Return the problem with the lots of parts from CSV files."""
     engine = problem.engine
-    if given.file.geared_inertias:
+    if context.file.geared_inertias:
         raise Refused("geared_inertias", None, "are not known of [assembly]", "leave one of the two out")
     unit = measured(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
     lots = []
@@ -362,7 +369,7 @@ def _assembly(table: AssemblyTable, problem: Problem, given: ExtensionContext) -
         file, where = getattr(table, key), f"assembly.{key}"
         if file is None:
             continue
-        rows = rows_of(file, given.folder / file, where, columns)
+        rows = rows_of(file, context.folder / file, where, columns)
         count = len(engine.slider_cranks)
         if len(rows) < count:
             raise Refused(where, file, f"has {len(rows)} parts for {count} cylinders", "measure one for each at least")

@@ -1,4 +1,4 @@
-"""Two designs built many times: share of engines against what they make; and what each tolerance costs."""
+"""Picture of two designs built many times: share of engines over objective, and cost of each tolerance."""
 
 from __future__ import annotations
 
@@ -17,47 +17,49 @@ MOST_TOLERANCES, WIDE = 8, 6.4
 
 
 def applies(result: Result) -> bool:
-    """Return whether built engines were decided for."""
+    """Return True if the result is a design for built engines."""
     return isinstance(result.details, RobustResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the share of engines that stays below, design by design, over bars of what tolerances cost."""
-    found, unit = result.details, objective_unit(result)
-    if not isinstance(found, RobustResult):
-        raise ValueError("nothing was decided for built engines")
-    drawn = page(2, 1, (WIDE, 2.5), gap=0.7)
-    first, second = drawn.panels
-    for design, colour in ((found.nominal, BEFORE), (found.robust, AFTER)):
+    """Draw the share of engines below each objective for both designs, above bars of the cost of tolerances."""
+    details, unit = result.details, objective_unit(result)
+    if not isinstance(details, RobustResult):
+        raise ValueError("the result is not of built engines")
+    layout = page(2, 1, (WIDE, 2.5), gap=0.7)
+    first, second = layout.panels
+    for design, colour in ((details.nominal, BEFORE), (details.robust, AFTER)):
         first.plot(design.quantiles, [100.0 * share for share in SHARES], color=colour, linewidth=1.8)
         first.axvline(design.drawing, color=colour, linewidth=1.2, linestyle=DRAWN)
         first.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
-    first.axhline(100.0 * found.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
+    first.axhline(100.0 * details.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
     name = result.problem.drawing.objective_name
     first.set(ylim=(0.0, 104.0), ylabel="engines below [%]", xlabel=label_of(name, unit, WIDE))
-    _bars(second, found, unit)
-    worst = "worst case, which no engine exceeds" if found.exact else "worst engine drawn"
+    _bars(second, details, unit)
+    worst = "worst case, which no engine exceeds" if details.exact else "worst engine drawn"
     legend = [
         entry("best drawing", color=BEFORE), entry("decided", color=AFTER),
         entry("as drawn", color=INK, linestyle=DRAWN), entry(worst, color=INK, linestyle=WORST),
     ]  # fmt: skip
     lines = (
-        f"{found.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
+        f"{details.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
     )
-    return finish_page(drawn, result, "The price of tolerances", lines, legend)
+    return finish_page(layout, result, "The price of tolerances", lines, legend)
 
 
-def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
-    shown = found.tolerances[:MOST_TOLERANCES]
-    top = axis_end(one.saving for one in shown)
-    axes.barh(range(len(shown)), [max(one.saving, 0.0) for one in shown], color=AFTER, height=0.55)
-    for k, one in enumerate(shown):
-        axes.text(0.01 * top, k - 0.36, one.name, size=SMALL, color=INK, va="bottom")
-        price = f"{number(one.saving, 3)} {unit}"
-        axes.text(max(one.saving, 0.0) + 0.01 * top, k, price, size=SMALL, color=FAINT, va="center")
+def _bars(axes: Axes, details: RobustResult, unit: str) -> None:
+    tolerances = details.tolerances[:MOST_TOLERANCES]
+    maximum = axis_end(tolerance.saving for tolerance in tolerances)
+    axes.barh(
+        range(len(tolerances)), [max(tolerance.saving, 0.0) for tolerance in tolerances], color=AFTER, height=0.55
+    )
+    for row, tolerance in enumerate(tolerances):
+        axes.text(0.01 * maximum, row - 0.36, tolerance.name, size=SMALL, color=INK, va="bottom")
+        price = f"{number(tolerance.saving, 3)} {unit}"
+        axes.text(max(tolerance.saving, 0.0) + 0.01 * maximum, row, price, size=SMALL, color=FAINT, va="center")
     axes.set(
-        ylim=(len(shown) - 0.4, -0.75), xlim=(0.0, 1.15 * top), yticks=[],
+        ylim=(len(tolerances) - 0.4, -0.75), xlim=(0.0, 1.15 * maximum), yticks=[],
         xlabel=label_of("shadow price times tolerance", unit, WIDE),
     )  # fmt: skip
     axes.grid(axis="y", visible=False)

@@ -1,4 +1,4 @@
-"""Reductions: measured parts are chosen, and designs decided for built engines, before the core sees a drawing."""
+"""Reductions of problems with tolerances or measured parts to problems of a drawing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.methods import Decide, Reduction
 from laufruhe.solvers.result import Result
 
-_NEXT = "limits that nothing open moves"
+_BEFORE = "limits that nothing open moves"
 
 
 def _solve_assembly(problem: Problem, decide: Decide, rest: Decide) -> Result:
@@ -35,5 +35,9 @@ def _refuse_built(problem: Problem) -> None:
     refuse(problem)
 
 
-ASSEMBLY = Reduction("assembly", lambda p: p.extra(Assembly) is not None, _solve_assembly, _refuse_assembly, _NEXT)
-TOLERANCES = Reduction("tolerances", lambda p: p.extra(Robust) is not None, _solve_built, _refuse_built, _NEXT)
+ASSEMBLY = Reduction(
+    "assembly", lambda problem: problem.extra(Assembly) is not None, _solve_assembly, _refuse_assembly, _BEFORE
+)
+TOLERANCES = Reduction(
+    "tolerances", lambda problem: problem.extra(Robust) is not None, _solve_built, _refuse_built, _BEFORE
+)

@@ -1,4 +1,4 @@
-"""Details of results: two designs under tolerance with the price of each, and parts that were chosen."""
+"""Details of results: two designs under tolerance with the price of each tolerance, or chosen parts."""
 
 from __future__ import annotations
 
@@ -9,30 +9,31 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Details
 
 SHARE = 0.95
-"""Of built engines whose value every comparison shows, where no other share is asked for."""
+"""Share of built engines in comparisons, unless the problem sets one."""
 SHARES = tuple(k / 200.0 for k in range(201))
-"""Of which quantiles are kept for pictures."""
+"""Shares of engines at which pictures show quantiles."""
 CONFIDENCE = 0.99
+"""Confidence of intervals and bounds of shares."""
 
 
 @dataclass(frozen=True)
 class BuiltDesign:
-    """Design and the engines built to it [SI].
+    """Objective of a design and of the engines built to it [SI].
 
     Attributes
     ----------
     name
-        Which of the two.
+        "best drawing" or "decided".
     decisions
-        Names and values.
+        Name, value and unit of each decision.
     drawing
-        The engine without any error.
+        Objective of the engine without errors.
     worst
-        What no engine within the tolerances exceeds; of drawn ones the largest.
+        Upper bound over all engines within the tolerances, or maximum of the random engines.
     share, low, high
-        What the share of engines asked for stays below, and its interval of confidence.
+        Objective that the required share of engines does not exceed, and its confidence interval.
     quantiles
-        Of random engines, at SHARES.
+        Quantiles of random engines at SHARES.
     """
 
     name: str
@@ -47,14 +48,22 @@ class BuiltDesign:
 
 @dataclass(frozen=True)
 class PricedTolerance:
-    """Tolerance, and by how much the objective falls for each unit by which it is narrowed.
+    """Tolerance with its shadow price.
 
     Attributes
     ----------
+    name
+        Key of the file.
+    size, unit
+        Largest error [SI].
+    law, scope
+        Distribution of errors, and "piece" or "batch".
+    errors
+        Count of independent errors.
     price
-        Per SI unit.
+        Fall of the objective per SI unit by which the tolerance is narrowed.
     saving
-        Price times tolerance: what it costs, in the first order.
+        Price times tolerance: estimate of its cost.
     """
 
     name: str
@@ -69,30 +78,30 @@ class PricedTolerance:
 
 @dataclass(frozen=True)
 class RobustResult(Details):
-    """Two designs under the same tolerances, and which tolerance to narrow first.
+    """Two designs under the same tolerances, and the price of each tolerance.
 
     Attributes
     ----------
     over
-        Of which engines the objective was taken.
+        Engines over which the objective is taken.
     exact
-        Whether the worst of all engines within the tolerances is bounded; else of those drawn.
+        True if `worst` is a bound over all engines within the tolerances, False for a maximum of random engines.
     share
-        Of engines, that `BuiltDesign.share` is of.
+        Share of engines for `BuiltDesign.share`.
     nominal, robust
-        The best drawing, and the design decided.
+        Best drawing, and design for built engines.
     tolerances
-        The dearest first.
+        Priced tolerances, the most expensive first.
     scenarios
-        Sets of errors in the program.
+        Count of error sets in the program.
     divisions
-        Parts of the errors that the bound looked at.
+        Count of nodes of the bound.
     engines, seed
-        Drawn for the comparison, other ones than those that decided.
+        Count and seed of the random engines of the comparison, independent of those of the search.
     worst_engine
-        The exact model's evaluation of the worst engine found of the design decided.
+        Exact evaluation of the worst engine found of the robust design.
     exceeding, exceeding_at_most
-        How many of them exceed the objective, and the share of all that does, at most, with CONFIDENCE.
+        Count of random engines above the objective, and upper bound of their share with CONFIDENCE.
     """
 
     over: Population
@@ -111,20 +120,20 @@ class RobustResult(Details):
 
     @property
     def measured(self) -> Evaluation:
-        """Evaluation that the objective is of."""
+        """Evaluation with the value of the objective."""
         return self.worst_engine
 
 
 @dataclass(frozen=True)
 class Place:
-    """Parts of a cylinder.
+    """Parts of one cylinder.
 
     Attributes
     ----------
     parts
-        Of every lot the number of the part in the order of its file, from one.
+        For each lot, the row of the part in its file, from 1.
     masses
-        Of each what goes to and fro, and what turns with the pin [kg].
+        Reciprocating and rotating mass of each part [kg].
     """
 
     cylinder: str
@@ -134,22 +143,26 @@ class Place:
 
 @dataclass(frozen=True)
 class AssemblyResult(Details):
-    """The best assembly beside others [SI].
+    """Best assembly, compared with random ones [SI].
 
     Attributes
     ----------
     kinds
-        Of the lots.
+        Kinds of the lots.
+    places
+        Parts of each cylinder.
     assemblies
-        That there are in all.
+        Count of all assemblies.
     looked_at
-        Parts of them that were bounded.
+        Count of nodes of branch and bound.
     quantiles
-        Of assemblies at random.
+        Quantiles of random assemblies at SHARES.
     worst
-        Of these.
+        Largest objective of the random assemblies.
     mean_parts
-        The objective if every part had the mean mass of its lot.
+        Objective with parts of mean mass.
+    random
+        Count of random assemblies.
     """
 
     kinds: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Sections and pictures of reports: two designs under tolerance with prices, and parts that were chosen."""
+"""Report sections and pictures of designs under tolerance and of chosen parts."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from laufruhe.solvers.result import Result
 
 
 def _tolerance_tables(result: Result) -> list[Table]:
-    """Return a table of two designs, and one of tolerances, a row each."""
-    found, unit = result.details, objective_unit(result)
-    assert isinstance(found, RobustResult)
-    worst = "worst case" if found.exact else "worst drawn"
-    below, sure = f"{100.0 * found.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"
-    head = ("design", "as drawn", worst, below, sure)
-    rows = [_design(design, unit) for design in (found.nominal, found.robust)]
-    pairs = ((getattr(found.nominal, key), getattr(found.robust, key)) for key in ("drawing", "worst", "share"))
-    rows.append(("price", *(percent(b / a - 1.0) if a else "-" for a, b in pairs), ""))
-    told = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
-    own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
+    """Return a table of the two designs and a table of the tolerances."""
+    details, unit = result.details, objective_unit(result)
+    assert isinstance(details, RobustResult)
+    worst = "worst case" if details.exact else "worst drawn"
+    level, confidence = f"{100.0 * details.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"
+    head = ("design", "as drawn", worst, level, confidence)
+    rows = [_design(design, unit) for design in (details.nominal, details.robust)]
+    pairs = ((getattr(details.nominal, key), getattr(details.robust, key)) for key in ("drawing", "worst", "share"))
+    rows.append(("price", *(percent(robust / nominal - 1.0) if nominal else "-" for nominal, robust in pairs), ""))
+    tolerance_head = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
+    tolerance_rows = [_tolerance(tolerance, unit) for tolerance in details.tolerances]
     note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
     return [
-        Table(head, rows, title="Under tolerance", note=_checked(found), file="under-tolerance"),
-        Table(told, own, title="Tolerances", left=2, note=note, file="tolerances"),
+        Table(head, rows, title="Under tolerance", note=_tolerance_note(details), file="under-tolerance"),
+        Table(tolerance_head, tolerance_rows, title="Tolerances", left=2, note=note, file="tolerances"),
     ]
 
 
@@ -48,28 +48,30 @@ def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:
 
 
 def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
-    share = not tolerance.unit
-    size = f"{100.0 * tolerance.size:.3g} %" if share else with_unit(tolerance.size, tolerance.unit)
+    is_share = not tolerance.unit
+    size = f"{100.0 * tolerance.size:.3g} %" if is_share else with_unit(tolerance.size, tolerance.unit)
     price = (
-        f"{number(0.01 * tolerance.price)} {unit} per %" if share else price_of(tolerance.price, unit, tolerance.unit)
+        f"{number(0.01 * tolerance.price)} {unit} per %"
+        if is_share
+        else price_of(tolerance.price, unit, tolerance.unit)
     )
     errors = f"{tolerance.errors}, {tolerance.law}" + (", batch" if tolerance.scope == "batch" else "")
     return tolerance.name, f"± {size}", errors, price, figure(tolerance.saving, unit, 3)
 
 
-def _checked(found: RobustResult) -> str:
-    told = f"Checked: of {found.engines:,} other engines {found.exceeding} exceed the objective"
-    return f"{told}, so at most {100.0 * found.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."
+def _tolerance_note(details: RobustResult) -> str:
+    count = f"Checked: of {details.engines:,} other engines {details.exceeding} exceed the objective"
+    return f"{count}, so at most {100.0 * details.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."
 
 
 def _assembly_tables(result: Result) -> list[Table]:
-    found, unit = result.details, objective_unit(result)
-    assert isinstance(found, AssemblyResult)
+    details, unit = result.details, objective_unit(result)
+    assert isinstance(details, AssemblyResult)
     head = ["cylinder"]
-    for kind in found.kinds:
+    for kind in details.kinds:
         head += [kind, "mass [g]"]
-    rows = [_row(place) for place in found.places]
-    return [Table(head, rows, title="Assembly", note=_beside(found, unit), file="assembly")]
+    rows = [_row(place) for place in details.places]
+    return [Table(head, rows, title="Assembly", note=_assembly_note(details, unit), file="assembly")]
 
 
 def _row(place: Place) -> tuple[str, ...]:
@@ -79,45 +81,48 @@ def _row(place: Place) -> tuple[str, ...]:
     return tuple(cells)
 
 
-def _beside(found: AssemblyResult, unit: str) -> str:
-    middle, maximum = (figure(found.quantiles[int(share * (len(found.quantiles) - 1))], unit) for share in (0.5, 0.95))
-    told = f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random"
-    worst, mean = figure(found.worst, unit), figure(found.mean_parts, unit)
+def _assembly_note(details: AssemblyResult, unit: str) -> str:
+    middle, maximum = (
+        figure(details.quantiles[int(share * (len(details.quantiles) - 1))], unit) for share in (0.5, 0.95)
+    )
+    count = f"Of {details.assemblies:,.0f} assemblies; {details.random} of them at random"
+    worst, mean = figure(details.worst, unit), figure(details.mean_parts, unit)
     return (
-        f"{told}: half above {middle}, one of twenty above {maximum}, the worst {worst}. "
+        f"{count}: half above {middle}, one of twenty above {maximum}, the worst {worst}. "
         f"With parts of mean mass {mean}."
     )
 
 
 def _tolerance_record(result: Result) -> dict[str, Any]:
-    # two designs under tolerance, and the price of each tolerance [SI]
-    found = result.details
-    assert isinstance(found, RobustResult)
+    details = result.details
+    assert isinstance(details, RobustResult)
     names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
-    told: dict[str, Any] = {"over": "worst case" if found.over.share is None else found.over.share}
-    told |= {name: getattr(found, name) for name in names.split()}
-    for key, design in (("best_drawing", found.nominal), ("decided", found.robust)):
+    record: dict[str, Any] = {"over": "worst case" if details.over.share is None else details.over.share}
+    record |= {name: getattr(details, name) for name in names.split()}
+    for key, design in (("best_drawing", details.nominal), ("decided", details.robust)):
         decisions = {name: {"value": value, "unit": unit} for name, value, unit in design.decisions}
-        told[key] = {name: getattr(design, name) for name in ["drawing", "worst", "share", "low", "high"]}
-        told[key] |= {"quantiles": list(design.quantiles), "decisions": decisions}
-    return {**told, "tolerances": [asdict(tolerance) for tolerance in found.tolerances]}
+        record[key] = {name: getattr(design, name) for name in ["drawing", "worst", "share", "low", "high"]}
+        record[key] |= {"quantiles": list(design.quantiles), "decisions": decisions}
+    return {**record, "tolerances": [asdict(tolerance) for tolerance in details.tolerances]}
 
 
 def _assembly_record(result: Result) -> dict[str, Any]:
-    found = result.details
-    assert isinstance(found, AssemblyResult)
-    told = {name: getattr(found, name) for name in ["assemblies", "looked_at", "random", "worst", "mean_parts"]}
-    places = [{"cylinder": one.cylinder, **dict(zip(found.kinds, one.parts, strict=True))} for one in found.places]
-    return {**told, "quantiles": list(found.quantiles), "places": places}
+    details = result.details
+    assert isinstance(details, AssemblyResult)
+    record = {name: getattr(details, name) for name in ["assemblies", "looked_at", "random", "worst", "mean_parts"]}
+    places = [
+        {"cylinder": place.cylinder, **dict(zip(details.kinds, place.parts, strict=True))} for place in details.places
+    ]
+    return {**record, "quantiles": list(details.quantiles), "places": places}
 
 
 def _shares(result: Result) -> Table:
-    unit, found = objective_unit(result) or "-", result.details
-    if isinstance(found, RobustResult):
-        columns = {"best drawing": found.nominal.quantiles, "decided": found.robust.quantiles}
+    unit, details = objective_unit(result) or "-", result.details
+    if isinstance(details, RobustResult):
+        columns = {"best drawing": details.nominal.quantiles, "decided": details.robust.quantiles}
     else:
-        assert isinstance(found, AssemblyResult)
-        columns = {"assemblies at random": found.quantiles}
+        assert isinstance(details, AssemblyResult)
+        columns = {"assemblies at random": details.quantiles}
     rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
     return Table(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
 

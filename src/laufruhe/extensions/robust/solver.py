@@ -1,8 +1,8 @@
-"""Unbalances decided for the engines that tolerances allow: the least worst case, or what a share stays below.
+"""Optimum of unbalances for engines within tolerances: smallest worst case, or smallest objective of a share.
 
-The least worst case is a cone program with a sum of norms for every extreme point of the errors (R4). Only those that
-hold the design are in it: the worst engine of a design joins, the program is solved again, and what it cannot go under
-meets what no engine exceeds (R8).
+The smallest worst case is a cone program with a sum of norms for each extreme point of the errors (R4). The program has
+only the points that determine the design. The worst engine of a design joins, and the program is solved again, until
+its lower bound meets the upper bound over all engines (R8).
 """
 
 from __future__ import annotations
@@ -49,36 +49,46 @@ Solve = Callable[[Problem], Result]
 MOST_ROUNDS = 60
 MOST_SCENARIOS = 24
 COARSER = 4
-"""The program has so many times fewer angles than the fidelity at first."""
+"""Factor by which the first program has fewer samples than the fidelity."""
 SAME = 1e-9
-JOINS = 0.1
-"""Share of the tolerance by which an engine has to be worse than all in the program to join it."""
+JOIN_SHARE = 0.1
+"""Share of the tolerance by which an engine must exceed all in the program to join it."""
 MOST_MARGINS, MOST_DOUBLINGS = 3, 3
-"""Times that limits are lowered, and that the angles of the fidelity are doubled, where its own leave a gap."""
-FALLS = 0.99
-"""What is passed by limits has to fall by so much for more errors to join: else angles or margins are what it is."""
-SMALL = 1e-2
-"""Share of a limit by which what is proven may be over it for margins to help."""
-OUTER = 12
-"""Rounds in which the engines that may be above are chosen anew."""
+"""Most times that limits are lowered, and that samples of the fidelity are doubled to close a gap."""
+MIN_FALL = 0.99
+"""Ratio of violations in successive rounds below which errors join; above it, samples or margins are the cause."""
+MAX_MARGIN = 1e-2
+"""Largest relative violation that margins can remove."""
+SHARE_ROUNDS = 12
+"""Most rounds that select the engines that may exceed the objective."""
 
 
 @dataclass(frozen=True, eq=False)
 class RobustDesign:
-    """A design, what no engine of it exceeds, and what no design goes under.
+    """Design with an upper bound over its engines, and a lower bound over all designs.
 
     Attributes
     ----------
+    values
+        Values of the decisions.
+    worst
+        Worst engines of the design.
+    bound
+        Lower bound of the objective over all designs [SI].
+    active
+        Error sets that determine the design.
+    scenarios, angles
+        Counts of error sets and of samples in the program.
     samples
-        Steps over the cycle at which engines are measured.
+        Samples over the cycle for engines.
     margin
-        Share by which limits were lowered, for peaks stand between angles.
+        Share by which limits were lowered, because peaks lie between samples.
     conflict
-        Limits that no design keeps in every engine; nothing else means anything then.
+        Limits that no design satisfies in each engine; all other attributes are then undefined.
     """
 
     values: tuple[Value, ...]
-    found: WorstEngines
+    worst: WorstEngines
     bound: float
     active: ActiveErrors
     scenarios: int
@@ -89,83 +99,83 @@ class RobustDesign:
 
 
 def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
-    """Decide for the engines that tolerances allow.
+    """Return the optimum for engines within tolerances.
 
     Parameters
     ----------
     problem
-        Its unbalances may be open.
+        Problem whose unbalances may be open.
     solve
-        Decides the drawing, and each star of an open one.
+        Solve the drawing, or one star of an open crank.
 
     Raises
     ------
     ModelError
-        If anything else is open or asked.
+        If other numbers are open, or measures are not affine in the errors.
     """
     refuse(problem)
     if problem.phasing is not None:
-        found = solve_star_by_star(problem, solve)
-        # of engines as built the design as given is told as they are too
-        given = None if found.objective is None else solve(replace(problem, phasing=None, decisions=())).objective
-        if found.objective is None or given is None:
-            return found
-        return replace(found, objective=replace(found.objective, initial=given.value))
+        result = solve_star_by_star(problem, solve)
+        # the objective of the initial design is also that of built engines
+        initial = None if result.objective is None else solve(replace(problem, phasing=None, decisions=())).objective
+        if result.objective is None or initial is None:
+            return result
+        return replace(result, objective=replace(result.objective, initial=initial.value))
     over = robust_of(problem).over
     started = time.perf_counter()
     with within("drawing"):
         drawing = solve(problem.drawing)
     nonzero = tolerances_of(problem).nonzero
-    without = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
-    if without or not nonzero.tolerances:
+    is_unsolved = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
+    if is_unsolved or not nonzero.tolerances:
         return replace(drawing, problem=problem)
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalances_of(problem, drawing))
     report_progress("worst errors of the drawing")
-    adversary, minimum = _decide(problem, over, start, drawing)
-    adversary = replace(adversary, samples=minimum.samples)
-    as_given = adversary.at(problem.start, proven=False)
-    if minimum.conflict:
-        return infeasible_robust_result(problem, as_given, minimum.conflict, {"solve": time.perf_counter() - started})
+    adversary, robust = _decide(problem, over, start, drawing)
+    adversary = replace(adversary, samples=robust.samples)
+    initial_worst = adversary.at(problem.start, proven=False)
+    if robust.conflict:
+        return infeasible_robust_result(
+            problem, initial_worst, robust.conflict, {"solve": time.perf_counter() - started}
+        )
     solved = time.perf_counter()
     strength = ProofStrength.EXACT if over.share is None else ProofStrength.RELAXED
-    design = evaluate_design(problem, minimum.values, minimum.samples)
-    shown = ProofData(minimum.bound, strength, minimum.active.residual, _method(problem, minimum))
-    details = compare_designs(
-        problem, adversary, start, minimum.values, minimum.found, minimum.active, minimum.scenarios
-    )
+    design = evaluate_design(problem, robust.values, robust.samples)
+    proof = ProofData(robust.bound, strength, robust.active.residual, _method(problem, robust))
+    details = compare_designs(problem, adversary, start, robust.values, robust.worst, robust.active, robust.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    return robust_result(problem, design, as_given, minimum.found, minimum.active, shown, details, timing)
+    return robust_result(problem, design, initial_worst, robust.worst, robust.active, proof, details, timing)
 
 
 def _decide(
     problem: Problem, over: Population, start: tuple[Value, ...], drawing: Result
 ) -> tuple[Adversary, RobustDesign]:
-    """Return the adversary that fits the tolerances, and the best design against it."""
+    """Return the adversary for the tolerances, and the best design against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
     zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
-        every = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
-        return every, _minimise_worst_case(problem, every, start, zero_level)
+        adversary = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
+        return adversary, _minimise_worst_case(problem, adversary, start, zero_level)
     if over.share is None:
-        drawn = SampledEngines(problem, tolerances.draw(random, over.engines), samples)
-        return drawn, _minimise_worst_case(problem, drawn, start, zero_level)
-    drawn = SampledEngines(problem, tolerances.draw_mirrored(random, over.engines), samples)
-    found = _minimise_share(problem, drawn, start, over.share, zero_level)
-    # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
+        sampled = SampledEngines(problem, tolerances.draw(random, over.engines), samples)
+        return sampled, _minimise_worst_case(problem, sampled, start, zero_level)
+    sampled = SampledEngines(problem, tolerances.draw_mirrored(random, over.engines), samples)
+    robust = _minimise_share(problem, sampled, start, over.share, zero_level)
+    # with symmetric errors at least half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
-    found = replace(found, bound=bound if problem.decisions else found.found.bound)
+    robust = replace(robust, bound=bound if problem.decisions else robust.worst.bound)
     for _ in in_time(range(READINGS)):
-        if not is_over(found.bound, found.found.bound, zero_level):
+        if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
-        drawn = replace(drawn, samples=fine_samples(found.samples))
-        level = _quantile(drawn, found.values, over.share)
-        found = replace(found, found=replace(found.found, value=level, bound=level), samples=drawn.samples)
-    return drawn, found
+        sampled = replace(sampled, samples=fine_samples(robust.samples))
+        level = _quantile(sampled, robust.values, over.share)
+        robust = replace(robust, worst=replace(robust.worst, value=level, bound=level), samples=sampled.samples)
+    return sampled, robust
 
 
 def refuse(problem: Problem) -> None:
-    """Refuse what no method decides for built engines."""
+    """Raise ModelError for problems that no method solves for built engines."""
     phasing = problem.phasing
     if phasing is not None:
         if phasing.continuous or phasing.throw_bounds is not None:
@@ -174,7 +184,7 @@ def refuse(problem: Problem) -> None:
         return
     open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
     if open_kinds:
-        names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
+        names = ", ".join(decision.name for decision in problem.decisions if decision.kind in open_kinds)
         raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")
     if problem.engine.geared:
         raise ModelError("[robust] takes all inertia on the crank; leave [[geared_inertias]] out, or [robust]")
@@ -185,23 +195,23 @@ def refuse(problem: Problem) -> None:
             raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
-    if robust_of(problem).over.share is not None and any(m.measure.is_load for m in problem.limits):
+    if robust_of(problem).over.share is not None and any(limit.measure.is_load for limit in problem.limits):
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
-def _method(problem: Problem, found: RobustDesign) -> str:
-    over, angles = robust_of(problem).over, f"at {found.angles} angles; " if found.angles else ""
-    cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
+def _method(problem: Problem, robust: RobustDesign) -> str:
+    over, sampling = robust_of(problem).over, f"at {robust.angles} angles; " if robust.angles else ""
+    cones = f"second-order cones over {robust.scenarios} sets of errors {sampling}" if sampling else ""
     if over.share is not None:
-        bounded = "bounded by the drawing" if tolerances_of(problem).is_affine else "without a bound"
-        return f"{cones}{over.engines} drawn engines, {bounded}"
+        bound = "bounded by the drawing" if tolerances_of(problem).is_affine else "without a bound"
+        return f"{cones}{over.engines} drawn engines, {bound}"
     if tolerances_of(problem).is_affine:
         return f"{cones}every error bounded by branch and bound"
     return f"{cones}the worst of {over.engines} drawn engines, not of all"
 
 
 class _Program:
-    """The cone program of several sets of errors, as they join."""
+    """Cone program of several error sets, which grows as sets join."""
 
     def __init__(self, problem: Problem, zero_level: float) -> None:
         self.problem, self.zero_level, self.samples = problem, zero_level, problem.fidelity.samples
@@ -213,15 +223,19 @@ class _Program:
         self.conflict: tuple[str, ...] = ()
 
     def add(self, errors: Sequence[Array]) -> bool:
-        """Add sets that are not in it yet, and return whether there were any."""
-        new = [z for z in errors if all(np.abs(z - own).max(initial=0.0) > SAME for own in self.errors)]
+        """Add error sets that it lacks; return True if there are any. The least active sets leave a full program."""
+        new = [
+            error_set
+            for error_set in errors
+            if all(np.abs(error_set - entries).max(initial=0.0) > SAME for entries in self.errors)
+        ]
         while self.errors and len(self.errors) + len(new) > MOST_SCENARIOS:
-            minimum = int(np.argmin(self.shares)) if self.shares else 0
-            for own in (self.errors, self.models, self.shares):
-                del own[minimum]
-        for z in new:
-            self.errors.append(z)
-            self.models.append(AffineModel(with_errors(self.problem, z)))
+            index = int(np.argmin(self.shares)) if self.shares else 0
+            for entries in (self.errors, self.models, self.shares):
+                del entries[index]
+        for error_set in new:
+            self.errors.append(error_set)
+            self.models.append(AffineModel(with_errors(self.problem, error_set)))
             self.shares.append(1.0)
         base = common_base([model.base for model in self.models])
         for model in self.models:
@@ -229,83 +243,83 @@ class _Program:
         return bool(new)
 
     def lower(self, violation: float) -> None:
-        """Lower limits by a little more than what one is passed by."""
+        """Lower limits by slightly more than a relative violation."""
         self.margin, self.margins = self.margin + 1.05 * violation, self.margins + 1
 
     @property
     def angles(self) -> int:
-        """Angles of the fidelity within the period of all loads."""
+        """Samples of the fidelity within the common period of all loads."""
         return max(model.full_samples for model in self.models)
 
     def at(self, samples: int, averaged: bool = False) -> tuple[AffineProblem, list[tuple[int, Limit]]]:
-        """Return all sets at so many angles, and of every limit the set and the limit that it is of."""
+        """Return the program of all error sets at `samples`, and the set index and the limit of each of its limits."""
         parts = [model.at(samples, averaged) for model in self.models]
-        limits = [(k, limit, own) for k, part in enumerate(parts)
-                  for limit, own in zip(self.problem.load_limits, part.limits, strict=True)
-                  if k == 0 or limit.measure.is_load]  # fmt: skip
+        limits = [(set_index, limit, affine_limit) for set_index, part in enumerate(parts)
+                  for limit, affine_limit in zip(self.problem.load_limits, part.limits, strict=True)
+                  if set_index == 0 or limit.measure.is_load]  # fmt: skip
         return AffineProblem(
             tuple(term for part in parts for term in part.terms),
-            tuple(own for _, _, own in limits),
+            tuple(affine_limit for _, _, affine_limit in limits),
             parts[0].domains,
             samples,
-            tuple(k for k, part in enumerate(parts) for _ in part.terms),
-        ), [(k, limit) for k, limit, _ in limits]
+            tuple(set_index for set_index, part in enumerate(parts) for _ in part.terms),
+        ), [(set_index, limit) for set_index, limit, _ in limits]
 
     def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
-        """Return its optimum and the bound of all designs; None where no design keeps the limits at these angles."""
+        """Return the optimum and a lower bound over all designs; None if no design satisfies the sampled limits."""
         coarse, owners = self.at(samples)
         coarse = tighten_limits(coarse, self.margin)
         solution = solve_cones(coarse)
         if solution.x is None:
-            # margins, and means of a few angles, forbid what is allowed (P7)
+            # margins and coarse samples of means are stricter than the limits, so check for a real conflict (P7)
             averaged, _ = self.at(samples, averaged=True)
             names = [limit.name for _, limit in owners]
             self.conflict = tuple(dict.fromkeys(smallest_conflict(averaged, names))) if is_infeasible(averaged) else ()
             return None
         shares = solution.shares
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
-        told = replace(solution.multipliers, terms=terms)
+        active_multipliers = replace(solution.multipliers, terms=terms)
         fine, _ = self.at(2 * max(self.angles, samples), averaged=True)
-        weighed = fine.shared(shares)
-        bound = best_bound(weighed, solution.x, told)
+        weighted = fine.shared(shares)
+        bound = best_bound(weighted, solution.x, active_multipliers)
         self.shares = [float(share) for share in shares]
-        prices = bound.multipliers.shadow_prices(weighed)
-        residual = kkt_residual(weighed, solution.x, bound)
-        of = [[(limit, price) for (owner, limit), price in zip(owners, prices, strict=True) if owner == k]
+        prices = bound.multipliers.shadow_prices(weighted)
+        residual = kkt_residual(weighted, solution.x, bound)
+        prices_by_set = [[(limit, price) for (owner, limit), price in zip(owners, prices, strict=True) if owner == k]
               for k in range(len(self.errors))]  # fmt: skip
-        self.active = ActiveErrors(tuple(self.errors), tuple(self.shares), tuple(map(tuple, of)), residual)
+        self.active = ActiveErrors(tuple(self.errors), tuple(self.shares), tuple(map(tuple, prices_by_set)), residual)
         return tuple(domain.complex_value(solution.x) for domain in coarse.domains), bound.value
 
     def level(self, values: Sequence[Value]) -> float:
-        """Return the largest objective of a design with the errors that are in it."""
-        found = (evaluate_built(model.problem, values, self.samples) for model in self.models)
-        return max(objective_value(self.problem, each) for each in found)
+        """Return the largest objective of a design over the error sets of the program."""
+        evaluations = (evaluate_built(model.problem, values, self.samples) for model in self.models)
+        return max(objective_value(self.problem, evaluation) for evaluation in evaluations)
 
 
 def _minimise_worst_case(
     problem: Problem, adversary: Adversary, start: tuple[Value, ...], zero_level: float
 ) -> RobustDesign:
-    """Return the design whose worst engine is least, from a given one (R8)."""
-    found = adversary.at(start, proven=not problem.decisions)
-    best = RobustDesign(start, found, 0.0, ActiveErrors((found.errors[0],), (1.0,), ((),)), 1, 0, adversary.samples)
+    """Return the design with the smallest worst case, from an initial design (R8)."""
+    worst = adversary.at(start, proven=not problem.decisions)
+    best = RobustDesign(start, worst, 0.0, ActiveErrors((worst.errors[0],), (1.0,), ((),)), 1, 0, adversary.samples)
     if not problem.decisions:
-        # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
-        engine = evaluate_built(with_errors(problem, found.errors[0]), start, adversary.samples)
-        best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=found.broken)
+        # without decisions the worst engine found gives both the bound and the violated limits
+        engine = evaluate_built(with_errors(problem, worst.errors[0]), start, adversary.samples)
+        best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=worst.violated)
         return _refine_sampling(adversary, best, zero_level)
     program, values, bound = _Program(problem, zero_level), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
-    samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
+    samples, level, previous_violation, is_solved = program.angles // COARSER, 0.0, math.inf, True
     for _ in in_time(range(MOST_ROUNDS)):
-        is_worse = found.value > level * (1.0 + JOINS * problem.tolerance)
-        is_new = known and (is_worse or FEASIBLE < found.violation < FALLS * before)
-        if is_new and program.add(found.errors):
-            samples, before = max(samples, program.angles // COARSER), found.violation
-        elif known and found.violation > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
-            # it knows all engines that hold this design, and peaks stand between its angles: limits a little lower
-            program.lower(found.violation)
+        is_worse = worst.value > level * (1.0 + JOIN_SHARE * problem.tolerance)
+        is_new = is_solved and (is_worse or FEASIBLE < worst.violation < MIN_FALL * previous_violation)
+        if is_new and program.add(worst.errors):
+            samples, previous_violation = max(samples, program.angles // COARSER), worst.violation
+        elif is_solved and worst.violation > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+            # all active engines are in the program, so peaks lie between samples: lower the limits slightly
+            program.lower(worst.violation)
         else:
-            samples, program.margin, program.margins, before = 2 * samples, 0.0, 0, math.inf
+            samples, program.margin, program.margins, previous_violation = 2 * samples, 0.0, 0, math.inf
             if samples > program.angles << MOST_DOUBLINGS:
                 break
             if samples > program.angles:
@@ -314,48 +328,48 @@ def _minimise_worst_case(
         solved = program.solved(samples)
         if program.conflict:
             return replace(best, conflict=program.conflict)
-        known = solved is not None
+        is_solved = solved is not None
         if solved is None:
             continue
-        values, own = solved
-        bound, level = max(bound, own), program.level(values)
-        found = adversary.at(values, proven=False)
-        if gap_of(found.value, bound, zero_level) <= problem.tolerance and found.violation <= FEASIBLE:
-            found = adversary.at(values, proven=True)
-        each = RobustDesign(
-            values, found, bound, program.active, len(program.errors), samples, adversary.samples, program.margin
+        values, lower_bound = solved
+        bound, level = max(bound, lower_bound), program.level(values)
+        worst = adversary.at(values, proven=False)
+        if gap_of(worst.value, bound, zero_level) <= problem.tolerance and worst.violation <= FEASIBLE:
+            worst = adversary.at(values, proven=True)
+        candidate = RobustDesign(
+            values, worst, bound, program.active, len(program.errors), samples, adversary.samples, program.margin
         )
-        best = min(best, each, key=lambda one: (one.found.violation > KEPT, one.found.value))
-        if gap_of(found.bound, bound, zero_level) <= problem.tolerance and found.violation <= FEASIBLE:
+        best = min(best, candidate, key=lambda design: (design.worst.violation > KEPT, design.worst.value))
+        if gap_of(worst.bound, bound, zero_level) <= problem.tolerance and worst.violation <= FEASIBLE:
             break
-    if not best.found.proven or best.samples < adversary.samples:
-        best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
+    if not best.worst.proven or best.samples < adversary.samples:
+        best = replace(best, worst=adversary.at(best.values, proven=True), samples=adversary.samples)
     return _refine_sampling(adversary, replace(_keep_limits(program, adversary, best), bound=bound), zero_level)
 
 
 def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float) -> RobustDesign:
     for _ in in_time(range(READINGS)):
-        if not is_over(best.bound, best.found.bound, zero_level):
+        if not is_over(best.bound, best.worst.bound, zero_level):
             break
         adversary = replace(adversary, samples=fine_samples(best.samples))
-        best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
+        best = replace(best, worst=adversary.at(best.values, proven=True), samples=adversary.samples)
     return best
 
 
 def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) -> RobustDesign:
-    """Lower limits a little until the proven bound of a design keeps them, where only the bound breaks them."""
+    """Lower limits until the proven bound of a design satisfies them, if the bound alone violates them."""
     program.margin = best.margin
     for _ in in_time(range(MOST_MARGINS)):
-        if not KEPT < best.found.violation <= SMALL:
+        if not KEPT < best.worst.violation <= MAX_MARGIN:
             break
-        program.lower(best.found.violation)
-        # of the design as given no program is known yet
+        program.lower(best.worst.violation)
+        # the initial design has no program yet
         solved = program.solved(best.angles or program.angles)
         if solved is None:
             break
-        found = adversary.at(solved[0], proven=True)
-        if found.violation < best.found.violation:
-            best = replace(best, values=solved[0], found=found, active=program.active)
+        worst = adversary.at(solved[0], proven=True)
+        if worst.violation < best.worst.violation:
+            best = replace(best, values=solved[0], worst=worst, active=program.active)
     return best
 
 
@@ -366,17 +380,17 @@ def _quantile(adversary: SampledEngines, values: Sequence[Value], share: float) 
 def _minimise_share(
     problem: Problem, adversary: SampledEngines, start: tuple[Value, ...], share: float, zero_level: float
 ) -> RobustDesign:
-    """Return the design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
-    below = math.ceil(share * len(adversary.errors))
+    """Return the design with the smallest objective of a share of random engines that the search finds (R9)."""
+    count = math.ceil(share * len(adversary.errors))
     values, best = start, None
-    for _ in in_time(range(OUTER)):
+    for _ in in_time(range(SHARE_ROUNDS)):
         order = np.argsort(adversary.objective(values), kind="stable")
-        lower_share = adversary.subset(order[:below])
-        each = _minimise_worst_case(problem, lower_share, values, zero_level)
-        if best is not None and each.found.value >= best.found.value * (1.0 - SAME):
+        lower_share = adversary.subset(order[:count])
+        candidate = _minimise_worst_case(problem, lower_share, values, zero_level)
+        if best is not None and candidate.worst.value >= best.worst.value * (1.0 - SAME):
             break
-        best, values = each, each.values
+        best, values = candidate, candidate.values
     if best is None:
         raise ModelError("no design was found within the time limit; raise it")
     level = _quantile(adversary, best.values, share)
-    return replace(best, found=replace(best.found, value=level, bound=level), samples=adversary.samples)
+    return replace(best, worst=replace(best.worst, value=level, bound=level), samples=adversary.samples)

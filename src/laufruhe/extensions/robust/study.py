@@ -1,8 +1,8 @@
-"""Free forces that manufacturing tolerances leave, at their worst and at random, and what they do to the mounts.
+"""Free forces from manufacturing tolerances, at their worst and at random, and their effect on mount forces.
 
-Hasselgruber 1964, on errors of balancing: all tolerances at their limits, summed
-algebraically, make about 100 kp where the second order of a four-cylinder makes 1000 kp;
-so finer balancing promises nothing for engines of fewer than six cylinders.
+Hasselgruber 1964, on errors of balancing: all tolerances at their limits, summed algebraically, make about 100 kp where
+the second order of a four-cylinder makes 1000 kp. So finer balancing promises nothing for engines of fewer than six
+cylinders.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
 CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0
 MOUNTED = 200
-"""Most engines whose mount forces are evaluated: one costs as much as a thousand free forces."""
+"""Most engines with mount forces: each costs as much as a thousand free forces."""
 LEAST, TALL = 0.1, 0.7
-"""Left end of the axis [kp]; what is smaller stands there with its value. Height of a density over that of a row."""
+"""Left end of the axis [kp], where smaller forces are drawn; height of a density over that of a row."""
 _TOP, _STEP = -0.55, 0.3
-"""Where the words above all rows stand, the first one lowest, in rows."""
+"""Position of the lowest label above the rows, and distance of labels, in rows."""
 
 
 class StudyTolerancesTable(Table):
@@ -63,29 +63,30 @@ class StudyTolerancesTable(Table):
     def _is_something(self) -> StudyTolerancesTable:
         aligned = self.alignment * sum(self.aligned_masses)
         if not self.reciprocating_mass + self.unbalance + aligned > 0.0:
-            raise f.refusal("leave nothing to chance; give one above zero (alignment needs aligned_masses)")
+            raise f.refusal("are all zero; give one above zero (alignment needs aligned_masses)")
         return self
 
     def of(self, engine: Engine) -> Tolerances:
-        """Return what of an engine they move, one for each cause that has a size.
+        """Return the tolerances of an engine, one for each cause with a size above zero.
 
-        Balancing planes stand from the first throw to the last, what is centred on the crank at
-        the last: the end where power is taken off (C3).
+        Balancing planes stand from the first throw to the last. Aligned masses stand at the last throw, where power is
+        taken off (C3).
         """
         front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
         places = [float(x) for x in np.linspace(front, rear, self.planes)]
         pistons = [Error(part.name, (PistonDrive(k, self.reciprocating_mass),))
                    for k, part in enumerate(engine.slider_cranks)]  # fmt: skip
-        left = [_left(f"left unbalance {k + 1}", x, self.unbalance) for k, x in enumerate(places)]
+        unbalances = [_added_error(f"left unbalance {k + 1}", x, self.unbalance) for k, x in enumerate(places)]
         aligned = [
-            _left(f"alignment {k + 1}", rear, mass * self.alignment) for k, mass in enumerate(self.aligned_masses)
+            _added_error(f"alignment {k + 1}", rear, mass * self.alignment)
+            for k, mass in enumerate(self.aligned_masses)
         ]
         sizes = (self.reciprocating_mass, self.unbalance, self.alignment * sum(self.aligned_masses))
-        causes = zip(CAUSES, ("kg", "kg m", "kg m"), sizes, (pistons, left, aligned), strict=True)
+        causes = zip(CAUSES, ("kg", "kg m", "kg m"), sizes, (pistons, unbalances, aligned), strict=True)
         return Tolerances(tuple(Cause(name, unit, size, tuple(errors)) for name, unit, size, errors in causes)).nonzero
 
 
-def _left(name: str, x: float, maximum: float) -> Error:
+def _added_error(name: str, x: float, maximum: float) -> Error:
     return Error(name, (AddedDrive(name, x, maximum),), 2)
 
 
@@ -96,50 +97,50 @@ def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
 def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array:
     point, steps = OperatingPoint("", speed), ANGLES * engine.cycle.turns
     engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
-    # over one and the same period: an engine without errors may repeat within it
-    loads = over(engine.cycle.base_order, [shaking_loads(one, point) for one in engines])
-    drawn, *each = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
-    return np.array([forces - drawn for forces in each]).reshape(tolerances.count, steps, 2)
+    # an engine without errors may have a shorter period, so use that of the cycle
+    loads = over(engine.cycle.base_order, [shaking_loads(variant, point) for variant in engines])
+    drawn, *unit_errors = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
+    return np.array([forces - drawn for forces in unit_errors]).reshape(tolerances.count, steps, 2)
 
 
 def worst_parts(engine: Engine, speed: float, tolerances: StudyTolerancesTable) -> dict[str, float]:
-    """Bound the free force [N] of each kind of tolerance, all of that kind at their limits (R4).
+    """Return the largest free force [N] of each cause, with all its errors at their limits (R4).
 
-    Unbalances may point anywhere, so the parts add up to the worst of all together.
+    Unbalances may have any angle, so the sum of all causes is the worst case.
     """
-    found, own = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0)
-    added = _added_forces(engine, speed, found)
-    for cause in found.tolerances:
-        slope = np.ascontiguousarray(np.moveaxis(added[found.columns_of(cause.name)], 0, -1))
+    tolerance_set, forces = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0)
+    added = _added_forces(engine, speed, tolerance_set)
+    for cause in tolerance_set.tolerances:
+        slope = np.ascontiguousarray(np.moveaxis(added[tolerance_set.columns_of(cause.name)], 0, -1))
         zero, steps = np.zeros(slope.shape[:2]), len(slope)
         norm = AffineNorm(MAXIMUM, zero, slope, Grid(np.full(steps, 1.0 / steps), steps))
         columns = Tolerances((cause,)).columns
-        own[cause.name] = worst_case([(1.0, norm)], columns, CLOSE).bound
-    return own
+        forces[cause.name] = worst_case([(1.0, norm)], columns, CLOSE).bound
+    return forces
 
 
 def random_forces(engine: Engine, speed: float, tolerances: StudyTolerancesTable, builds: int, seed: int) -> Array:
-    """Return the largest free force over the cycle [N] of each of many engines, the nominal force left out.
+    """Return the largest free force over the cycle that errors add to each random engine [N], shape (builds,).
 
-    Masses are even over their tolerance, unbalances even over their disc.
+    Masses are uniform within their tolerance, unbalances within their disc.
     """
-    found = tolerances.of(engine)
-    added, errors = _added_forces(engine, speed, found), found.draw(np.random.default_rng(seed), builds)
-    # in pieces: all engines at once would take gigabytes
+    tolerance_set = tolerances.of(engine)
+    added, errors = _added_forces(engine, speed, tolerance_set), tolerance_set.draw(np.random.default_rng(seed), builds)
+    # in parts: all engines at once would take gigabytes
     pieces = (np.tensordot(errors[k : k + PIECE], added, axes=1) for k in range(0, builds, PIECE))
     return np.concatenate([np.hypot(forces[..., 0], forces[..., 1]).max(axis=1) for forces in pieces])
 
 
 def built(engine: Engine, tolerances: StudyTolerancesTable, random: np.random.Generator) -> Engine:
-    """Return one engine out of many, for the exact model."""
-    found = tolerances.of(engine)
-    return _built(engine, found, found.draw(random, 1)[0])
+    """Return one random engine for the exact model."""
+    tolerance_set = tolerances.of(engine)
+    return _built(engine, tolerance_set, tolerance_set.draw(random, 1)[0])
 
 
 def mean_mount_forces(
     problem: Problem, tolerances: StudyTolerancesTable, builds: int, seed: int
 ) -> tuple[float, Array]:
-    """Return the mean mount force [N] of the engine as drawn, and of each of many as built."""
+    """Return the mean mount force [N] of the drawing, and of random engines, shape (builds,)."""
     random = np.random.default_rng(seed)
     drawn = evaluate(problem).value(MEAN_MOUNT_FORCE)
     engines = (built(problem.engine, tolerances, random) for _ in range(builds))
@@ -147,11 +148,11 @@ def mean_mount_forces(
 
 
 def spread(problem: Problem, tolerances: StudyTolerancesTable, builds: int = 10_000, seed: int = 1964) -> Record:
-    """Return what tolerances do to the free force of one engine [N], at its crank speed [rad/s].
+    """Return the free force [N] of an engine under tolerances, at its crank speed [rad/s].
 
-    The largest over the cycle of the drawing (`nominal`), the worst that each cause adds, the mean of what is added at
-    random, and what each share (SHARES) of engines stays below. Of the mean mount force the same, as drawn (`mount`)
-    and at random; NaN without mounts.
+    Keys: largest over the cycle of the drawing (`nominal`), worst addition by each cause (`causes`), mean and quantiles
+    at SHARES of the random additions (`mean`, `random`), mean mount force of the drawing and quantiles of random
+    engines (`mount`, `mount_random`); NaN without mounts.
     """
     engine, point = problem.engine, problem.points[0]
     drawn = random_forces(engine, point.speed, tolerances, builds, seed)
@@ -188,7 +189,7 @@ class ToleranceCase(CaseTable):
 
 
 class MarkTable(Table):
-    """A force that the picture shows beside those computed."""
+    """Force that the picture shows for comparison."""
 
     name: Name
     force: f.Force
@@ -205,11 +206,11 @@ class ToleranceStudy(Part):
     marks: list[MarkTable] = Field(default_factory=list)
 
     def settings(self) -> dict[str, Any]:
-        """Return what random engines hang on; marks are for pictures."""
+        """Return the settings that random engines depend on; marks are for pictures alone."""
         return self.model_dump(include={"kind", "tolerances", "engines", "seed"})
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Return every engine, at its one operating point."""
+        """Return one point for each engine, at its single operating point."""
         for case in self.cases:
             if len(scenes.problem(Point(case)).points) != 1:
                 rule = f"has several in '{case.name}', and tolerances are studied at one"
@@ -217,32 +218,34 @@ class ToleranceStudy(Part):
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return the spread of one engine."""
+        """Return the record of one engine, as `spread` does."""
         return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return engines side by side, with what is claimed of them."""
+        """Return a data set of all engines with the claims of the source."""
         names, forces = [mark.name for mark in self.marks], [mark.force for mark in self.marks]
-        shown = {"mark_names": names, "mark_forces": forces} if names else {}
-        values = {name: variable("case", [one[name] for one in records], *words) for name, words in _WORDS.items()}
+        marks = {"mark_names": names, "mark_forces": forces} if names else {}
+        values = {
+            name: variable("case", [record[name] for record in records], *words) for name, words in _WORDS.items()
+        }
         for cause in CAUSES:
-            sizes = [one["causes"][cause] for one in records]
+            sizes = [record["causes"][cause] for record in records]
             values[f"worst_{cause.replace(' ', '_')}"] = variable("case", sizes, f"from {cause} alone", "N")
-        worst = [sum(one["causes"].values()) for one in records]
+        worst = [sum(record["causes"].values()) for record in records]
         values["worst"] = variable("case", worst, "largest free force that tolerances add", "N")
         for name, words in _RANDOM.items():
-            values[name] = variable(("case", "share"), [one[name] for one in records], words, "N")
+            values[name] = variable(("case", "share"), [record[name] for record in records], words, "N")
         coords = {
             "case": [point.case.name for point in points],
             "share": variable("share", SHARES, "share of random engines that stay below"),
-            "speed": ("case", [one["speed"] for one in records], {"units": "rad/s"}),
+            "speed": ("case", [record["speed"] for record in records], {"units": "rad/s"}),
             "claim": ("case", [case.claim or "" for case in self.cases]),
         }
-        return xr.Dataset(values, coords, self.about(seed=self.seed, engines=self.engines, **shown))
+        return xr.Dataset(values, coords, self.about(seed=self.seed, engines=self.engines, **marks))
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return nominal, worst and random free forces of every engine [kp], cause by cause, and what was said."""
+        """Return tables of free forces by engine and cause [kp], and of claims with verdicts."""
         head = ["engine", "drawing [kp]", "worst sum [kp]", *(f"of it {cause} [kp]" for cause in CAUSES)]
         head += ["random: mean [kp]", "95 % below [kp]", "drawing over worst sum"]
         head += ["mean mount force, drawing [kp]", "95 % of built engines: at most"]
@@ -251,15 +254,15 @@ class ToleranceStudy(Part):
             row = data.sel(case=name)
             nominal, worst = float(row["nominal"]) / GRAVITY, float(row["worst"]) / GRAVITY
             parts = [f"{float(row['worst_' + cause.replace(' ', '_')]) / GRAVITY:.1f}" for cause in CAUSES]
-            often = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
+            quantile = float(row["random"].sel(share=0.95, method="nearest")) / GRAVITY
             cells = [str(name), number(nominal, 3), f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
-            cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
+            cells += [f"{quantile:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
             rows.append([*cells, percent(rise_of(row))])
         return [marked_table(head, rows), *statement_table(verdicts(data))]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Return the density over random engines, worst sum, and the free force of the drawing, a row an engine."""
+        """Return a picture with a row for each engine: density of random engines, worst sum, and drawing."""
         rows = [data.sel(case=name) for name in data["case"].values]
         stated = np.atleast_1d(data.attrs.get("mark_forces", []))
         maximum = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
@@ -281,13 +284,12 @@ class ToleranceStudy(Part):
 
 
 def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
-    """Judge what the source says of finer balancing, engine by engine, confirmed or not.
+    """Return a verdict on each claim of the source about finer balancing.
 
-    It promises nothing where tolerances hardly move the mean mount force: engines built
-    without any could not be told from nineteen of twenty built with them (W1 of
-    docs/findings/economics.md).
+    Finer balancing "promises nothing" if tolerances raise the mean mount force of 95 of 100 engines by less than a
+    negligible share (W1 of docs/findings/economics.md).
     """
-    found = []
+    result = []
     why = f"W1: under {100.0 * NEGLIGIBLE:.0f} % at 95 of 100 engines built"
     for name in data["case"].values:
         row = data.sel(case=name)
@@ -295,14 +297,14 @@ def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
         if claim:
             agrees = (rise < NEGLIGIBLE) == (claim == "promises nothing")
             statement, unit = f"finer balancing, {name}", "% of the mean mount force"
-            found.append(Verdict(statement, claim, 100.0 * rise, unit, agrees, why))
-    return tuple(found)
+            result.append(Verdict(statement, claim, 100.0 * rise, unit, agrees, why))
+    return tuple(result)
 
 
 def rise_of(row: xr.Dataset) -> float:
-    """Share by which the mean mount force of 95 of 100 built engines is at most over that of the drawing."""
-    often = float(row["mount_random"].sel(share=0.95, method="nearest"))
-    return often / float(row["mount"]) - 1.0
+    """Return the relative rise of the mean mount force at the 95 % quantile of built engines over the drawing."""
+    quantile = float(row["mount_random"].sel(share=0.95, method="nearest"))
+    return quantile / float(row["mount"]) - 1.0
 
 
 def _label(row: xr.Dataset) -> str:
@@ -334,10 +336,10 @@ def _density(quantiles: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.
 
 def _marks(data: xr.Dataset, count: int) -> list[p.Mark]:
     names, forces = (np.atleast_1d(data.attrs.get(key, [])) for key in ("mark_names", "mark_forces"))
-    found: list[p.Mark] = []
-    # long names of two neighbours would touch on one line
+    marks: list[p.Mark] = []
+    # labels alternate between two heights, so that long names do not overlap
     for k, (name, force) in enumerate(zip(names, forces / GRAVITY if len(forces) else forces, strict=True)):
         top = _TOP - _STEP * (k % 2)
-        found.append(p.Line([force] * 2, [top, count - 0.5], "faint", width=1.2, dash=(3.0, 2.0), behind=True))
-        found.append(p.Words(force, top, f"{name}: {force:.0f}", colour="faint", across="center", along="bottom"))
-    return found
+        marks.append(p.Line([force] * 2, [top, count - 0.5], "faint", width=1.2, dash=(3.0, 2.0), behind=True))
+        marks.append(p.Words(force, top, f"{name}: {force:.0f}", colour="faint", across="center", along="bottom"))
+    return marks

@@ -1,8 +1,8 @@
-"""Tolerances: how far the numbers of a built engine stand from those of its drawing, and what of it moves with them.
+"""Tolerances: errors of the numbers of a built engine, and the parts of an engine that they change.
 
-Every tolerance is a list of independent errors, counted in their largest size: a real error lies between -1 and 1,
-an unbalance of any angle in the unit disc. A problem with given errors is a problem again, so that all that
-evaluates, bounds or decides a drawing does the same for a built engine (R2).
+A tolerance is a list of independent errors in units of their largest size: a real error lies between -1 and 1, an
+unbalance of any angle in the unit disc. A problem with fixed errors is an ordinary problem again, so that all methods
+for drawings also apply to built engines (R2).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from laufruhe.problem.decision import RotorDrive
 from laufruhe.problem.problem import Drawing, Extra, Path, Problem, Rebuild, no_file
 
 SIGMAS = 3.0
-"""Standard deviations of a normal law that the tolerance is; what lies beyond is not built in."""
+"""Tolerance over standard deviation of the normal law; errors beyond the tolerance are rejected."""
 
 
 class Law(StrEnum):
@@ -32,33 +32,33 @@ class Law(StrEnum):
 
 
 class Scope(StrEnum):
-    """Extent of an error: each piece has one of its own, or all have the same."""
+    """Extent of an error: one for each piece, or one for the batch."""
 
     PIECE = "piece"
     BATCH = "batch"
 
 
 class ErrorDrive(Protocol):
-    """Part of an engine that an error moves."""
+    """Part of an engine that an error changes."""
 
     @property
     def is_affine(self) -> bool:
-        """Return whether every load is affine in it together with all others of which the same is true."""
+        """True if all loads are affine in this error, jointly with all other affine errors."""
 
-    def moved(self, drawing: Drawing, error: complex, /) -> Drawing:
-        """Return the drawing with this error, in units of its largest size."""
+    def with_error(self, drawing: Drawing, error: complex, /) -> Drawing:
+        """Return the drawing with an error, in units of its largest size."""
 
 
 @dataclass(frozen=True)
 class PistonDrive:
-    """Reciprocating mass of one slider-crank += gain x error (L2, L3)."""
+    """Error of the reciprocating mass of one slider-crank: mass += gain x error (L2, L3)."""
 
     cylinder: int
     gain: float
     is_affine: ClassVar[bool] = True
 
-    def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with the mass of one cylinder moved."""
+    def with_error(self, drawing: Drawing, error: complex) -> Drawing:
+        """Return the drawing with the error in the mass of one cylinder."""
         parts = list(drawing.engine.slider_cranks)
         part = parts[self.cylinder]
         mass = part.reciprocating_mass + self.gain * error.real
@@ -68,7 +68,7 @@ class PistonDrive:
 
 @dataclass(frozen=True)
 class AddedDrive:
-    """An unbalance gain x error beside those of the drawing (L1)."""
+    """Unbalance gain x error, added to those of the drawing (L1)."""
 
     name: str
     x: float
@@ -76,51 +76,54 @@ class AddedDrive:
     shaft: Shaft = CRANKSHAFT
     is_affine: ClassVar[bool] = True
 
-    def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with one rotor more."""
+    def with_error(self, drawing: Drawing, error: complex) -> Drawing:
+        """Return the drawing with one more rotor."""
         return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, self.rotor(error))))
 
     def rotor(self, error: complex) -> Rotor:
-        """Return the rotor that is added."""
+        """Return the added rotor."""
         return Rotor(self.name, self.x, self.gain * error, self.shaft, Role.THROW)
 
 
 @dataclass(frozen=True)
 class ShareDrive:
-    """An unbalance U and all that decides it, times 1 + share x error (R3)."""
+    """Relative error of an unbalance and of the drives of its decisions: factor 1 + share x error (R3)."""
 
     rotor: str
     share: float
     is_affine: ClassVar[bool] = True
 
-    def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with the rotor, and what drives it, moved."""
+    def with_error(self, drawing: Drawing, error: complex) -> Drawing:
+        """Return the drawing with the rotor, and the drives of its decisions, times the factor."""
         factor = 1.0 + self.share * error.real
         rotors = tuple(
-            replace(r, unbalance=factor * r.unbalance) if r.name == self.rotor else r for r in drawing.engine.rotors
+            replace(rotor, unbalance=factor * rotor.unbalance) if rotor.name == self.rotor else rotor
+            for rotor in drawing.engine.rotors
         )
         decisions = tuple(
-            replace(d, drives=tuple(
-                replace(v, gain=factor * v.gain) if isinstance(v, RotorDrive) and v.rotor == self.rotor else v
-                for v in d.drives
+            replace(decision, drives=tuple(
+                replace(drive, gain=factor * drive.gain)
+                if isinstance(drive, RotorDrive) and drive.rotor == self.rotor
+                else drive
+                for drive in decision.drives
             ))
-            for d in drawing.decisions
+            for decision in drawing.decisions
         )  # fmt: skip
         return replace(drawing, engine=replace(drawing.engine, rotors=rotors), decisions=decisions)
 
 
 @dataclass(frozen=True)
 class FileDrive:
-    """A number of the problem file += gain x error; the problem is put together anew.
+    """Error of a number of the problem file: number += gain x error; the problem is built again from the file.
 
     Attributes
     ----------
     path
-        Where the number stands.
+        Keys of the number.
     number, gain
-        The drawing's and the largest error, in the unit of the file.
+        Number of the drawing and largest error, in the unit of the file.
     unit
-        Of the file; empty for a plain number.
+        Unit in the file; "" for a plain number.
     """
 
     path: Path
@@ -129,12 +132,12 @@ class FileDrive:
     unit: str
     is_affine: ClassVar[bool] = False
 
-    def moved(self, drawing: Drawing, _: complex) -> Drawing:
-        """Return the drawing as it is: files put the problem together."""
+    def with_error(self, drawing: Drawing, _: complex) -> Drawing:
+        """Return the drawing unchanged, because the file builds it."""
         return drawing
 
     def written(self, error: complex) -> str | float:
-        """Return the number as a file has it."""
+        """Return the number as written in a file."""
         value = self.number + self.gain * error.real
         return f"{value!r} {self.unit}" if self.unit else value
 
@@ -146,11 +149,11 @@ class Error:
     Attributes
     ----------
     name
-        Of what has it.
+        Part that has the error.
     drives
-        All that moves with it.
+        Changes by the error.
     width
-        One real number, or two for an unbalance of any angle.
+        1 for a real number, 2 for an unbalance of any angle.
     """
 
     name: str
@@ -159,26 +162,28 @@ class Error:
 
     @property
     def is_affine(self) -> bool:
-        """Return whether every load is affine in it."""
+        """True if all loads are affine in it."""
         return all(drive.is_affine for drive in self.drives)
 
 
 @dataclass(frozen=True)
 class Tolerance:
-    """A number of the drawing and how far it may be off.
+    """Tolerance of a number of the drawing.
 
     Attributes
     ----------
     name
-        The key of the file.
+        Key of the file.
     unit
-        SI; "" where it is a share.
+        SI unit; "" for a share.
     size
         Largest error [SI].
     errors
         One for each piece, or one for the batch.
+    law, scope
+        Distribution and extent of the errors.
     scale
-        Times its own size that it is taken at.
+        Factor of its size, for prices.
     """
 
     name: str
@@ -190,7 +195,7 @@ class Tolerance:
     scale: float = 1.0
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
-        """Draw errors of many engines, shape (count, columns), even over interval or disc, or normal within it."""
+        """Return random errors, shape (count, columns): uniform in interval or disc, or normal and truncated."""
         parts = [self._one(random, count, error.width) for error in self.errors]
         return np.concatenate(parts, axis=1)
 
@@ -204,24 +209,24 @@ class Tolerance:
 
 
 def _normal(random: np.random.Generator, count: int, width: int) -> Array:
-    found = random.normal(0.0, 1.0 / SIGMAS, (count, width))
-    while (out := np.hypot.reduce(found, axis=1) > 1.0).any():
-        found[out] = random.normal(0.0, 1.0 / SIGMAS, (int(out.sum()), width))
-    return found
+    errors = random.normal(0.0, 1.0 / SIGMAS, (count, width))
+    while (is_outside := np.hypot.reduce(errors, axis=1) > 1.0).any():
+        errors[is_outside] = random.normal(0.0, 1.0 / SIGMAS, (int(is_outside.sum()), width))
+    return errors
 
 
 @dataclass(frozen=True)
 class Population:
-    """Choice of the built engines that what is minimised and limited is taken of.
+    """Engines over which objective and limits are taken.
 
     Attributes
     ----------
     share
-        Of built engines that are to stay below; None for the worst that tolerances allow.
+        Share of engines that must not exceed the objective; None for the worst case.
     engines
-        Drawn where a share is minimised, or where the worst case is sought among drawn ones.
+        Count of random engines, if the objective needs them.
     seed
-        Of these; those that certify have another.
+        Seed of these engines; those of the comparison have another.
     """
 
     share: float | None = None
@@ -229,7 +234,7 @@ class Population:
     seed: int = 0
 
     def named(self, measure: str, is_affine: bool) -> str:
-        """Return the name of the objective with the engines that count."""
+        """Return the name of the objective, with the engines that it covers."""
         if self.share is not None:
             return f"{measure}, {100.0 * self.share:g} % of engines below"
         return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
@@ -237,7 +242,7 @@ class Population:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Tolerances of a problem, their errors side by side in one vector.
+    """Tolerances of a problem; all their errors form one vector.
 
     Attributes
     ----------
@@ -249,8 +254,10 @@ class Tolerances:
 
     @property
     def nonzero(self) -> Tolerances:
-        """Tolerances but those of no size."""
-        return replace(self, tolerances=tuple(t for t in self.tolerances if t.size * t.scale > 0.0))
+        """Tolerances with a size above zero."""
+        return replace(
+            self, tolerances=tuple(tolerance for tolerance in self.tolerances if tolerance.size * tolerance.scale > 0.0)
+        )
 
     @cached_property
     def errors(self) -> tuple[Error, ...]:
@@ -259,7 +266,7 @@ class Tolerances:
 
     @cached_property
     def columns(self) -> tuple[slice, ...]:
-        """Columns of every error in the vector of all."""
+        """Slice of each error in the vector of all errors."""
         ends = np.cumsum([0, *(error.width for error in self.errors)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -270,11 +277,11 @@ class Tolerances:
 
     @property
     def is_affine(self) -> bool:
-        """Return whether every load is affine in all errors together."""
+        """True if all loads are affine in all errors jointly."""
         return all(error.is_affine for error in self.errors)
 
     def columns_of(self, name: str) -> slice:
-        """Return the columns of one tolerance in the vector of all errors."""
+        """Return the slice of one tolerance in the vector of all errors."""
         start = 0
         for tolerance in self.tolerances:
             width = sum(error.width for error in tolerance.errors)
@@ -284,45 +291,48 @@ class Tolerances:
         raise KeyError(name)
 
     def scaled(self, name: str, factor: float) -> Tolerances:
-        """Return all with one of them so many times as wide."""
-        tolerances = tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.tolerances)
+        """Return the tolerances with one of them times a factor."""
+        tolerances = tuple(
+            replace(tolerance, scale=factor * tolerance.scale) if tolerance.name == name else tolerance
+            for tolerance in self.tolerances
+        )
         return replace(self, tolerances=tolerances)
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
-        """Return errors of many engines, shape (count, columns)."""
+        """Return random errors of many engines, shape (count, columns)."""
         return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.tolerances)], axis=1)
 
     def draw_mirrored(self, random: np.random.Generator, count: int) -> Array:
-        """Return errors of as many engines, half of them the others with every error turned round (R9)."""
+        """Return random errors, shape (count, columns); the second half is the negative of the first (R9)."""
         half = self.draw(random, -(-count // 2))
         return np.concatenate([half, -half])
 
     def with_errors(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
-        """Return the drawing of engines with these errors, shape (columns,); numbers of a file draw it anew."""
+        """Return the drawing with errors, shape (columns,); numbers of the file are rebuilt from it."""
         moves: list[tuple[ErrorDrive, complex]] = []
-        at = iter(self.columns)
+        columns = iter(self.columns)
         for tolerance in self.tolerances:
             for error in tolerance.errors:
-                own = errors[next(at)] * tolerance.scale
-                value = complex(own[0], own[1] if error.width > 1 else 0.0)
+                components = errors[next(columns)] * tolerance.scale
+                value = complex(components[0], components[1] if error.width > 1 else 0.0)
                 moves += [(drive, value) for drive in error.drives if value != 0.0]
         written = {v.path: v.written(e) for v, e in moves if isinstance(v, FileDrive)}
         drawing = rebuild(written) if written else drawing
         for drive, value in moves:
-            drawing = drive.moved(drawing, value)
+            drawing = drive.with_error(drawing, value)
         return drawing
 
 
 @dataclass(frozen=True)
 class Robust(Extra):
-    """Take what is minimised and limited of built engines.
+    """Objective and limits over built engines.
 
     Attributes
     ----------
     tolerances
-        How far they stand from the drawing.
+        Tolerances of the engines.
     over
-        Which of them count.
+        Engines that objective and limits cover.
     """
 
     tolerances: Tolerances
@@ -330,15 +340,15 @@ class Robust(Extra):
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
-        """Return the name of what is minimised, with the engines that it is of."""
+        """Return the name of the objective, with the engines that it covers."""
         return self.over.named(name, self.tolerances.is_affine)
 
 
 def robust_of(problem: Problem) -> Robust:
-    """Return the tolerances of a problem, and the engines that count."""
-    found = problem.extra(Robust)
-    assert found is not None
-    return found
+    """Return the tolerances of a problem, and the engines that its objective covers."""
+    robust = problem.extra(Robust)
+    assert robust is not None
+    return robust
 
 
 def tolerances_of(problem: Problem) -> Tolerances:
@@ -347,16 +357,16 @@ def tolerances_of(problem: Problem) -> Tolerances:
 
 
 def with_tolerances(problem: Problem, tolerances: Tolerances) -> Problem:
-    """Return a problem of built engines with other tolerances."""
+    """Return the problem with other tolerances."""
     return replace(problem, extras=(replace(robust_of(problem), tolerances=tolerances),))
 
 
 def with_errors(problem: Problem, errors: Array, tolerances: Tolerances | None = None) -> Problem:
-    """Return the problem of the engine with these errors, shape (columns,), and no tolerances (R2)."""
-    own = tolerances_of(problem) if tolerances is None else tolerances
-    given = Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
-    found = own.with_errors(given, errors, problem.rebuild)
+    """Return the problem of the engine with errors, shape (columns,), and without tolerances (R2)."""
+    applied = tolerances_of(problem) if tolerances is None else tolerances
+    drawing = Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
+    built = applied.with_errors(drawing, errors, problem.rebuild)
     return replace(
-        problem, engine=found.engine, points=found.points, decisions=found.decisions,
-        mount_numbers=found.mount_numbers, extras=(),
+        problem, engine=built.engine, points=built.points, decisions=built.decisions,
+        mount_numbers=built.mount_numbers, extras=(),
     )  # fmt: skip

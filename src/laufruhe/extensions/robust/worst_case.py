@@ -1,8 +1,8 @@
-"""The worst errors of a design, and a bound that no errors exceed (R4 to R7).
+"""Worst errors of a design, and an upper bound over all errors (R4 to R7).
 
-The objective is convex in the errors, so its largest value stands at a corner of every interval and on the circle of
-every disc. Branch and bound finds which one: an interval is fixed at either end, a circle is parted into arcs, and the
-free rest is bounded from above. Every bound comes from rows of the exact model.
+The objective is convex in the errors, so its maximum lies at an end of each interval and on the circle of each disc.
+Branch and bound finds it: an interval is fixed at either end, a circle is divided into arcs, and the remaining errors
+are bounded from above. All bounds come from rows of the exact model.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, Fathom
 from laufruhe.prove.witness import THIN, Witness, check_near_witness
 
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
-"""Weights and norms, whose decision vector is that of the errors."""
+"""Weights, and norms as functions of the errors."""
 
 ROUNDING = 1e-12
 MOST_NODES = 5000
 STARTS, CLIMBS = 12, 30
-"""Random errors that a climb starts from, and its steps."""
+"""Random starts of the local search, and most steps of each."""
 MOST_ENDS = 12
-"""Intervals whose ends are all tried in one part."""
-TOUCHES, TURNS = 3, 6
-"""Majorants that are tried, and fixed-point steps for the points of balls, in one part."""
+"""Most intervals with all ends enumerated in one node."""
+MAJORANTS, BALL_STEPS = 3, 6
+"""Most majorants, and fixed-point steps for the points of balls, in one node."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorstCase:
-    """The worst errors found, the value there, and a bound over all errors.
+    """Worst errors found, with an upper bound over all errors.
 
     Attributes
     ----------
@@ -49,9 +49,9 @@ class WorstCase:
     value
         Weighted sum of the norms at these errors.
     bound
-        Upper bound over all errors allowed, raw.
+        Upper bound over all errors, without tolerance.
     nodes
-        Parts that the errors were divided into.
+        Count of nodes.
     """
 
     errors: Array
@@ -66,33 +66,33 @@ def value_at(terms: Terms, errors: Array) -> float:
 
 
 def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MOST_NODES) -> WorstCase:
-    """Return the largest weighted sum of norms N(V0 + E z) over intervals and discs.
+    """Return the maximum of a weighted sum of norms N(V0 + E z) over intervals and discs.
 
     Parameters
     ----------
     terms
-        Weights and norms, affine in the errors.
+        Weights and norms, affine in the errors z.
     columns
-        Columns of every error: one for an interval of -1 to 1, two for the unit disc.
+        Slice of each error: one column for an interval from -1 to 1, two for the unit disc.
     tolerance
-        Relative distance of bound and value at which the search ends.
+        Relative gap at which the search ends.
     maximum
-        Largest number of parts that the errors are divided into.
+        Most nodes.
     """
     count = columns[-1].stop if columns else 0
     starts = np.random.default_rng(0).uniform(-1.0, 1.0, (STARTS + 1, count))
     starts[0] = 0.0
     for disc in columns:
-        # a point of the square may lie outside the disc in it
+        # scale points of the square into the disc
         starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]
-    best = max((_climb(terms, columns, z) for z in starts), key=lambda point: point[0])
+    best = max((_climb(terms, columns, start) for start in starts), key=lambda point: point[0])
     if not count:
         return WorstCase(np.zeros(0), best[0], best[0], 0)
     search = _ErrorSearch(terms, tolerance, best)
-    blocks = [ErrorBlock(own, np.eye(own.stop - own.start)) for own in columns]
-    root = bound_part(terms, np.zeros(count), blocks, best[0], search.reaches)
+    blocks = [ErrorBlock(error_columns, np.eye(error_columns.stop - error_columns.start)) for error_columns in columns]
+    root = bound_node(terms, np.zeros(count), blocks, best[0], search.reaches)
     search.improve(_climb(terms, columns, root.errors))
-    bound = search.divide((-root.bound, _Part(np.zeros(count), blocks, root.split)), maximum)
+    bound = search.divide((-root.bound, _Node(np.zeros(count), blocks, root.split)), maximum)
     value, errors = search.best
     if is_over(bound, -value):
         report(BoundError("errors that no engine exceeds", -bound, value))
@@ -100,38 +100,41 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
 
 
 def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
-    """Report a bound of a thin part around the worst errors that is under their value."""
+    """Report a bound of a thin node around the worst errors that is below their value."""
     check_near_witness(_Around(terms, columns), worst.errors, Witness(worst.errors, -worst.value))
 
 
 @dataclass(frozen=True, eq=False)
 class _Around:
-    """Bounder of thin parts of the errors; it minimises the negative of the sum."""
+    """Bounds of thin nodes around known errors; it minimises the negative sum."""
 
     terms: Terms
     columns: Sequence[slice]
     what: str = "errors that no engine exceeds"
 
     def around(self, errors: Array) -> tuple[Array, list[ErrorBlock]]:
-        """Return a centre and thin blocks about it that reach some errors."""
-        return (1.0 - THIN) * errors, [ErrorBlock(own, THIN * np.eye(own.stop - own.start)) for own in self.columns]
+        """Return the centre and thin blocks of a node that contains the errors."""
+        return (1.0 - THIN) * errors, [
+            ErrorBlock(error_columns, THIN * np.eye(error_columns.stop - error_columns.start))
+            for error_columns in self.columns
+        ]
 
     def bound(self, part: tuple[Array, list[ErrorBlock]]) -> float:
-        """Return the lower bound of the negative sum over a part."""
-        return -bound_part(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
+        """Return a lower bound of the negative sum over a node."""
+        return -bound_node(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """Node of the search: a centre, free blocks, and the number of the block to divide next."""
+class _Node:
+    """Node of the search: centre, free blocks, and index of the block to divide next."""
 
     centre: Array
     blocks: list[ErrorBlock]
     split: int
 
 
-class _ErrorSearch(BranchAndBound[_Part]):
-    """Branch and bound over errors; it minimises the negative of the sum."""
+class _ErrorSearch(BranchAndBound[_Node]):
+    """Branch and bound over errors; it minimises the negative sum."""
 
     what, reports_bounds = "boxes of errors", False
 
@@ -140,56 +143,58 @@ class _ErrorSearch(BranchAndBound[_Part]):
         self.reaches: Reaches = [{} for _ in terms]
 
     def improve(self, point: tuple[float, Array]) -> None:
-        """Keep a value and its errors if they are worse than the worst so far."""
+        """Store a value and its errors if they are worse than the worst so far."""
         self.best = max(self.best, point, key=lambda each: each[0])
 
-    def is_fathomed(self, node: OpenNode[_Part]) -> bool:
-        """Return whether no errors of a part are worse by the tolerance."""
+    def is_fathomed(self, node: OpenNode[_Node]) -> bool:
+        """Return True if no errors of a node are worse by the tolerance."""
         return -node.bound <= self.best[0] * (1.0 + self._tolerance)
 
-    def branch(self, nodes: Sequence[OpenNode[_Part]]) -> BoundedParts[_Part]:
-        """Yield parts with one interval fixed at either end, or one circle parted."""
-        ((above, _, own),) = nodes
-        rest = [block for k, block in enumerate(own.blocks) if k != own.split]
-        for centre, free in own.blocks[own.split].parts(own.centre):
-            blocks = rest if free is None else [*rest, free]
-            part = bound_part(self._terms, centre, blocks, self.best[0] * (1.0 + self._tolerance), self.reaches)
-            self.improve((value_at(self._terms, part.errors), part.errors))
-            # a part is never worse than the whole
-            bound = min(part.bound, -above)
-            yield (-bound, _Part(centre, blocks, part.split)) if blocks else FathomedPart(-bound)
+    def branch(self, nodes: Sequence[OpenNode[_Node]]) -> BoundedParts[_Node]:
+        """Yield children: one interval fixed at either end, or one circle divided into arcs."""
+        ((negative_bound, _, parent),) = nodes
+        other_blocks = [block for k, block in enumerate(parent.blocks) if k != parent.split]
+        for centre, free in parent.blocks[parent.split].parts(parent.centre):
+            blocks = other_blocks if free is None else [*other_blocks, free]
+            child = bound_node(self._terms, centre, blocks, self.best[0] * (1.0 + self._tolerance), self.reaches)
+            self.improve((value_at(self._terms, child.errors), child.errors))
+            # the bound of the parent also holds for the child
+            bound = min(child.bound, -negative_bound)
+            yield (-bound, _Node(centre, blocks, child.split)) if blocks else FathomedPart(-bound)
 
 
 def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
-    """Step to the farthest point along the slope until the value stops rising; return value and errors."""
+    """Step to the farthest errors along the slope until the value stops rising; return value and errors."""
     value = value_at(terms, errors)
     for _ in range(CLIMBS):
         slope = np.zeros(len(errors))
         for weight, norm in terms:
             slope += weight * np.einsum("kd,kdn->n", norm.subgradient(errors), norm.slope)
-        following = np.zeros(len(errors))
-        for own in columns:
-            size = float(np.hypot.reduce(slope[own]))
-            following[own] = slope[own] / size if size > 0.0 else np.eye(own.stop - own.start)[0]
-        reached = value_at(terms, following)
-        if reached <= value * (1.0 + ROUNDING):
-            return max((value, errors), (reached, following), key=lambda each: each[0])
-        value, errors = reached, following
+        next_errors = np.zeros(len(errors))
+        for error_columns in columns:
+            size = float(np.hypot.reduce(slope[error_columns]))
+            next_errors[error_columns] = (
+                slope[error_columns] / size if size > 0.0 else np.eye(error_columns.stop - error_columns.start)[0]
+            )
+        next_value = value_at(terms, next_errors)
+        if next_value <= value * (1.0 + ROUNDING):
+            return max((value, errors), (next_value, next_errors), key=lambda point: point[0])
+        value, errors = next_value, next_errors
     return value, errors
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBlock:
-    """A free error: local numbers in an interval of -1 to 1 each, or in the unit disc.
+    """Free error with local numbers, each in an interval from -1 to 1 or together in the unit disc.
 
     Attributes
     ----------
     columns
-        In the vector of errors.
+        Slice in the vector of errors.
     spans
         Change of the errors per local number, shape (width, width).
     arc
-        Middle and half angle of a part of a circle; None of an interval or a whole disc.
+        Middle and half angle of an arc [rad]; None for an interval or a whole disc.
     """
 
     columns: slice
@@ -198,11 +203,11 @@ class ErrorBlock:
 
     @property
     def is_disc(self) -> bool:
-        """Return whether its local numbers lie in the unit disc and not in intervals."""
+        """True if its local numbers lie in the unit disc, False for intervals."""
         return self.arc is None and len(self.spans) > 1
 
     def parts(self, centre: Array) -> list[tuple[Array, ErrorBlock | None]]:
-        """Return centres and free blocks that together hold every extreme point."""
+        """Return centres and free blocks that together contain all extreme points."""
         if len(self.spans) == 1:
             ends = [centre.copy(), centre.copy()]
             for end, sign in zip(ends, (1.0, -1.0), strict=True):
@@ -214,26 +219,26 @@ class ErrorBlock:
         return [self._arc(centre, middle + side * 0.5 * half, 0.5 * half) for side in (-1.0, 1.0)]
 
     def _arc(self, centre: Array, middle: float, half: float) -> tuple[Array, ErrorBlock]:
-        along = np.array([np.cos(middle), np.sin(middle)])
-        across = np.array([-along[1], along[0]])
-        near = float(np.cos(half))
-        moved = centre.copy()
-        moved[self.columns] = 0.5 * (1.0 + near) * along
-        spans = np.stack([0.5 * (1.0 - near) * along, np.sin(half) * across], axis=1)
-        return moved, ErrorBlock(self.columns, spans, (middle, half))
+        radial = np.array([np.cos(middle), np.sin(middle)])
+        tangential = np.array([-radial[1], radial[0]])
+        cosine = float(np.cos(half))
+        new_centre = centre.copy()
+        new_centre[self.columns] = 0.5 * (1.0 + cosine) * radial
+        spans = np.stack([0.5 * (1.0 - cosine) * radial, np.sin(half) * tangential], axis=1)
+        return new_centre, ErrorBlock(self.columns, spans, (middle, half))
 
 
 @dataclass(frozen=True, eq=False)
-class PartBound:
-    """Upper bound over a part of the errors, its block to divide next, and errors that may be its worst."""
+class NodeBound:
+    """Upper bound over a node, index of the block to divide next, and errors that are near the worst."""
 
     bound: float
     split: int
     errors: Array
 
 
-def bound_part(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, reaches: Reaches) -> PartBound:
-    """Bound the sum of norms over a part of the errors from above (R5, R6).
+def bound_node(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, reaches: Reaches) -> NodeBound:
+    """Return an upper bound of the sum of norms over a node (R5, R6).
 
     Parameters
     ----------
@@ -241,56 +246,60 @@ def bound_part(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff
         Weights and norms.
     centre
         Errors about which the blocks are free, shape (columns,).
+    blocks
+        Free blocks.
     cutoff
-        Bound at which no better one is sought.
+        Bound at which the node is fathomed and no better bound is needed.
     reaches
-        What blocks move, one cache per term; filled here.
+        Cache of the changes by blocks, one for each term; filled here.
     """
     parts = [_TermAbout(*term, centre, blocks, cached) for term, cached in zip(terms, reaches, strict=True)]
     if not blocks:
-        return PartBound(sum(part.separate_bound() for part in parts), -1, centre)
-    local = np.ones(parts[0].moves.shape[2])
-    touched = [np.sqrt(np.square(part.lengths) + np.square(part.reaches).sum(axis=0)) for part in parts]
+        return NodeBound(sum(part.separate_bound() for part in parts), -1, centre)
+    best_point = np.ones(parts[0].moves.shape[2])
+    touching_lengths = [np.sqrt(np.square(part.lengths) + np.square(part.reaches).sum(axis=0)) for part in parts]
     best = math.inf
-    for k in range(TOUCHES):
-        majorants = [part.norm.norm.majorant(part.norm.grid, sizes) for part, sizes in zip(parts, touched, strict=True)]
+    for k in range(MAJORANTS):
+        majorants = [
+            part.norm.norm.majorant(part.norm.grid, sizes) for part, sizes in zip(parts, touching_lengths, strict=True)
+        ]
         if not any(majorants):
             best = sum(part.separate_bound() for part in parts)
             break
-        above, at = _over_majorants(parts, majorants, blocks)
-        if above < best:
-            best, local = above, at
-        reached = [lengths(part.rows + part.moves @ at) for part in parts]
+        bound, point = _over_majorants(parts, majorants, blocks)
+        if bound < best:
+            best, best_point = bound, point
+        reached = [lengths(part.rows + part.moves @ point) for part in parts]
         value = sum(part.value(sizes) for part, sizes in zip(parts, reached, strict=True))
         if best <= cutoff or best <= value * (1.0 + ROUNDING):
             break
-        touched = [(a * k + b) / (k + 1) for a, b in zip(touched, reached, strict=True)]
-    errors, at_block = centre.copy(), 0
+        touching_lengths = [(a * k + b) / (k + 1) for a, b in zip(touching_lengths, reached, strict=True)]
+    errors, first = centre.copy(), 0
     for block in blocks:
         width = len(block.spans)
-        errors[block.columns] += block.spans @ local[at_block : at_block + width]
+        errors[block.columns] += block.spans @ best_point[first : first + width]
         if width > 1:
-            # on the circle of its disc
+            # move the error to the circle of its disc
             errors[block.columns] /= float(np.hypot(*errors[block.columns])) or 1.0
-        at_block += width
-    return PartBound(best, int(np.argmax(np.sum([part.sizes for part in parts], axis=0))), errors)
+        first += width
+    return NodeBound(best, int(np.argmax(np.sum([part.sizes for part in parts], axis=0))), errors)
 
 
 class _TermAbout:
-    """A weighted norm about a centre, and its changes by the local numbers of all blocks.
+    """Weighted norm about a centre, and its changes by the local numbers of all blocks.
 
     Attributes
     ----------
-    rows
-        At the centre, shape (k, d), and their lengths, shape (k,).
+    rows, lengths
+        Rows at the centre, shape (k, d), and their lengths, shape (k,).
     moves
         Change of the rows per local number, shape (k, d, n).
     own
-        Local numbers of every block among these n.
+        Slice of each block among the n local numbers.
     reaches
-        Largest change of every row by every block, shape (blocks, k).
+        Largest change of each row by each block, shape (blocks, k).
     sizes
-        Largest rise of the weighted norm by every block, shape (blocks,).
+        Largest rise of the weighted norm by each block, shape (blocks,).
     """
 
     def __init__(
@@ -299,30 +308,32 @@ class _TermAbout:
         self.weight, self.norm, self.blocks = weight, norm, blocks
         self.rows = norm.rows(centre)
         self.lengths = lengths(self.rows)
-        found = [_reach(norm, block, cached) for block in blocks]
-        ends = np.cumsum([0, *(each.move.shape[-1] for each in found)])
+        block_reaches = [_reach(norm, block, cached) for block in blocks]
+        ends = np.cumsum([0, *(reach.move.shape[-1] for reach in block_reaches)])
         self.own = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-        self.moves = np.concatenate([np.zeros((*self.rows.shape, 0)), *(each.move for each in found)], axis=2)
-        self.reaches = np.array([each.rows for each in found]).reshape(len(blocks), len(self.rows))
-        self.sizes = weight * np.array([each.size for each in found])
+        self.moves = np.concatenate([np.zeros((*self.rows.shape, 0)), *(reach.move for reach in block_reaches)], axis=2)
+        self.reaches = np.array([reach.rows for reach in block_reaches]).reshape(len(blocks), len(self.rows))
+        self.sizes = weight * np.array([reach.size for reach in block_reaches])
 
     def separate_bound(self) -> float:
-        """Return the bound of the weighted norm with every row at its own worst (R5)."""
+        """Return the upper bound of the weighted norm with each row at its own worst (R5)."""
         kind, grid, rows = self.norm.norm, self.norm.grid, self.rows
         bound = self.weight * kind.value(grid, rows) + float(self.sizes.sum())
         if not kind.of_row_lengths:
             return bound
         pulls = np.einsum("kd,kdn->kn", rows, self.moves)
-        along = np.zeros(len(rows))
-        for block, own in zip(self.blocks, self.own, strict=True):
-            along += np.hypot.reduce(pulls[:, own], axis=1) if block.is_disc else np.abs(pulls[:, own]).sum(axis=1)
-        across = self.reaches.sum(axis=0)
-        longest = np.sqrt(np.square(self.lengths) + 2.0 * along + np.square(across))
-        longest = np.minimum(self.lengths + across, longest)
+        pull_sum = np.zeros(len(rows))
+        for block, numbers in zip(self.blocks, self.own, strict=True):
+            pull_sum += (
+                np.hypot.reduce(pulls[:, numbers], axis=1) if block.is_disc else np.abs(pulls[:, numbers]).sum(axis=1)
+            )
+        reach_sum = self.reaches.sum(axis=0)
+        longest = np.sqrt(np.square(self.lengths) + 2.0 * pull_sum + np.square(reach_sum))
+        longest = np.minimum(self.lengths + reach_sum, longest)
         return min(bound, self.weight * kind.value(grid, longest[:, None]))
 
     def value(self, sizes: Array) -> float:
-        """Return the weighted norm of rows of these lengths; zero for a norm that needs more than lengths."""
+        """Return the weighted norm of rows of these lengths, shape (k,); 0 if the norm needs more than lengths."""
         kind = self.norm.norm
         return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.of_row_lengths else 0.0
 
@@ -330,81 +341,91 @@ class _TermAbout:
 def _over_majorants(
     parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[ErrorBlock]
 ) -> tuple[float, Array]:
-    """Return a bound of the quadratic majorants over all local numbers, and where it stands, shape (n,).
+    """Return an upper bound of the quadratic majorants over all local numbers, and the point of it, shape (n,).
 
-    Ends of up to MOST_ENDS intervals are all tried, so that the majorants are exact between them; of the rest each
-    block is bounded by itself.
+    The ends of up to MOST_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
+    bounded one by one.
     """
-    own = parts[0].own
+    numbers_of = parts[0].own
     count = parts[0].moves.shape[2]
-    constant, slope, bend = 0.0, np.zeros(count), np.zeros((count, count))
+    constant, slope, curvature = 0.0, np.zeros(count), np.zeros((count, count))
     for part, majorant in zip(parts, majorants, strict=True):
         if majorant is None:
             constant += part.separate_bound()
             continue
         factors, offset = part.weight * majorant[0], part.weight * majorant[1]
-        weighed = (factors[:, None, None] * part.moves).reshape(-1, count)
+        weighted = (factors[:, None, None] * part.moves).reshape(-1, count)
         constant += offset + 0.5 * float(factors @ np.square(part.lengths))
-        slope += weighed.T @ part.rows.reshape(-1)
-        bend += weighed.T @ part.moves.reshape(-1, count)
+        slope += weighted.T @ part.rows.reshape(-1)
+        curvature += weighted.T @ part.moves.reshape(-1, count)
     ends = [k for k, block in enumerate(blocks) if not block.is_disc]
-    ends.sort(key=lambda k: -float(np.abs(bend[own[k]]).sum()))
-    tried: list[int] = []
+    ends.sort(key=lambda k: -float(np.abs(curvature[numbers_of[k]]).sum()))
+    enumerated: list[int] = []
     for k in ends:
-        if len(tried) + own[k].stop - own[k].start <= MOST_ENDS:
-            tried += range(own[k].start, own[k].stop)
-    signs = _signs(len(tried))
-    rest = [k for k in range(len(blocks)) if own[k].start not in tried]
-    left = [j for k in rest for j in range(own[k].start, own[k].stop)]
-    # a disc is one ball, each number of an interval or an arc one of its own
+        if len(enumerated) + numbers_of[k].stop - numbers_of[k].start <= MOST_ENDS:
+            enumerated += range(numbers_of[k].start, numbers_of[k].stop)
+    signs = _signs(len(enumerated))
+    other_blocks = [k for k in range(len(blocks)) if numbers_of[k].start not in enumerated]
+    other_numbers = [j for k in other_blocks for j in range(numbers_of[k].start, numbers_of[k].stop)]
+    # a disc is one ball; each number of an interval or an arc is a ball of its own
     firsts = [
-        left.index(j) for k in rest for j in range(own[k].start, own[k].start + 1 if blocks[k].is_disc else own[k].stop)
+        other_numbers.index(j)
+        for k in other_blocks
+        for j in range(numbers_of[k].start, numbers_of[k].start + 1 if blocks[k].is_disc else numbers_of[k].stop)
     ]
-    total = signs @ slope[tried] + 0.5 * np.einsum("sn,sn->s", signs @ bend[np.ix_(tried, tried)], signs)
-    pulls = slope[left] + signs @ bend[np.ix_(tried, left)]
-    added, points = _over_balls(pulls, bend[np.ix_(left, left)], np.array(firsts, dtype=int))
-    best = int(np.argmax(total + added))
-    at = np.zeros(count)
-    at[tried], at[left] = signs[best], points[best]
-    return constant + float(total[best] + added[best]), at
+    enumerated_values = signs @ slope[enumerated] + 0.5 * np.einsum(
+        "sn,sn->s", signs @ curvature[np.ix_(enumerated, enumerated)], signs
+    )
+    pulls = slope[other_numbers] + signs @ curvature[np.ix_(enumerated, other_numbers)]
+    ball_bounds, points = _over_balls(
+        pulls, curvature[np.ix_(other_numbers, other_numbers)], np.array(firsts, dtype=int)
+    )
+    best = int(np.argmax(enumerated_values + ball_bounds))
+    point = np.zeros(count)
+    point[enumerated], point[other_numbers] = signs[best], points[best]
+    return constant + float(enumerated_values[best] + ball_bounds[best]), point
 
 
-def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array]:
-    """Bound a . u + u . H u / 2 where every u_b has the length one (R6a).
+def _over_balls(slopes: Array, curvature: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array]:
+    """Return upper bounds of a . u + u . H u / 2 over all u with each u_b of length one (R6a).
 
     Parameters
     ----------
-    pulls
-        Many a, shape (s, n).
-    bend
+    slopes
+        Vectors a, shape (s, n).
+    curvature
         H, shape (n, n).
     firsts
-        First number of every ball.
+        Index of the first number of each ball.
 
     Returns
     -------
-    The bounds (s,), and the points about which they are taken (s, n).
+    Bounds, shape (s,), and the points about which they are taken, shape (s, n).
     """
-    if not len(bend):
-        return np.zeros(len(pulls)), np.zeros((len(pulls), 0))
-    sizes = np.diff([*firsts, len(bend)])
+    if not len(curvature):
+        return np.zeros(len(slopes)), np.zeros((len(slopes), 0))
+    sizes = np.diff([*firsts, len(curvature)])
 
     def lengths_of(vectors: Array) -> Array:
         return np.asarray(np.sqrt(np.add.reduceat(np.square(vectors), firsts, axis=1)))
 
-    # what bends alike in all directions of a ball is known
-    even = np.add.reduceat(np.diag(bend), firsts) / sizes
-    rest = bend - np.diag(np.repeat(even, sizes))
-    maximum = float(np.linalg.eigvalsh(rest)[-1])
-    points, pulled = np.zeros_like(pulls), pulls
-    for _ in range(TURNS):
-        size = np.repeat(lengths_of(pulled), sizes, axis=1)
-        points = np.where(size > 0.0, pulled / np.where(size > 0.0, size, 1.0), 0.0)
-        # any point of the sphere will do where nothing pulls
+    # the mean curvature of each ball is constant on its sphere
+    mean_curvature = np.add.reduceat(np.diag(curvature), firsts) / sizes
+    deviation = curvature - np.diag(np.repeat(mean_curvature, sizes))
+    largest_eigenvalue = float(np.linalg.eigvalsh(deviation)[-1])
+    points, gradient = np.zeros_like(slopes), slopes
+    for _ in range(BALL_STEPS):
+        size = np.repeat(lengths_of(gradient), sizes, axis=1)
+        points = np.where(size > 0.0, gradient / np.where(size > 0.0, size, 1.0), 0.0)
+        # without a gradient any point of the sphere will do
         points[:, firsts] += lengths_of(points) == 0.0
-        pulled = pulls + points @ rest
-    reached = lengths_of(pulled - maximum * points) + maximum
-    bound = reached.sum(axis=1) - 0.5 * np.einsum("sn,sn->s", points @ rest, points) + 0.5 * float(even.sum())
+        gradient = slopes + points @ deviation
+    ball_lengths = lengths_of(gradient - largest_eigenvalue * points) + largest_eigenvalue
+    bound = (
+        ball_lengths.sum(axis=1)
+        - 0.5 * np.einsum("sn,sn->s", points @ deviation, points)
+        + 0.5 * float(mean_curvature.sum())
+    )
     return bound, points
 
 
@@ -415,7 +436,7 @@ def _signs(count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Reach:
-    """Change of the rows by a block, shape (k, d, w), its largest of each row, shape (k,), and rise of the norm."""
+    """Change of the rows by a block, shape (k, d, w), its maximum for each row, shape (k,), and rise of the norm."""
 
     move: Array
     rows: Array
@@ -424,12 +445,12 @@ class _Reach:
 
 _Key: TypeAlias = tuple[int, tuple[float, float] | None]
 Reaches: TypeAlias = Sequence[dict[_Key, _Reach]]
-"""Reach of blocks of each term, which does not change with the centre."""
+"""Cache of the reach of blocks for each term; it is independent of the centre."""
 
 
-def _reach(norm: AffineNorm, block: ErrorBlock, cached: dict[_Key, _Reach]) -> _Reach:
+def _reach(norm: AffineNorm, block: ErrorBlock, cache: dict[_Key, _Reach]) -> _Reach:
     key = block.columns.start, block.arc
-    if key not in cached:
+    if key not in cache:
         move = norm.slope[..., block.columns] @ block.spans
         columns = [move[..., j] for j in range(move.shape[-1])]
         if block.is_disc:
@@ -439,6 +460,6 @@ def _reach(norm: AffineNorm, block: ErrorBlock, cached: dict[_Key, _Reach]) -> _
         else:
             rows = sum((lengths(column) for column in columns), np.zeros(len(move)))
         kind, grid = norm.norm, norm.grid
-        apart = kind.value(grid, rows[:, None]) if kind.of_row_lengths else sum(kind.value(grid, c) for c in columns)
-        cached[key] = _Reach(move, rows, apart)
-    return cached[key]
+        rise = kind.value(grid, rows[:, None]) if kind.of_row_lengths else sum(kind.value(grid, c) for c in columns)
+        cache[key] = _Reach(move, rows, rise)
+    return cache[key]
