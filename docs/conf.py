@@ -78,7 +78,7 @@ def for_readers_aloud(app, page, template, context, doctree):
 
 HERE = Path(__file__).parent
 MEASURED = HERE / "measured"
-LOGS = ("attack", "faults", "mutants", "proofs")
+LOGS = ("attack", "changes", "faults", "mutants", "proofs")
 """Folders of results whose README.md is a page of measurements too."""
 
 
@@ -100,7 +100,7 @@ def lead_within_the_site(app, *given):
     content = given[-1]
     text = content[0].replace("gallery.md)", "gallery/index.rst)").replace("../CHANGELOG.md)", "changes.md)")
     text = re.sub(r"\[([^\]]+)\]\((?:results/README|SECURITY)\.md\)", r"\1", text)
-    text = re.sub(rf"\]\((?:\.\./)+results/({'|'.join(LOGS)})/README\.md", r"](/measured/\1.md", text)
+    text = re.sub(rf"\]\((?:\.\./)*results/({'|'.join(LOGS)})/README\.md", r"](/measured/\1.md", text)
     content[0] = re.sub(r"\]\((?:\.\./)+results/benchmarks/([\w-]+\.md)", r"](/measured/\1", text)
 
 

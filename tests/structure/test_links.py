@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[2]
 WRITTEN = ROOT / "results"
 KEPT = (
     WRITTEN / "benchmarks",
-    *(WRITTEN / name / "README.md" for name in ("", "attack", "faults", "mutants", "proofs")),
+    *(WRITTEN / name / "README.md" for name in ("", "attack", "changes", "faults", "mutants", "proofs")),
 )
 PAGES = sorted(
     path
@@ -20,6 +20,7 @@ PAGES = sorted(
         "results/README.md",
         "results/benchmarks/*.md",
         "results/attack/README.md",
+        "results/changes/README.md",
         "results/faults/README.md",
         "results/proofs/README.md",
     )
