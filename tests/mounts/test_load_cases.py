@@ -29,7 +29,7 @@ from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.cases import StaticCases
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting
 from problem_files import PROBLEMS
@@ -193,7 +193,7 @@ def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
 def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path: Path) -> None:
     """Hold the rows of the program to the length at each mount in each load case, at a balance with stops."""
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, ASKED[name])
-    measure, held, mounting = problem.objective[0].measure, Gathered(), mounting_in(problem.engine)
+    measure, held, mounting = problem.objective[0].measure, ConstraintCollector(), mounting_in(problem.engine)
     root, numbers = mass_root(mounting.block), ca.MX.sym("d", 2)
     cases = StaticCases(symbolic_mounts(problem, mounting.block, numbers), mounting, root, held)
     top = cases.largest(measure, problem.engine)

@@ -14,7 +14,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 from laufruhe.solvers.smooth.modes import ModeVariables
 from problem_files import PROBLEMS
 
@@ -30,7 +30,7 @@ def test_motions_and_modes_are_paired_as_an_assignment_pairs_them(problem: Probl
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     x = low + (high - low) * np.random.default_rng(seed).random(len(low))
     mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
-    modes = ModeVariables(problem, Gathered())
+    modes = ModeVariables(problem, ConstraintCollector())
     modes.hold(np.eye(6), np.eye(6), mounting)
     _, squares = modes.start(mounting)
     _, columns = linear_sum_assignment(-mounting.modes.energy)
@@ -45,8 +45,8 @@ def test_a_band_has_the_price_of_the_edge_that_each_mode_stands_at(problem: Prob
     mounting = mounting_in(problem.engine)
     multipliers, size = np.random.default_rng(4).normal(size=6), (2.0 * np.pi) ** 2
 
-    def rows_of(edges: tuple[float, float]) -> tuple[ModeVariables, Gathered, ca.Function]:
-        held = Gathered()
+    def rows_of(edges: tuple[float, float]) -> tuple[ModeVariables, ConstraintCollector, ca.Function]:
+        held = ConstraintCollector()
         modes = ModeVariables(replace(problem, objective=(Term(measure),)), held)
         modes.hold(np.eye(6), np.eye(6), mounting)
         for limit in (above, replace(band, outside=edges), above):

@@ -292,7 +292,7 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
         turns = generator.uniform(-0.07, 0.07, moves.size)
         mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, generator.uniform(0.0, 1.0, 1), turns)
-        moved = joint.designed(x)
+        moved = joint.problem_at(x)
         given, unbalances = joint.split(x)
         # at as many angles as the program has: 32 a turn
         exact = evaluate(moved, moved.design([*unbalances, *given]), 64)
@@ -318,7 +318,7 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
         turns = generator.uniform(-0.07, 0.07, moves.size)
         mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, np.array([0.5]), turns)
-        moved = joint.designed(x)
+        moved = joint.problem_at(x)
         given, unbalances = joint.split(x)
         exact = evaluate(moved, moved.design([*unbalances, *given]))
         assert max(abs(loads.wrench.at(0.5)[3]) for loads in exact.loads) > 0.5

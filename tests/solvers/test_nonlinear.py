@@ -14,7 +14,7 @@ from laufruhe.numerics.norms import softened_lengths
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
-from laufruhe.solvers.smooth.ipopt import Task, _judged
+from laufruhe.solvers.smooth.ipopt import Task, _kkt_residual
 from laufruhe.solvers.smooth.local_optimum import Ending, distinct, ends_in_words, is_explored
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
 
@@ -107,7 +107,7 @@ def test_the_residual_by_hand(gradient, multiplier, bounds, constraint, residual
     task = Task("", *sides, np.ones(2), 1.0, ((),), 1, 1.0, False)
     point, slopes = np.array([0.0, 0.25]), np.array([[2.0, 1.0]])
     numbers = (np.array(v, ndmin=1) for v in (constraint, gradient))
-    told, violation = _judged(task, point, *numbers, slopes, np.array([multiplier]), np.array(bounds))
+    told, violation = _kkt_residual(task, point, *numbers, slopes, np.array([multiplier]), np.array(bounds))
     assert told == pytest.approx(residual, rel=1e-12)
     assert violation == pytest.approx(max(constraint - 1.0, 0.0), rel=1e-12)
 

@@ -1,7 +1,6 @@
-"""Methods propose designs, the exact model judges them, bounds prove them.
+"""Solvers: methods propose designs, the exact model evaluates them, and lower bounds prove them.
 
-The table of methods is imported with the first of its names that is asked for: who reads results, as what draws them
-does, needs none of it.
+Names of this package are imported at first use, because readers of results do not need the table of methods.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""How accurate a result is, and designs whose accuracy was asked for (F10, F11)."""
+"""Estimate the accuracy of results, and solve again at a better fidelity (F10, F11)."""
 
 from __future__ import annotations
 
@@ -18,22 +18,23 @@ from laufruhe.solvers.result import Result, Status
 
 _ROUNDS = 4
 TIMES, MOST_GAS = 4, 23040
-"""Times as many steps of the gas at once, and most of them."""
+"""Factor by which the steps of the gas pressure grow, and their largest number per cycle."""
 
 
 def error_of(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative error of the objective, not exceeded: from sampling, or against the reference where that was asked.
+    """Return an upper bound of the relative error of the objective.
 
-    A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
+    With an automatic fidelity the error is against the reference physics. A fidelity that the file states counts as
+    exact, so only the error of sampling remains.
     """
-    told = [(term, term.measure.channel) for term in problem.objective]
-    runs = [term for term, channel in told if channel.simulation or channel.of_torque]
-    loads = _error_of_loads(problem, evaluation)
+    terms = [(term, term.measure.channel) for term in problem.objective]
+    runs = [term for term, channel in terms if channel.simulation or channel.of_torque]
+    load_error = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
-        return loads
-    share = value_of_loads(problem, evaluation) * loads
-    between = sum(term.weight * missed(term.measure, evaluation) for term in runs)
-    return relative(share + between, objective_value(problem, evaluation))
+        return load_error
+    load_share = value_of_loads(problem, evaluation) * load_error
+    run_error = sum(term.weight * missed(term.measure, evaluation) for term in runs)
+    return relative(load_share + run_error, objective_value(problem, evaluation))
 
 
 def largest_error(results: Sequence[Result]) -> float:
@@ -50,49 +51,54 @@ def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Result) -> Result:
-    """Solve at more steps of the gas while these miss more than the tolerance; what they miss is no proof.
+    """Solve with more steps of the gas pressure while their error exceeds the tolerance, or weaken the proof by it.
 
-    Fewer steps than by default, or a number of their own, were chosen by hand and are taken as wanted.
+    Numbers of steps that the file states are not changed.
     """
-    own = problem.fidelity
-    if own.gas_samples is not None or own.samples < EXACT.samples or result.final.resonance or not problem.load_terms:
+    fidelity = problem.fidelity
+    if (
+        fidelity.gas_samples is not None
+        or fidelity.samples < EXACT.samples
+        or result.final.resonance
+        or not problem.load_terms
+    ):
         return result
-    (missed, between), steps = missed_of_gas(problem, result.final), own.gas_steps
+    (missed, interpolated), steps = missed_of_gas(problem, result.final), fidelity.gas_steps
     while missed > problem.tolerance * value_of_loads(problem, result.final) and steps < MOST_GAS and not passed():
         steps *= TIMES
-        result = solve(problem.at(replace(own, gas_samples=steps)))
+        result = solve(problem.at(replace(fidelity, gas_samples=steps)))
         if result.certificate is None:
             return result
-        missed, between = missed_of_gas(result.problem, result.final)
-    proof, told, missed = result.certificate, result.objective, missed + between
-    if told is None or proof is None or missed <= problem.tolerance * value_of_loads(problem, result.final):
+        missed, interpolated = missed_of_gas(result.problem, result.final)
+    proof, objective, missed = result.certificate, result.objective, missed + interpolated
+    if objective is None or proof is None or missed <= problem.tolerance * value_of_loads(problem, result.final):
         return result
     bound, zero_level = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
-        gap=gap_of(told.value, bound, zero_level), method=f"{proof.method}, less what the gas may miss",
+        gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less what the gas may miss",
     )  # fmt: skip
     status = Status.FEASIBLE if result.status is Status.OPTIMAL else result.status
     return replace(result, status=status, certificate=weaker)
 
 
 def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Solve at the fidelity chosen for the design as given, and choose again until the optimum is accurate too (F11).
+    """Solve, and choose a better fidelity until the optimum is as accurate as the file demands (F11).
 
-    What is left out is the same force for every design, so a share of it that is small
-    before balancing may be large after.
+    The physics that a fidelity leaves out adds a fixed force. This may be a small share of the initial forces and a
+    large share of the optimal ones.
     """
-    asked = problem.fidelity.tolerance
+    tolerance = problem.fidelity.tolerance
     result = solve(problem)
     if result.certificate is None:
         return result
-    if asked is None:
+    if tolerance is None:
         return _with_gas(problem, solve, result)
     for _ in () if passed() else in_time(range(_ROUNDS)):
-        # steps of a simulation are the same at every fidelity
-        if _error_of_loads(result.problem, result.final) <= asked:
+        # a simulation has the same time steps at every fidelity
+        if _error_of_loads(result.problem, result.final) <= tolerance:
             break
-        better = choose(problem, asked, result.final.engine).fidelity
+        better = choose(problem, tolerance, result.final.engine).fidelity
         if better == result.problem.fidelity:
             break
         result = solve(problem.at(better))

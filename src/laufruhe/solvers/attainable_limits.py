@@ -1,8 +1,7 @@
-"""What limits that no design keeps could be met by: the least value of each while the others hold (P16).
+"""Find the value that each violated limit can attain while the other limits hold (P16).
 
-A limit is a measure, and so is an objective. The problem that minimises what is limited under the other limits is
-decided by whatever method suits it, and its proof is that of any objective. What has no largest value to minimise is
-asked for at edges that are halved: each edge is a problem of its own, with a design or with a proof that there is none.
+The limited measure becomes the objective, the other limits stay, and `solve` gives design and lower bound. A measure
+that cannot be an objective is bisected: each trial value of the limit is a problem of its own.
 """
 
 from __future__ import annotations
@@ -39,15 +38,15 @@ from laufruhe.solvers.values import AttainableLimit, Nearest, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 LEAST_SECONDS = 10.0
-"""All limits together may take so long, or as long as it took to find that there is no design."""
+"""Time limit of all limits together [s], if the solve itself took less."""
 HALVINGS, CLOSE = 10, 1e-3
-"""Of the edges of a limit that has no least value to minimise, and the share of it at which they stop."""
+"""Largest number of bisections of a limit, and relative width at which they stop."""
 LONG = "there was no time left for it; give more by a time limit"
 
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """Reached value of one limit, its result, and a flag set if no design keeps the other limits."""
+    """Attainable value of one limit with its result; `is_none` is True if no design keeps the other limits."""
 
     told: AttainableLimit
     result: Result | None = None
@@ -55,129 +54,136 @@ class _Answer:
 
 
 def with_attainable_limits(
-    found: Result, problem: Problem, kinds: Collection[Kind], took: float, solve: Solve
+    result: Result, problem: Problem, kinds: Collection[Kind], spent: float, solve: Solve
 ) -> Result:
-    """A result without a design, with what each conflicting limit can reach, and with the nearest design.
+    """Return a result without a design, with the attainable value of each limit in conflict and the nearest design.
 
-    A design that was overlooked becomes the result; where a bound shows that there is none, the result says so.
+    If the search finds a feasible design, the result becomes that design. If a bound excludes all designs, the result
+    becomes infeasible.
 
     Parameters
     ----------
-    found
-        Infeasible or failed.
+    result
+        Infeasible or failed result.
     problem
-        As it was asked.
+        Problem as the caller of `solve` gave it.
     kinds
-        Of what is open.
-    took
-        Seconds that `found` did.
+        Kinds of the open numbers.
+    spent
+        Duration of the solve [s].
     solve
-        Decides a problem by the method that suits it.
+        Solver of any problem.
     """
-    wanted = _wanted(found, problem)
-    asked = [limit for limit in problem.limits if limit.name in wanted]
-    # what the nearest design breaks most is looked at first
-    asked.sort(key=lambda limit: found.nearest is None or limit.name != found.nearest.name)
-    if not asked or any(extra.open_names for extra in problem.extras):
-        return found
-    drawn = not problem.extras and not problem.ranks
-    solve, answers = partial(_surely, solve, problem) if drawn else solve, []
-    # a limit of time that was asked for counts alone
-    seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, took)
-    with limited(seconds), within(found.message or str(found.status)):
-        for k, limit in enumerate(asked):
-            report_progress("what limits can reach", k, len(asked))
-            with within(f"what '{limit.name}' can reach"), limited(left() / (len(asked) - k)):
-                answers.append(_in_time(_answer(limit, problem, kinds, found, solve)))
-        if len(found.conflict) > 1 and any(answer.is_none for answer in answers):
-            found = _narrowed(found, problem, solve)
+    names = _wanted(result, problem)
+    limits = [limit for limit in problem.limits if limit.name in names]
+    # the largest violation of the nearest design comes first
+    limits.sort(key=lambda limit: result.nearest is None or limit.name != result.nearest.name)
+    if not limits or any(extra.open_names for extra in problem.extras):
+        return result
+    is_core = not problem.extras and not problem.ranks
+    solve, answers = partial(_surely, solve, problem) if is_core else solve, []
+    # a time limit of the caller replaces the default
+    seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, spent)
+    with limited(seconds), within(result.message or str(result.status)):
+        for k, limit in enumerate(limits):
+            report_progress("what limits can reach", k, len(limits))
+            with within(f"what '{limit.name}' can reach"), limited(left() / (len(limits) - k)):
+                answers.append(_in_time(_answer(limit, problem, kinds, result, solve)))
+        if len(result.conflict) > 1 and any(answer.is_none for answer in answers):
+            result = _narrowed(result, problem, solve)
     designs = [answer.result for answer in answers if answer.result is not None]
-    for result in designs:
-        if drawn and result.final.violation(problem.limits) <= KEPT:
-            return _recovered(found, problem, result)
-    wanted = _wanted(found, problem)
-    found = replace(found, reached=tuple(answer.told for answer in answers if answer.told.name in wanted))
-    if found.status is Status.FAILED and drawn:
-        found = _excluded(found, problem)
-    near = _nearest(found, problem, designs) if drawn and found.status is Status.FAILED else None
-    return replace(found, nearest=near)
+    for candidate in designs:
+        if is_core and candidate.final.violation(problem.limits) <= KEPT:
+            return _recovered(result, problem, candidate)
+    names = _wanted(result, problem)
+    result = replace(result, reached=tuple(answer.told for answer in answers if answer.told.name in names))
+    if result.status is Status.FAILED and is_core:
+        result = _excluded(result, problem)
+    near = _nearest(result, problem, designs) if is_core and result.status is Status.FAILED else None
+    return replace(result, nearest=near)
 
 
-def _surely(solve: Solve, problem: Problem, asked: Problem) -> Result:
-    # P7: means at few angles are inexact, so a disagreement is settled at many
-    result = solve(asked)
+def _surely(solve: Solve, problem: Problem, part: Problem) -> Result:
+    # P7: means of few samples are inexact, so more samples settle a doubt about feasibility
+    result = solve(part)
     if not result.status.has_design or result.objective is None:
         return result
-    sampled, fine = [limit for limit in problem.limits if limit.measure.is_load], with_fine_sampling(result.final)
-    if (result.final.violation(sampled) <= KEPT) is (fine.violation(sampled) <= KEPT):
+    load_limits, fine = [limit for limit in problem.limits if limit.measure.is_load], with_fine_sampling(result.final)
+    if (result.final.violation(load_limits) <= KEPT) is (fine.violation(load_limits) <= KEPT):
         return result
     value = objective_value(result.problem, fine)
     return replace(result, final=fine, objective=replace(result.objective, value=value))
 
 
-def _wanted(found: Result, problem: Problem) -> Collection[str]:
-    if found.status is Status.INFEASIBLE:
-        return found.conflict
-    broken = broken_limits(problem.limits, found.final) if found.decisions else found.nearest and found.nearest.broken
-    return broken or [limit.name for limit in problem.limits]
+def _wanted(result: Result, problem: Problem) -> Collection[str]:
+    if result.status is Status.INFEASIBLE:
+        return result.conflict
+    violated = (
+        broken_limits(problem.limits, result.final) if result.decisions else result.nearest and result.nearest.broken
+    )
+    return violated or [limit.name for limit in problem.limits]
 
 
-def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
-    """Return the value that a limit can reach under the others; of two sides the second if the first is no cause."""
-    measure, unsolved = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
+def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
+    """Return the attainable value of a limit under the others; its lower side if the upper one is not the cause."""
+    measure, default = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
-        return _Answer(replace(unsolved, why="a band is kept or not; no single value can be reached"))
-    others = tuple(other for other in problem.limits if other is not limit)
+        return _Answer(replace(default, why="a band is kept or not; no single value can be reached"))
+    other_limits = tuple(other for other in problem.limits if other is not limit)
     sides = [("at most", limit.maximum, replace(limit, minimum=-math.inf), replace(limit, maximum=math.inf))]
     sides += [("at least", limit.minimum, *reversed(sides[0][2:]))]
-    answer = _Answer(unsolved)
-    for side, edge, own, rest in sides:
-        if math.isinf(edge):
+    answer = _Answer(default)
+    for side, limit_value, one_side, other_side in sides:
+        if math.isinf(limit_value):
             continue
-        told = replace(unsolved, side=side, limit=edge)
+        entry = replace(default, side=side, limit=limit_value)
         if passed():
-            return _Answer(replace(told, why=LONG))
+            return _Answer(replace(entry, why=LONG))
         if not depends(measure.channel, kinds, problem):
-            known = {own.name: own.value for own in found.limits}
-            value = math.nan if found.initial.resonance else known.get(limit.name, math.nan)
-            return _Answer(replace(told, value=value, why="nothing that is open changes it"))
-        held = others if math.isinf(rest.minimum) and math.isinf(rest.maximum) else (*others, rest)
+            known = {entry.name: entry.value for entry in result.limits}
+            value = math.nan if result.initial.resonance else known.get(limit.name, math.nan)
+            return _Answer(replace(entry, value=value, why="nothing that is open changes it"))
+        limits = (
+            other_limits
+            if math.isinf(other_side.minimum) and math.isinf(other_side.maximum)
+            else (*other_limits, other_side)
+        )
         try:
             if measure.channel.minimised and side == "at most":
-                answer = _minimum(told, _asking(problem, (Term(measure),), held), solve)
+                answer = _minimum(entry, _asking(problem, (Term(measure),), limits), solve)
             else:
-                answer = _at_edges(told, own, problem, held, found.status, solve)
+                answer = _at_edges(entry, one_side, problem, limits, result.status, solve)
         except LaufruheError as error:
-            return _Answer(replace(told, why=str(error)))
+            return _Answer(replace(entry, why=str(error)))
         if not answer.is_none:
             break
     return answer
 
 
 def _in_time(answer: _Answer) -> _Answer:
-    told = answer.told
-    return replace(answer, told=replace(told, ended=passed() and not told.why and told.proof is not Proof.GLOBAL))
+    entry = answer.told
+    return replace(answer, told=replace(entry, ended=passed() and not entry.why and entry.proof is not Proof.GLOBAL))
 
 
 def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
     # decisions that affect nothing here are left out
-    asked = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
+    part = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
     if problem.phasing is not None:
-        return asked
-    felt = [measure.channel for measure in asked.measures]
-    moving = tuple(d for d in asked.decisions if any(depends(channel, {d.kind}, asked) for channel in felt))
-    return asked.changed(decisions=moving)
+        return part
+    channels = [measure.channel for measure in part.measures]
+    decisions = tuple(d for d in part.decisions if any(depends(channel, {d.kind}, part) for channel in channels))
+    return part.changed(decisions=decisions)
 
 
-def _minimum(told: AttainableLimit, asked: Problem, solve: Solve) -> _Answer:
-    """Return the reached value of a measure by minimising it under the other limits."""
-    result = solve(asked)
+def _minimum(entry: AttainableLimit, part: Problem, solve: Solve) -> _Answer:
+    """Return the attainable value of a measure by minimising it under the other limits."""
+    result = solve(part)
     if not result.status.has_design or result.objective is None:
-        return _none(told, result)
+        return _none(entry, result)
     proof = result.certificate
     return _Answer(
         replace(
-            told,
+            entry,
             value=result.objective.value,
             bound=proof.lower_bound if proof else math.nan,
             proof=proof.kind if proof else Proof.NONE,
@@ -187,98 +193,98 @@ def _minimum(told: AttainableLimit, asked: Problem, solve: Solve) -> _Answer:
     )
 
 
-def _none(told: AttainableLimit, result: Result) -> _Answer:
+def _none(entry: AttainableLimit, result: Result) -> _Answer:
     # the other limits have no design either
     if result.status is Status.INFEASIBLE:
         names = quoted(result.conflict)
-        why = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
-        return _Answer(replace(told, why=why), is_none=True)
-    return _Answer(replace(told, why=LONG if passed() else "no design was found that keeps the other limits"))
+        reason = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
+        return _Answer(replace(entry, why=reason), is_none=True)
+    return _Answer(replace(entry, why=LONG if passed() else "no design was found that keeps the other limits"))
 
 
-def _narrowed(found: Result, problem: Problem, solve: Solve) -> Result:
-    # the conflict becomes a smallest set: what breaks a limit on one star may keep it on another
-    limits = [limit for limit in problem.limits if limit.name in found.conflict]
+def _narrowed(result: Result, problem: Problem, solve: Solve) -> Result:
+    # shrink the conflict: limits that conflict on one star may be met on another
+    limits = [limit for limit in problem.limits if limit.name in result.conflict]
 
-    def excluded(kept: Sequence[Limit]) -> bool:
-        asked = _asking(problem, problem.objective, tuple(kept))
-        return not passed() and solve(asked).status is Status.INFEASIBLE
+    def excluded(subset: Sequence[Limit]) -> bool:
+        part = _asking(problem, problem.objective, tuple(subset))
+        return not passed() and solve(part).status is Status.INFEASIBLE
 
     names = smallest_conflict(limits, excluded)
-    return found if len(names) == len(limits) else replace(found, conflict=names, message=contradiction(names))
+    return result if len(names) == len(limits) else replace(result, conflict=names, message=contradiction(names))
 
 
 def _at_edges(
-    told: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
+    entry: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
 ) -> _Answer:
-    """Return the reached value of a limit by bisection between its edge and the value of a design without it."""
-    high = told.side == "at most"
-    first = solve(_asking(problem, problem.objective, others))
-    if not first.status.has_design:
-        return _none(told, first)
-    best, reached = first, _extreme(first, limit, high)
-    missed, bound = told.limit, told.limit if status is Status.INFEASIBLE else math.nan
+    """Return the attainable value of a limit by bisection between the limit and the value of a design without it."""
+    is_maximum = entry.side == "at most"
+    unlimited = solve(_asking(problem, problem.objective, others))
+    if not unlimited.status.has_design:
+        return _none(entry, unlimited)
+    nearest, value = unlimited, _extreme(unlimited, limit, is_maximum)
+    unreached, bound = entry.limit, entry.limit if status is Status.INFEASIBLE else math.nan
     for _ in in_time(range(HALVINGS)):
-        if abs(reached - missed) <= CLOSE * abs(told.limit):
+        if abs(value - unreached) <= CLOSE * abs(entry.limit):
             break
-        edge = 0.5 * (reached + missed)
-        moved = replace(limit, maximum=edge) if high else replace(limit, minimum=edge)
-        found = solve(_asking(problem, problem.objective, (*others, moved)))
-        if found.status.has_design:
-            best, reached = found, _extreme(found, limit, high)
+        middle = 0.5 * (value + unreached)
+        bisected = replace(limit, maximum=middle) if is_maximum else replace(limit, minimum=middle)
+        candidate = solve(_asking(problem, problem.objective, (*others, bisected)))
+        if candidate.status.has_design:
+            nearest, value = candidate, _extreme(candidate, limit, is_maximum)
         else:
-            missed, bound = edge, edge if found.status is Status.INFEASIBLE else bound
-    proven = Proof.WITHIN_GAP if bound == missed else Proof.LOCAL
-    return _Answer(replace(told, value=reached, bound=bound, proof=proven, decisions=best.decisions), best)
+            unreached, bound = middle, middle if candidate.status is Status.INFEASIBLE else bound
+    proven = Proof.WITHIN_GAP if bound == unreached else Proof.LOCAL
+    return _Answer(replace(entry, value=value, bound=bound, proof=proven, decisions=nearest.decisions), nearest)
 
 
-def _extreme(result: Result, limit: Limit, high: bool) -> float:
+def _extreme(result: Result, limit: Limit, is_maximum: bool) -> float:
     values = result.final.values(limit.measure)
-    return (max if high else min)(values, default=limit.maximum if high else limit.minimum)
+    return (max if is_maximum else min)(values, default=limit.maximum if is_maximum else limit.minimum)
 
 
-def _recovered(found: Result, problem: Problem, result: Result) -> Result:
-    """A design that keeps all limits after all, by what bounds are known of the objective."""
+def _recovered(result: Result, problem: Problem, candidate: Result) -> Result:
+    """Return a feasible design that the search found, with the lower bound of the original objective."""
     bound, zero_level = (
-        found.certificate.lower_bound if found.certificate else 0.0,
-        numerical_zero(problem, result.final.engine),
+        result.certificate.lower_bound if result.certificate else 0.0,
+        numerical_zero(problem, candidate.final.engine),
     )
-    read = read_under(problem, result.final, objective_value(problem, result.final), bound, zero_level)
-    result, value = replace(result, final=read.evaluation), read.value
-    how = f"found while {result.problem.objective_name} was minimised"
+    reading = read_under(problem, candidate.final, objective_value(problem, candidate.final), bound, zero_level)
+    candidate, value = replace(candidate, final=reading.evaluation), reading.value
+    method = f"found while {candidate.problem.objective_name} was minimised"
     proof = make_certificate(
-        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, how, read.doubt
+        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, method, reading.doubt
     )
-    own = result.problem.changed(objective=problem.objective, limits=problem.limits)
+    restored = candidate.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
-        result,
-        problem=own,
+        candidate,
+        problem=restored,
         status=Status.OPTIMAL if proof.kind is Proof.GLOBAL else Status.FEASIBLE,
-        objective=ObjectiveValue.of(problem, value, objective_value(problem, found.initial)),
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, result.initial)),
         certificate=proof,
         decisions=tuple(
-            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in result.decisions
+            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in candidate.decisions
         ),
-        limits=limit_values(problem, result.final, {}, value),
-        initial=found.initial,
-        error=partial(error_of, own, result.final),
+        limits=limit_values(problem, candidate.final, {}, value),
+        initial=result.initial,
+        error=partial(error_of, restored, candidate.final),
     )
 
 
-def _excluded(found: Result, problem: Problem) -> Result:
-    # infeasible if the bound of one limit exceeds it
-    for told in found.reached:
-        if told.side == "at most" and told.bound > told.limit * (1.0 + KEPT):
+def _excluded(result: Result, problem: Problem) -> Result:
+    # the problem is infeasible if the lower bound of a limited measure exceeds its limit
+    for entry in result.reached:
+        if entry.side == "at most" and entry.bound > entry.limit * (1.0 + KEPT):
             names = tuple(limit.name for limit in problem.limits)
             others = " that keeps the other limits" if len(names) > 1 else ""
-            none = infeasible_result(problem, found.initial, names, found.timing)
-            message = f"no design exists: none{others} keeps '{told.name}'"
-            return replace(none, message=message, reached=found.reached)
-    return found
+            infeasible = infeasible_result(problem, result.initial, names, result.timing)
+            message = f"no design exists: none{others} keeps '{entry.name}'"
+            return replace(infeasible, message=message, reached=result.reached)
+    return result
 
 
-def _nearest(found: Result, problem: Problem, designs: Sequence[Result]) -> Nearest | None:
-    # known design with the smallest violation of limits
-    known = [found.nearest] if found.nearest is not None else []
-    known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, found) if not r.final.resonance]
-    return min(known, key=lambda each: each.violation, default=None)
+def _nearest(result: Result, problem: Problem, designs: Sequence[Result]) -> Nearest | None:
+    # the design with the smallest violation
+    known = [result.nearest] if result.nearest is not None else []
+    known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, result) if not r.final.resonance]
+    return min(known, key=lambda candidate: candidate.violation, default=None)

@@ -1,4 +1,4 @@
-"""From a decided design to a result: judged by the exact model, priced, and certified in one way (P5, E15)."""
+"""Build results from designs: exact evaluation, shadow prices and certificate (P5, E15)."""
 
 from __future__ import annotations
 
@@ -30,35 +30,35 @@ from laufruhe.solvers.stars.ranking import why_no_order
 from laufruhe.solvers.values import DecisionValue, LimitValue, Nearest, ObjectiveValue
 
 FEASIBLE = 1e-6
-"""Relative excess over a limit that counts as none."""
+"""Relative violation of a limit that counts as zero."""
 KEPT = 10.0 * FEASIBLE
-"""Relative excess that a design may have and be called one."""
+"""Largest relative violation of a feasible design."""
 STEEP = 10.0
-"""Times a relative excess over a limit that counts of the objective of a witness, whose prices nobody knows yet."""
+"""Penalty of a witness: its objective rises by this factor times its relative violation, since prices are unknown."""
 READINGS = 3
-"""Times that an objective is read at more angles where a bound lies over it."""
-# share of the objective under which a price is a rounding
-_FELT = 1e-7
-# share of the objective from which a price tells that a limit holds the design, whatever room its tolerance left
-_TOLD = 1e-3
+"""Largest number of refinements of the samples while a lower bound exceeds the objective."""
+# prices below this share of the objective are rounding errors
+_PRICE_FLOOR = 1e-7
+# a limit is active if relaxing it by all of its value gains more than this share of the objective
+_ACTIVE_PRICE = 1e-3
 NEAR, STILL = 1e-3, 1e-9
-"""Share of a decision's scale by which it is moved, and share of what is limited that is no change of it."""
+"""Step of a decision relative to its scale, and relative change of a measure that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Design:
-    """Decisions and what the exact model says of them.
+    """Values of all decisions with their evaluation by the exact model.
 
     Attributes
     ----------
     problem
-        With the star and the firing order of the design.
+        Problem with the star and the firing order of the design.
     values
-        Of its decisions.
+        Values of the decisions [SI].
     value
         Objective.
     violation
-        Largest relative excess over a limit.
+        Largest relative violation of a limit.
     """
 
     problem: Problem
@@ -70,8 +70,8 @@ class Design:
     @property
     def rank(self) -> tuple[bool, float]:
         """Sort key: smallest violation of limits first, then smallest objective."""
-        broken = self.violation > KEPT
-        return broken, self.violation if broken else self.value
+        is_infeasible = self.violation > KEPT
+        return is_infeasible, self.violation if is_infeasible else self.value
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,15 +81,15 @@ class ProofData:
     Attributes
     ----------
     bound
-        What no design allowed goes under.
+        Lower bound of the objective over all feasible designs.
     strength
-        What such a bound can prove.
+        Kind of proof that a bound of this method can give.
     kkt_residual, method
-        As in a certificate.
+        Residual of the optimality conditions and name of the method, as in a certificate.
     prices
-        Of sides of limits, those that are known.
+        Known shadow prices of sides of limits.
     bounds
-        Prices of bounds, by the name of the size or angle that stands at one.
+        Shadow prices of active bounds of decisions, by the name of the size or angle.
     """
 
     bound: float
@@ -101,21 +101,28 @@ class ProofData:
 
 
 def evaluate_design(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
-    """A design by the exact model.
+    """Evaluate a design by the exact model.
+
+    Parameters
+    ----------
+    values
+        Value of every decision of the problem [SI].
+    samples
+        Samples per cycle; those of the fidelity if None.
 
     Raises
     ------
     ModelError
-        If it has no loads, as on a resonance that nothing damps.
+        If the design has no finite loads, for example at an undamped resonance.
     """
-    held = problem.fixed_at(values)
-    evaluation = evaluate(held, samples=samples)
+    fixed = problem.fixed_at(values)
+    evaluation = evaluate(fixed, samples=samples)
     value = objective_value(problem, evaluation)
     return Design(problem, tuple(values), evaluation, value, evaluation.violation(problem.limits))
 
 
 def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
-    """The design as given; None where it has no loads."""
+    """Return the initial design from its evaluation; None at an undamped resonance, where loads are infinite."""
     if initial.resonance:
         return None
     value = objective_value(problem, initial)
@@ -126,21 +133,21 @@ def better(design: Design, other: Design | None) -> Design:
     """Return the design with the smaller violation of limits; at equal violation, with the smaller objective."""
     if other is None:
         return design
-    return min((design, other), key=lambda each: (max(each.violation, KEPT), each.value))
+    return min((design, other), key=lambda candidate: (max(candidate.violation, KEPT), candidate.value))
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """Objective of a design beside a bound of all.
+    """Objective of a design at enough samples for a comparison with a lower bound.
 
     Attributes
     ----------
     evaluation
-        At the angles at which the objective was read.
+        Evaluation at the samples of `value`.
     value
         Objective.
     doubt
-        By how much it may be read too low: between these angles, and where limits are exceeded by a rounding.
+        Largest error by which `value` may be too low: from sampling, and from violations within the tolerance.
     """
 
     evaluation: Evaluation
@@ -152,9 +159,20 @@ def read_under(
     problem: Problem, evaluation: Evaluation, value: float, bound: float, zero_level: float,
     prices: Mapping[Side, Price] | None = None,
 ) -> Reading:  # fmt: skip
-    """Return the objective of a design, read at so many angles that what bounds all of a cycle lies under it (P7).
+    """Return the objective of a design, with more samples while a lower bound exceeds it (P7).
 
-    Means averaged about angles bound those of the whole cycle, and a mean at few angles may lie under them.
+    A bound holds for the mean over the cycle, and a mean of few samples may be smaller than that.
+
+    Parameters
+    ----------
+    evaluation, value
+        Evaluation of the design and its objective.
+    bound
+        Lower bound of the objective.
+    zero_level
+        Value of the objective that is numerically zero.
+    prices
+        Shadow prices of limits, which value violations within the tolerance.
     """
     for _ in range(READINGS):
         if not is_over(bound, value, zero_level) or not any(is_sampled(term.measure) for term in problem.objective):
@@ -165,7 +183,7 @@ def read_under(
 
 
 def result_under(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
-    """Return a result read at so many angles that a bound lies under it, and by how much it may be read too low."""
+    """Return a result with more samples while a bound exceeds its objective, and the error of that objective."""
     if result.objective is None:
         return result, 0.0
     read = read_under(result.problem, result.final, result.objective.value, bound, zero_level, result.prices)
@@ -173,70 +191,88 @@ def result_under(result: Result, bound: float, zero_level: float) -> tuple[Resul
 
 
 def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
-    """Return a design as a witness of bounds in coordinates of theirs; None where it exceeds a limit by more."""
+    """Return a design as a witness of lower bounds; None if its violation is larger than `violation`.
+
+    Parameters
+    ----------
+    place
+        Coordinates of the design in the boxes of the bound, shape (n,).
+    violation
+        Largest relative violation of a witness.
+    """
     if design.violation > violation:
         return None
     problem, evaluation = design.problem, design.evaluation
 
     def read() -> float:
         zero_level = numerical_zero(problem, evaluation.engine)
-        found = read_under(problem, evaluation, design.value, math.inf, zero_level)
-        return found.value * (1.0 + STEEP * max(design.violation, 0.0)) + found.doubt + zero_level
+        reading = read_under(problem, evaluation, design.value, math.inf, zero_level)
+        return reading.value * (1.0 + STEEP * max(design.violation, 0.0)) + reading.doubt + zero_level
 
     return Witness(place, design.value, read)
 
 
 def is_sampled(measure: Measure) -> bool:
-    """Return whether more angles tell more of a measure."""
+    """Return True if the value of a measure depends on the number of samples."""
     return measure.is_load and not measure.norm.is_euclidean
 
 
 def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
-    # P7: possible underestimate of the objective; infinite if the design breaks limits at many angles
-    many = with_fine_sampling(evaluation) if problem.limits else evaluation
-    if many.violation(problem.limits) > FEASIBLE:
+    # P7: possible underestimate of the objective; infinite if the design violates limits at many samples
+    fine = with_fine_sampling(evaluation) if problem.limits else evaluation
+    if fine.violation(problem.limits) > FEASIBLE:
         return math.inf
-    missing = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
+    error = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
-        found = many.standing(limit)
-        if found.side == side and price.relaxed > 0.0:
-            missing += price.relaxed * max(found.violation, 0.0) * abs(found.edge)
-    return missing
+        standing = fine.standing(limit)
+        if standing.side == side and price.relaxed > 0.0:
+            error += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
+    return error
 
 
-def build_result(design: Design, initial: Evaluation, shown: ProofData, timing: dict[str, float]) -> Result:
-    """The result of a design, or of the one given where that is better."""
+def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: dict[str, float]) -> Result:
+    """Return the result of a design, or of the initial design if that is better.
+
+    Parameters
+    ----------
+    initial
+        Evaluation of the initial design.
+    proof
+        Lower bound and shadow prices from the method.
+    timing
+        Seconds by stage of the solve.
+    """
     problem = design.problem
-    given = objective_value(problem, initial)
-    as_given = Design(problem, problem.start, initial, given, initial.violation(problem.limits))
-    design = min(design, as_given, key=lambda each: each.rank)
-    met = design.violation <= KEPT
+    initial_value = objective_value(problem, initial)
+    baseline = Design(problem, problem.start, initial, initial_value, initial.violation(problem.limits))
+    design = min(design, baseline, key=lambda candidate: candidate.rank)
+    is_feasible = design.violation <= KEPT
     zero_level = numerical_zero(problem, design.evaluation.engine)
-    if met:
-        read = read_under(problem, design.evaluation, design.value, shown.bound, zero_level, shown.prices)
-        design = replace(design, evaluation=read.evaluation, value=read.value)
+    if is_feasible:
+        reading = read_under(problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices)
+        design = replace(design, evaluation=reading.evaluation, value=reading.value)
         certificate = make_certificate(
-            design.value, shown.bound, zero_level, problem.tolerance, shown.strength, shown.kkt_residual, shown.method,
-            read.doubt,
+            design.value, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method,
+            reading.doubt,
         )  # fmt: skip
     else:
-        # the bound is of designs, and this is none
-        bound = max(shown.bound, 0.0)
+        # an infeasible design proves nothing
+        bound = max(proof.bound, 0.0)
         gap = gap_of(design.value, bound, zero_level)
-        certificate = Certificate(Proof.NONE, bound, gap, shown.kkt_residual, shown.method)
-    # prices under what the proof leaves open are those of its rounding
-    unfelt = max(_FELT, min(certificate.gap, problem.tolerance))
-    limits = limit_values(problem, design.evaluation, shown.prices, design.value, unfelt)
+        certificate = Certificate(Proof.NONE, bound, gap, proof.kkt_residual, proof.method)
+    # prices below the gap are rounding errors
+    price_floor = max(_PRICE_FLOOR, min(certificate.gap, problem.tolerance))
+    limits = limit_values(problem, design.evaluation, proof.prices, design.value, price_floor)
     proven = certificate.kind is Proof.GLOBAL
     message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
-    if not met:
+    if not is_feasible:
         message = broken_message(problem, design.evaluation)
     return Result(
         problem=problem,
-        status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue.of(problem, design.value, given),
+        status=Status.FAILED if not is_feasible else Status.OPTIMAL if proven else Status.FEASIBLE,
+        objective=ObjectiveValue.of(problem, design.value, initial_value),
         certificate=certificate,
-        decisions=decided(design, shown.bounds, unfelt),
+        decisions=decided(design, proof.bounds, price_floor),
         limits=limits,
         initial=initial,
         final=design.evaluation,
@@ -247,28 +283,28 @@ def build_result(design: Design, initial: Evaluation, shown: ProofData, timing: 
 
 
 def broken_message(problem: Problem, evaluation: Evaluation) -> str:
-    """Return a message that the best design found breaks limits."""
+    """Return a message that the best design found violates limits."""
     broken = quoted(broken_limits(problem.limits, evaluation)) or "a limit"
     return f"the best design found breaks {broken}; relax it, or open more"
 
 
 def state(problem: Problem, to_start_from: bool = False) -> Result:
-    """The design as given, evaluated and not changed; infeasible where its throws have no firing order allowed.
+    """Evaluate the initial design without a change; infeasible if its throws have no permitted firing order.
 
     Parameters
     ----------
     to_start_from
-        Whether it is only where a search starts, so that it may stand on a resonance.
+        True if a search starts from the design: it may then stand on an undamped resonance.
     """
     started = time.perf_counter()
     problem = problem.drawing
     evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
-    open_of = problem.phasing
-    why = why_no_order(open_of, open_of.throws) if open_of is not None and open_of.throws is not None else ""
+    phasing = problem.phasing
+    reason = why_no_order(phasing, phasing.throws) if phasing is not None and phasing.throws is not None else ""
     return Result(
         problem=problem,
-        status=Status.INFEASIBLE if why else Status.FEASIBLE,
-        message=why,
+        status=Status.INFEASIBLE if reason else Status.FEASIBLE,
+        message=reason,
         objective=ObjectiveValue.given(problem, evaluation),
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
@@ -279,12 +315,12 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
 
 
 def quoted(names: Iterable[str]) -> str:
-    """Names of limits in a sentence."""
+    """Return names in quotation marks, joined by "and"."""
     return " and ".join(f"'{name}'" for name in names)
 
 
 def contradiction(conflict: Sequence[str]) -> str:
-    """Return a message that no design keeps the named limits together."""
+    """Return a message that no design meets all of the named limits."""
     names = quoted(conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return f"no design exists: {names} {verb}"
@@ -307,23 +343,32 @@ def infeasible_result(
 
 
 def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
-    """Return a failed result: the search found no feasible design, and nothing proves that none exists."""
-    why = f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
-    return replace(infeasible_result(problem, initial, (), timing), status=Status.FAILED, message=why)
+    """Return a failed result: no feasible design was found, and none is proven not to exist."""
+    message = (
+        f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
+    )
+    return replace(infeasible_result(problem, initial, (), timing), status=Status.FAILED, message=message)
 
 
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
-    """Names of those that a design breaks."""
+    """Return names of limits whose relative violation is more than `KEPT`."""
     return tuple(limit.name for limit in limits if evaluation.standing(limit).violation > KEPT)
 
 
 def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> Nearest:
-    """A design that is no answer, and the limit that it breaks most."""
-    broken = max(problem.limits, key=lambda limit: design.standing(limit).violation)
-    stands = design.standing(broken)
+    """Return the record of an infeasible design: its decisions, and the limit with the largest violation."""
+    limit = max(problem.limits, key=lambda limit: design.standing(limit).violation)
+    standing = design.standing(limit)
     names = broken_limits(problem.limits, design)
     return Nearest(
-        broken.name, stands.side, stands.edge, broken.measure.unit, stands.value, stands.violation, names, decisions
+        limit.name,
+        standing.side,
+        standing.edge,
+        limit.measure.unit,
+        standing.value,
+        standing.violation,
+        names,
+        decisions,
     )
 
 
@@ -332,13 +377,20 @@ def limit_values(
     evaluation: Evaluation,
     prices: Mapping[Side, Price] | None = None,
     value: float = 0.0,
-    unfelt: float = _FELT,
+    price_floor: float = _PRICE_FLOOR,
 ) -> tuple[LimitValue, ...]:
-    """Return value and price of each limit at a design (E15).
+    """Return value and shadow price of each limit at a design (E15).
 
-    A price below an `unfelt` share of the objective is zero.
+    Parameters
+    ----------
+    prices
+        Known shadow prices by side of a limit; None if nothing is open.
+    value
+        Objective.
+    price_floor
+        Share of the objective below which a price counts as zero.
     """
-    return tuple(_limit_value(problem, limit, evaluation, prices, value, unfelt) for limit in problem.limits)
+    return tuple(_limit_value(problem, limit, evaluation, prices, value, price_floor) for limit in problem.limits)
 
 
 def _limit_value(
@@ -347,86 +399,106 @@ def _limit_value(
     evaluation: Evaluation,
     prices: Mapping[Side, Price] | None,
     value: float,
-    unfelt: float = _FELT,
+    price_floor: float = _PRICE_FLOOR,
 ) -> LimitValue:
-    found = evaluation.standing(limit)
+    standing = evaluation.standing(limit)
     if prices is None:
-        # nothing is open that takes a step
+        # no decision can move
         price = Price.both(math.nan)
-    elif found.violation >= -ACTIVE and not _is_moved(problem, evaluation, limit):
-        # nothing open moves it: relaxed it changes nothing, and tightened no design keeps it
+    elif standing.violation >= -ACTIVE and not _is_moved(problem, evaluation, limit):
+        # no decision changes the measure: relaxing gains nothing, and tightening excludes every design
         price = Price(0.0, math.inf)
     else:
-        # an active side without a price has one that nothing here tells
-        price = prices.get((limit, found.side), Price.both(math.nan))
-    told = price.relaxed * abs(found.edge) > _TOLD * value and found.violation >= -problem.tolerance
-    active = bool(found.violation >= -ACTIVE or told)
-    price = price.felt(unfelt * value / abs(found.edge) if found.edge else 0.0) if active else Price(0.0, 0.0)
-    error = relative(missed(limit.measure, evaluation), found.value)
+        # the price of an active side may be unknown
+        price = prices.get((limit, standing.side), Price.both(math.nan))
+    is_priced = price.relaxed * abs(standing.edge) > _ACTIVE_PRICE * value and standing.violation >= -problem.tolerance
+    active = bool(standing.violation >= -ACTIVE or is_priced)
+    price = (
+        price.felt(price_floor * value / abs(standing.edge) if standing.edge else 0.0) if active else Price(0.0, 0.0)
+    )
+    error = relative(missed(limit.measure, evaluation), standing.value)
     return LimitValue(
-        limit.name, found.value, found.edge, limit.measure.unit, active, price.relaxed, found.side, error, price.other
+        limit.name,
+        standing.value,
+        standing.edge,
+        limit.measure.unit,
+        active,
+        price.relaxed,
+        standing.side,
+        error,
+        price.other,
     )
 
 
 def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
-    """Tell if anything open moves what is limited, near a design."""
+    """Return True if a small step of a decision changes the limited measure at a design."""
     channel = limit.measure.channel
     if not depends(channel, kinds_of(problem), problem):
         return False
     # no step of a decision moves a throw
-    turns = problem.phasing is not None and depends(channel, {Kind.STAR}, problem)
-    if channel.is_load or channel.is_mass or turns:
+    moves_throws = problem.phasing is not None and depends(channel, {Kind.STAR}, problem)
+    if channel.is_load or channel.is_mass or moves_throws:
         return True
-    given, there = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
+    values, at_design = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
     steps = (
         (decision, NEAR * decision.set.scale * (direction if decision.is_affine else 1.0))
         for decision in problem.decisions for direction in decision.set.directions
     )  # fmt: skip
     for decision, step in steps:
         try:
-            values = evaluate(problem, there.design([decision.start + step], [decision])).values(limit.measure)
+            shifted = evaluate(problem, at_design.design([decision.start + step], [decision])).values(limit.measure)
         except ModelError:
             return True
-        if len(values) != len(given) or any(abs(x - y) > STILL * abs(x) for x, y in zip(given, values, strict=True)):
+        if len(shifted) != len(values) or any(
+            abs(x - y) > STILL * abs(x) for x, y in zip(values, shifted, strict=True)
+        ):
             return True
     return False
 
 
 def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
-    """A result with limits beside its own that nothing open acts on, in the order given."""
+    """Return a result with further limits that no decision changes, in the order of `limits`."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
-    still, finer = result.final, with_fine_sampling(result.final)
-    shown = tuple(
-        known.get(limit) or _limit_value(problem, limit, finer if still.violation([limit]) > KEPT else still, {}, 0.0)
+    final, fine = result.final, with_fine_sampling(result.final)
+    values = tuple(
+        known.get(limit) or _limit_value(problem, limit, fine if final.violation([limit]) > KEPT else final, {}, 0.0)
         for limit in limits
     )
     resonant = not known and result.final.resonance
-    return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)
+    return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else values)
 
 
 def unbalances_of(problem: Problem, result: Result) -> list[complex]:
-    """Complex decisions from the sizes and angles of a result."""
+    """Return the unbalances of a result as complex numbers [kg m]."""
     return [complex(value) for value in values_of(replace(problem, decisions=problem.unbalances), result)]
 
 
 def values_of(problem: Problem, result: Result) -> list[Value]:
-    """Return the value of every decision in a result; the start value if the result has none."""
-    found = {decision.name: decision.value for decision in result.decisions}
+    """Return the value of every decision [SI]: that of the result, or the initial value if the result has none."""
+    sizes = {decision.name: decision.value for decision in result.decisions}
 
     def value(decision: Decision) -> Value:
-        size = found.get(decision.name)
+        size = sizes.get(decision.name)
         if size is None or not decision.is_affine:
             return decision.start if size is None else size
-        return cmath.rect(size, found.get(angle_name(decision), decision.set.angles[0]))
+        return cmath.rect(size, sizes.get(angle_name(decision), decision.set.angles[0]))
 
     return [value(decision) for decision in problem.decisions]
 
 
 def decided(
-    design: Design, bounds: Mapping[str, Price] | None = None, unfelt: float = 0.0
+    design: Design, bounds: Mapping[str, Price] | None = None, price_floor: float = 0.0
 ) -> tuple[DecisionValue, ...]:
-    """Return the decisions of a design, with prices of the bounds that it stands at, where that share is felt."""
-    minimum = unfelt * design.value
+    """Return the decision values of a design, with shadow prices of active bounds.
+
+    Parameters
+    ----------
+    bounds
+        Shadow prices by the name of the size or angle.
+    price_floor
+        Share of the objective below which a price counts as zero.
+    """
+    minimum = price_floor * design.value
     return tuple(
         _priced(entry, (bounds or {}).get(entry.name), minimum)
         for decision, value in zip(design.problem.decisions, design.values, strict=True)
@@ -437,21 +509,21 @@ def decided(
 def _priced(entry: DecisionValue, price: Price | None, minimum: float) -> DecisionValue:
     if price is None or not entry.at_bound:
         return entry
-    own = price.felt(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
-    return replace(entry, shadow_price=own.relaxed, tightening_price=own.other)
+    floored = price.felt(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
+    return replace(entry, shadow_price=floored.relaxed, tightening_price=floored.other)
 
 
 def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ...]:
-    """Size and, where open, angle of one decision."""
-    own = decision.set
-    (size, angle), (given_size, given_angle) = own.split(value), own.split(decision.start)
-    reach = own.scale * ACTIVE if decision.is_affine else (own.upper - own.lower) * ACTIVE
-    high, low = size >= own.upper - reach, size <= own.lower + reach
-    at_bound = high or (own.width == 1 and low)
-    entry = DecisionValue(decision.name, size, decision.unit, own.lower, own.upper, given_size, at_bound)
-    if own.width == 1:
+    """Return the size of one decision, and its angle if that is open."""
+    bounds = decision.set
+    (size, angle), (initial_size, initial_angle) = bounds.split(value), bounds.split(decision.start)
+    tolerance = bounds.scale * ACTIVE if decision.is_affine else (bounds.upper - bounds.lower) * ACTIVE
+    high, low = size >= bounds.upper - tolerance, size <= bounds.lower + tolerance
+    at_bound = high or (bounds.width == 1 and low)
+    entry = DecisionValue(decision.name, size, decision.unit, bounds.lower, bounds.upper, initial_size, at_bound)
+    if bounds.width == 1:
         return (entry,)
-    low_angle, high_angle = own.angles
-    edge = not own.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
+    low_angle, high_angle = bounds.angles
+    at_angle_bound = not bounds.free_angle and size > tolerance and min(angle - low_angle, high_angle - angle) < 1e-6
     name = angle_name(decision)
-    return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
+    return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, initial_angle, at_angle_bound)

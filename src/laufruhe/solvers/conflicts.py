@@ -1,4 +1,4 @@
-"""Which limits contradict each other: a smallest set of them, each needed for the contradiction."""
+"""Find a smallest set of conflicting limits: without any of them there is no conflict."""
 
 from __future__ import annotations
 
@@ -10,16 +10,22 @@ from laufruhe.problem.measure import Limit
 T = TypeVar("T")
 
 
-def smallest(conflicting: Iterable[T], excluded: Callable[[Sequence[T]], bool]) -> list[T]:
-    """Return a smallest subset that still conflicts: leaving out any element ends the conflict."""
-    kept = list(conflicting)
-    for one in tuple(kept):
-        without = [other for other in kept if other is not one]
-        if excluded(without):
-            kept = without
-    return kept
+def smallest(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
+    """Return a smallest subset that still conflicts: without any of its elements there is no conflict.
+
+    Parameters
+    ----------
+    conflicts
+        Return True if a subset conflicts.
+    """
+    subset = list(conflicting)
+    for element in tuple(subset):
+        without = [other for other in subset if other is not element]
+        if conflicts(without):
+            subset = without
+    return subset
 
 
-def smallest_conflict(limits: Sequence[Limit], excluded: Callable[[Sequence[Limit]], bool]) -> tuple[str, ...]:
-    """A smallest set of limits that no design keeps together, by name."""
-    return tuple(limit.name for limit in smallest(limits, excluded))
+def smallest_conflict(limits: Sequence[Limit], conflicts: Callable[[Sequence[Limit]], bool]) -> tuple[str, ...]:
+    """Return the names of a smallest set of limits that no design meets together."""
+    return tuple(limit.name for limit in smallest(limits, conflicts))

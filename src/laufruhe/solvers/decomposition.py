@@ -1,6 +1,7 @@
-"""Flywheel, crankshaft and all else decided apart: at an even speed none feels the others.
+"""Solve flywheel, crankshaft and all other decisions as separate problems.
 
-So sums of their optima are optimal, and sums of their bounds are bounds.
+At constant speed no measure of one depends on the others. So the sum of the optima is the optimum, and the sum of the
+lower bounds is a lower bound.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ def _groups(problem: Problem) -> list[Kinds]:
 
 
 def is_separable(problem: Problem) -> bool:
-    """Tell if decisions include a flywheel or crankshaft beside others, and each measure depends on one group alone."""
+    """Return True if flywheel or crankshaft are open with other numbers, and each measure depends on one group."""
     groups = [group for group in _groups(problem) if group]
     return len(groups) > 1 and all(len(_movers(measure, groups, problem)) <= 1 for measure in problem.measures)
 
@@ -51,12 +52,12 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
     Raises
     ------
     ModelError
-        If nothing is minimised of one.
+        If the objective depends on no decision of a group.
     """
     groups = _groups(problem)
     by_group = {group: solve(part) for group, part in _parts(problem, groups).items()}
-    found = list(by_group.values())
-    for result in found:
+    results = list(by_group.values())
+    for result in results:
         if result.status is Status.INFEASIBLE:
             return infeasible_result(problem, evaluate_start(problem), result.conflict, result.timing)
     engine = by_group[groups[-1]].final.engine if groups[-1] in by_group else problem.engine
@@ -67,22 +68,22 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
             if any(kind.name == extra.name for kind in group):
                 engine = engine.with_extra(extra)
     limits = {
-        limit: shown for result in found for limit, shown in zip(result.problem.limits, result.limits, strict=True)
+        limit: entry for result in results for limit, entry in zip(result.problem.limits, result.limits, strict=True)
     }
-    values = {value.name: value for result in found for value in result.decisions}
-    value, given = (sum(getattr(r.objective, key) for r in found if r.objective) for key in ("value", "initial"))
+    decisions = {entry.name: entry for result in results for entry in result.decisions}
+    value, initial = (sum(getattr(r.objective, key) for r in results if r.objective) for key in ("value", "initial"))
     return Result(
         problem=problem,
-        status=next((r.status for r in found if r.status is Status.FAILED), _status(found)),
-        objective=ObjectiveValue.of(problem, value, given),
-        certificate=_together(found, value),
-        decisions=tuple(values.values()),
+        status=next((r.status for r in results if r.status is Status.FAILED), _status(results)),
+        objective=ObjectiveValue.of(problem, value, initial),
+        certificate=_together(results, value),
+        decisions=tuple(decisions.values()),
         limits=tuple(limits[limit] for limit in problem.limits),
         initial=evaluate_start(problem),
-        final=evaluate(problem, engine, found[-1].final.samples),
-        message="; ".join(r.message for r in found if r.message),
-        error=partial(largest_error, found),
-        timing={key: took for r in found for key, took in r.timing.items()},
+        final=evaluate(problem, engine, results[-1].final.samples),
+        message="; ".join(r.message for r in results if r.message),
+        error=partial(largest_error, results),
+        timing={key: took for r in results for key, took in r.timing.items()},
     )
 
 
@@ -108,22 +109,22 @@ def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
     )
 
 
-def _status(found: list[Result]) -> Status:
-    proven = (r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in found)
+def _status(results: list[Result]) -> Status:
+    proven = (r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in results)
     return Status.OPTIMAL if all(proven) else Status.FEASIBLE
 
 
-def _together(found: list[Result], value: float) -> Certificate:
-    """Bounds add up; a part without anything open is its own."""
-    shown = [(r.certificate, r.objective.value if r.objective else 0.0) for r in found]
-    bound = sum(own if certificate is None else certificate.lower_bound for certificate, own in shown)
-    told = [certificate for certificate, _ in shown if certificate is not None]
-    kind = min((certificate.kind for certificate in told), key=PROOF_RANK)
-    residual = max(certificate.kkt_residual for certificate in told)
-    method = "; beside it ".join(certificate.method for certificate in told)
-    if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in found)):
+def _together(results: list[Result], value: float) -> Certificate:
+    """Return the certificate of the sum: lower bounds add up, and a part without decisions is its own bound."""
+    pairs = [(r.certificate, r.objective.value if r.objective else 0.0) for r in results]
+    bound = sum(objective if certificate is None else certificate.lower_bound for certificate, objective in pairs)
+    certificates = [certificate for certificate, _ in pairs if certificate is not None]
+    kind = min((certificate.kind for certificate in certificates), key=PROOF_RANK)
+    residual = max(certificate.kkt_residual for certificate in certificates)
+    method = "; beside it ".join(certificate.method for certificate in certificates)
+    if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in results)):
         return unproven_certificate(value, residual, method)
     gap = (value - bound) / value if value > 0.0 else 0.0
-    # what cancels in a part counts as zero there
-    gap = gap if any(certificate.gap for certificate in told) else 0.0
+    # a part may be numerically zero although the sum is not
+    gap = gap if any(certificate.gap for certificate in certificates) else 0.0
     return Certificate(kind, bound, gap, residual, method)

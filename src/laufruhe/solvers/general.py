@@ -1,8 +1,8 @@
-"""Local programs of whatever numbers are open, by exact evaluations alone: nothing is bounded.
+"""Optimise any open numbers by local programs of exact evaluations, without a lower bound.
 
-A number of the file is open by its address: every design that has it is put together anew. Where cones know some of
-what is open, they decide it for the numbers found, and programs go on from there. Where stars are open too, each of a
-limited number of them is decided so.
+An open number of the problem file has an address there, and each design is built anew from the file. Unbalances and
+other numbers in which loads are affine come from cone programs, in turn with local programs of the others. Open stars
+are solved one by one, up to a maximum number.
 """
 
 from __future__ import annotations
@@ -31,26 +31,26 @@ from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 Decide = Callable[[Problem], Result]
 INNER = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
-"""Kinds that cones decide for given values of all else, where what is asked lets them."""
+"""Kinds of numbers that cone programs optimise while all others are fixed."""
 ROUNDS, GAIN = 4, 1e-6
-"""Times that cones and programs take turns, and the share that a turn has to gain for another."""
+"""Largest number of rounds of cone program and local program, and relative gain below which they stop."""
 MOST_STARS = 60
-"""Stars, firing orders and sets of shafts that are decided one by one."""
+"""Largest number of stars, firing orders and sets of shafts that are solved one by one."""
 
 
 def solve_generally(
-    problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool], near: Sequence[Sequence[Value]] = ()
+    problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool], starts: Sequence[Sequence[Value]] = ()
 ) -> Result:  # fmt: skip
-    """Return the best design of local programs from several starts; no bound but zero is told of others.
+    """Return the best design of local programs from several starts, with the lower bound zero.
 
     Parameters
     ----------
     decide
-        What decides the rest of what is open while some of it is held.
+        Solver of a problem in which some decisions are fixed.
     by_cones
-        Return whether cones decide a problem.
-    near
-        Designs to begin with.
+        Return True if a cone program solves a problem.
+    starts
+        Further values of all decisions from which local programs start.
     """
     phasing = problem.phasing
     if phasing is not None and (phasing.continuous or phasing.throw_bounds is not None):
@@ -59,49 +59,49 @@ def solve_generally(
         return solve_star_by_star(problem, decide)
     started = time.perf_counter()
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
-    # what cannot be evaluated is refused first
+    # raise ModelError before the search if the initial design cannot be evaluated
     objective_value(problem, initial)
-    places = [*map(program.shares, (problem.start, *near)), *spread_starts(problem)]
+    points = [*map(program.shares, (problem.start, *starts)), *spread_starts(problem)]
     modelled = time.perf_counter()
-    best = best_local_optimum(program, places, problem.search.starts)
-    inner = tuple(decision for decision in problem.decisions if decision.kind in INNER)
-    if 0 < len(inner) < len(problem.decisions) and by_cones(problem.changed(decisions=inner)):
+    best = best_local_optimum(program, points, problem.search.starts)
+    cone_decisions = tuple(decision for decision in problem.decisions if decision.kind in INNER)
+    if 0 < len(cone_decisions) < len(problem.decisions) and by_cones(problem.changed(decisions=cone_decisions)):
         best = _in_turns(program, best, decide)
     design = evaluate_design(problem, program.values(best))
-    text = f"local programs from the best of {counted(len(places), 'start')}"
-    found = proof_data(program, design, 0.0, ProofStrength.RELAXED, text)
-    # gas and speeds may follow from open numbers
-    own = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))
+    text = f"local programs from the best of {counted(len(points), 'start')}"
+    proof = proof_data(program, design, 0.0, ProofStrength.RELAXED, text)
+    # gas pressure and speeds may depend on open numbers
+    solved = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-    return build_result(replace(design, problem=own), initial, found, timing)
+    return build_result(replace(design, problem=solved), initial, proof, timing)
 
 
 def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
-    """Cones for the numbers found, then local programs from there, as long as that gains."""
+    """Alternate cone programs of `INNER` decisions and local programs of all while the objective falls."""
     problem = program.problem
-    outer = tuple(decision for decision in problem.decisions if decision.kind not in INNER)
+    other_decisions = tuple(decision for decision in problem.decisions if decision.kind not in INNER)
     for k in rounds(ROUNDS):
-        before = program.rank(best)
-        report_progress("cones and local programs in turn", k, ROUNDS, before[1])
+        rank = program.rank(best)
+        report_progress("cones and local programs in turn", k, ROUNDS, rank[1])
         values = dict(zip((d.name for d in problem.decisions), program.values(best), strict=True))
         try:
-            held = problem.fixed_at([values[decision.name] for decision in outer], outer)
-            own = values_of(held, decide(replace(held, search=replace(held.search, proves=False))))
+            fixed = problem.fixed_at([values[decision.name] for decision in other_decisions], other_decisions)
+            cone_values = values_of(fixed, decide(replace(fixed, search=replace(fixed.search, proves=False))))
         except (ModelError, SolverError):
             break
-        values |= dict(zip((d.name for d in held.decisions), own, strict=True))
-        by_cones = program.shares([values[decision.name] for decision in problem.decisions])
-        best = min(best, best_local_optimum(program, [by_cones], 1), by_cones, key=program.rank)
-        if program.rank(best)[1] >= before[1] * (1.0 - GAIN):
+        values |= dict(zip((d.name for d in fixed.decisions), cone_values, strict=True))
+        point = program.shares([values[decision.name] for decision in problem.decisions])
+        best = min(best, best_local_optimum(program, [point], 1), point, key=program.rank)
+        if program.rank(best)[1] >= rank[1] * (1.0 - GAIN):
             break
     return best
 
 
 def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
-    """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
+    """Solve each star with even firing and each set of shafts as a problem of its own, up to `MOST_STARS`."""
     phasing = problem.phasing
     assert phasing is not None
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    return solve_every_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
+    return solve_every_order(problem, phasing, stars, lambda part, _: decide(replace(part, phasing=None)), MOST_STARS)

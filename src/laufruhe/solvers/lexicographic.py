@@ -1,12 +1,12 @@
-"""Objectives in order of rank: each is least among the designs that are best by those before it (P12).
+"""Minimise several objectives in lexicographic order (P12).
 
-Every rank is a problem of its own, decided by whatever method suits it, in which those before it are limits:
+Rank k is a problem of its own, in which the objectives of earlier ranks are limits:
 
     f_j(x) <= v_j (1 + e_j),   j < k                                                              (P12)
 
-with v_j the value found and e_j the share that may be given up for what follows, no less than a solver needs. What
-cancels is limited to nothing. The design that is best in this order keeps all these limits, so what bounds a rank
-under them bounds it for that design.
+with v_j the optimum of rank j and e_j the share of it that later ranks may use, no less than the accuracy of the
+solver. An objective that is numerically zero has the limit zero. The lexicographic optimum keeps all these limits, so
+the lower bound of each rank under them holds for it.
 """
 
 from __future__ import annotations
@@ -29,51 +29,51 @@ from laufruhe.solvers.values import DecisionRange, ObjectiveValue, RankValue
 
 Solve = Callable[[Problem], Result]
 CLOSE, SAMPLED = 1e-9, 1e-5
-"""Share by which objectives before another may be exceeded at least; of what is known at sampled angles alone."""
+"""Smallest relative slack of limits on earlier objectives: of exact measures, and of measures from samples."""
 WIDER = (0.0, 10.0 * SAMPLED)
-"""Shares by which they may be exceeded further, where a solver finds no design."""
+"""Further relative slacks, tried in turn until the solver finds a design."""
 
 
 def solve_in_order(problem: Problem, solve: Solve) -> Result:
-    """Decide by the first objective, then by each of the others what is left open by those before it."""
-    alone = problem.changed(ranks=())
+    """Minimise each rank in order, with limits on the objectives of earlier ranks."""
+    single = problem.changed(ranks=())
     stages: list[Result] = []
-    held: list[Limit] = []
-    equal: list[tuple[DecisionRange, ...]] = []
+    rank_limits: list[Limit] = []
+    equal_by_rank: list[tuple[DecisionRange, ...]] = []
     for rank in problem.ranks:
-        found = _found(alone.changed(objective=rank.terms), problem.limits, held, solve)
-        if not found.status.has_design or found.objective is None:
+        result = _found(single.changed(objective=rank.terms), problem.limits, rank_limits, solve)
+        if not result.status.has_design or result.objective is None:
             if not stages:
-                return found
+                return result
             break
-        stages.append(found)
+        stages.append(result)
         limit = Limit(
             rank.terms[0].measure.name,
             rank.terms[0].measure,
-            _edge(found, max(rank.within, _least_room(rank.terms[0].measure))),
+            _edge(result, max(rank.within, _least_room(rank.terms[0].measure))),
         )
-        held.append(limit)
-        equal.append(equal_designs(found, limit) if len(rank.terms) == 1 else ())
-    return _together(problem, stages, held, equal)
+        rank_limits.append(limit)
+        equal_by_rank.append(equal_designs(result, limit) if len(rank.terms) == 1 else ())
+    return _together(problem, stages, rank_limits, equal_by_rank)
 
 
-def _edge(found: Result, within: float) -> float:
-    # bound on this objective for later ones; zero if it cancels
-    value = found.objective.value if found.objective else math.inf
-    weight = found.problem.objective[0].weight
-    if value <= numerical_zero(found.problem, found.final.engine):
+def _edge(result: Result, slack: float) -> float:
+    # limit on this objective for later ranks; zero if it is numerically zero
+    value = result.objective.value if result.objective else math.inf
+    weight = result.problem.objective[0].weight
+    if value <= numerical_zero(result.problem, result.final.engine):
         return 0.0
-    return value / weight * (1.0 + within)
+    return value / weight * (1.0 + slack)
 
 
-def _found(stage: Problem, limits: tuple[Limit, ...], held: list[Limit], solve: Solve) -> Result:
-    # limits on earlier objectives widen until the solver finds a design
-    for more in WIDER:
-        held[:] = [replace(limit, maximum=limit.maximum * (1.0 + more)) for limit in held]
-        found = solve(stage.changed(limits=(*limits, *held)))
-        if found.status.has_design or not held:
+def _found(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], solve: Solve) -> Result:
+    # relax the limits on earlier objectives until the solver finds a design
+    for slack in WIDER:
+        rank_limits[:] = [replace(limit, maximum=limit.maximum * (1.0 + slack)) for limit in rank_limits]
+        result = solve(stage.changed(limits=(*limits, *rank_limits)))
+        if result.status.has_design or not rank_limits:
             break
-    return found
+    return result
 
 
 def _least_room(measure: Measure) -> float:
@@ -81,32 +81,32 @@ def _least_room(measure: Measure) -> float:
 
 
 def _together(
-    problem: Problem, stages: list[Result], held: list[Limit], equal: list[tuple[DecisionRange, ...]]
+    problem: Problem, stages: list[Result], rank_limits: list[Limit], equal_by_rank: list[tuple[DecisionRange, ...]]
 ) -> Result:
-    """The design of the last rank, and what was proven of each."""
+    """Return the design of the last rank, with the proof of every rank."""
     last = stages[-1]
     count = len(problem.limits)
-    # each stage had its own angles: what its design is worth to the others is read at many (P7)
+    # ranks may have different samples, so the final design is evaluated at fine sampling (P7)
     final = with_fine_sampling(last.final)
     ranks = tuple(
         _rank(stage, final, limit, last, k, count, designs)
-        for k, (stage, limit, designs) in enumerate(zip(stages, held, equal, strict=True))
+        for k, (stage, limit, designs) in enumerate(zip(stages, rank_limits, equal_by_rank, strict=True))
     )
     message = last.message
     if len(stages) < len(problem.ranks):
         name = problem.ranks[len(stages)].terms[0].measure.name
-        # the last design keeps all limits of this one
-        why = "was not decided: time was over" if passed() else "found no design under the limits of those before it"
-        message = f"objective {len(stages) + 1}, {name}, {why}"
+        # the last design meets all limits of the missing rank
+        reason = "was not decided: time was over" if passed() else "found no design under the limits of those before it"
+        message = f"objective {len(stages) + 1}, {name}, {reason}"
     weakest = min((rank.proof for rank in ranks), key=PROOF_RANK)
-    whole = not message and all(stage.status is Status.OPTIMAL for stage in stages)
+    is_complete = not message and all(stage.status is Status.OPTIMAL for stage in stages)
     first = stages[0]
-    shown = last.problem.changed(objective=problem.objective, ranks=problem.ranks, limits=problem.limits)
-    # a price is of the objective of its own rank, and the report's are of the first
+    problem_of_result = last.problem.changed(objective=problem.objective, ranks=problem.ranks, limits=problem.limits)
+    # shadow prices of the last rank are not those of the first, which the report shows
     return replace(
         last,
-        problem=shown,
-        status=Status.OPTIMAL if whole and weakest is Proof.GLOBAL else Status.FEASIBLE,
+        problem=problem_of_result,
+        status=Status.OPTIMAL if is_complete and weakest is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, ranks[0].final, first.objective.initial if first.objective else math.nan),
         certificate=_certificate(first, ranks, weakest),
         decisions=tuple(
@@ -126,7 +126,7 @@ def _together(
 def _rank(
     stage: Result, final: Evaluation, limit: Limit, last: Result, k: int, count: int, designs: tuple[DecisionRange, ...]
 ) -> RankValue:
-    """Return the rank of one objective: its own optimum, and its value at the final design."""
+    """Return the record of one rank: its optimum, and its value at the final design."""
     assert stage.objective is not None
     certificate = stage.certificate
     is_last = stage is last
@@ -147,11 +147,11 @@ def _rank(
 
 def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) -> Certificate | None:
     # P12
-    own = first.certificate
-    if own is None:
+    certificate = first.certificate
+    if certificate is None:
         return None
-    method = f"{own.method}; then {len(ranks) - 1} more in order"
-    return replace(own, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
+    method = f"{certificate.method}; then {len(ranks) - 1} more in order"
+    return replace(certificate, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
 
 
 def _summed(stages: list[Result]) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""A row of the table of methods: what it can have open, what may be asked, and who decides."""
+"""Method of solution: open numbers and measures that it accepts, and its solver."""
 
 from __future__ import annotations
 
@@ -15,57 +15,58 @@ from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.result import Result
 
-# of stars and choices of shafts: masses are those of the shafts that are built, numbers of a signal are told apart
+# dependences on stars and optional shafts that methods of stars accept
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
 OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
-"""Channels that programs of mounts have formulas for, or peaks of a simulation."""
+"""Channels for which programs of mounts have formulas or a simulation."""
 OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.of_engine is not None)
-"""Channels that are functions of the sizes of an engine alone."""
+"""Channels that depend on the sizes of an engine only."""
 
 
 def is_no_number(channel: Channel) -> bool:
-    """Return whether a channel is a load or a mass."""
+    """Return True if a channel is a load or a mass."""
     return not channel.is_number
 
 
 def is_pointwise(norm: Norm) -> bool:
-    """Return whether a norm claims to be convex in what each angle has."""
+    """Return True if a norm is declared convex and a function of the values at single crank angles."""
     return norm.is_convex and norm.is_pointwise
 
 
 def is_convex(norm: Norm) -> bool:
-    """Return whether a norm claims to be convex."""
+    """Return True if a norm is declared convex."""
     return norm.is_convex
 
 
 @dataclass(frozen=True)
 class Method:
-    """A way of deciding.
+    """Method that solves problems with certain open numbers and measures.
 
     Attributes
     ----------
     name
-        In words.
+        Name for messages and reports.
     needs
-        Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
+        Kinds of numbers that may be open together, each with the permitted dependences of measures on it.
+        `Dependence.NONE` is always permitted.
     strength
-        What its bounds can prove.
+        Kind of proof that its lower bounds can give.
     solver
-        Return the best design with its certificate. The function imports its module when it is first called.
+        Return the best design with its certificate. The function imports its module when it is called.
     judges_fidelity
-        Whether the fidelity is chosen again where the design needs a better one than that given (F11).
+        True if a better fidelity is chosen when the design needs it (F11).
     knows
-        Channels that it has formulas of its own for, however they depend on what is open, but not UNKNOWN.
+        Channels with formulas of its own, for any dependence but UNKNOWN.
     norms
-        Return whether it suits a norm of a load, by what that claims.
+        Return True if a norm of a load is permitted.
     still
-        Return whether a channel that it does not know, and that nothing open moves, may be asked beside.
+        Return True if another channel that no decision changes is permitted.
     also
-        Return whether other facts of a problem suit it.
+        Return True if all else about a problem is permitted.
     proves
-        What of the best design, in words.
+        Text of what it proves.
     before
-        Name of the row that one of an extension stands before.
+        Name of the method that follows one of an extension in the table.
     """
 
     name: str
@@ -82,11 +83,11 @@ class Method:
 
     @property
     def decides(self) -> frozenset[Kind]:
-        """Kinds that it can have open together."""
+        """Kinds of numbers that may be open together."""
         return frozenset(self.needs)
 
     def suits(self, problem: Problem) -> bool:
-        """Return whether it decides all that is open and asked of a problem."""
+        """Return True if the method solves a problem, by its open numbers and its measures."""
         kinds = kinds_of(problem)
         return (
             kinds <= self.decides
@@ -95,17 +96,17 @@ class Method:
         )
 
     def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
-        # the measure depends on these kinds in a way that the method allows
+        # the method permits the dependence of the measure on these kinds
         if measure in problem.known_rows:
             return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
         if measure.is_load and not self.norms(measure.norm):
             return False
-        found = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
+        dependences = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
         if measure.channel in self.knows:
-            return Dependence.UNKNOWN not in found.values()
-        if all(each is Dependence.NONE for each in found.values()):
+            return Dependence.UNKNOWN not in dependences.values()
+        if all(value is Dependence.NONE for value in dependences.values()):
             return self.still(measure.channel)
-        return all(each is Dependence.NONE or each in self.needs[kind] for kind, each in found.items())
+        return all(value is Dependence.NONE or value in self.needs[kind] for kind, value in dependences.items())
 
     def solve(self, problem: Problem) -> Result:
         """Return the best design, at a better fidelity if the method judges that and the design needs it."""

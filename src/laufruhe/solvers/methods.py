@@ -1,4 +1,4 @@
-"""Which method decides what: a table, and the way of one decision through it."""
+"""Choose the method for a problem from a table, and solve the problem by it."""
 
 from __future__ import annotations
 
@@ -56,13 +56,13 @@ from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
 from laufruhe.solvers.walk import walked
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy")
-"""Packages that are imported where something open needs them, named as their modules."""
+"""Optional packages that some methods import."""
 CUT_SHORT = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 
 
 def solve_separable(problem: Problem) -> Result:
-    """Parts of what is open, each by its own method."""
+    """Solve groups of decisions that do not affect each other, each by its own method."""
     return solve_decomposed(problem, _decided)
 
 
@@ -200,38 +200,38 @@ _OWN: tuple[Method, ...] = (
 )  # fmt: skip
 
 METHODS: tuple[Method, ...] = in_order("methods", Method, _OWN)
-"""Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
+"""Methods in order of preference; the first one that suits a problem solves it."""
 
 
 def solve(
     problem: Problem, listener: Listener | None = None, time_limit: float | None = None, further: bool = False
 ) -> Result:
-    """Decide what a problem leaves open.
+    """Optimise the open numbers of a problem.
 
     Parameters
     ----------
     problem
-        What is open, wanted and forbidden.
+        Engine with open numbers, objective and limits.
     listener
-        Told how far searches are.
+        Receives reports on the progress of searches.
     time_limit
-        Seconds after which searches end with the best that they have, and with its bound.
+        Time [s] after which searches end with their best design and its lower bound; None for no limit.
     further
-        Whether to ask what limits that no design keeps can reach, and which decisions an optimum leaves free.
+        True to compute also the attainable values of limits in conflict, and the range of equally good designs.
 
     Raises
     ------
     SolverError
-        If a solver stops without an answer.
+        If a solver stops without a result.
     ModelError
-        If the engine as given cannot be evaluated, or nothing decides what is open.
+        If the initial design cannot be evaluated, or no method solves the problem.
     """
     with limited(time_limit), progress_listener(listener), collected() as reports:
-        begun, spent = time.perf_counter(), time.thread_time()
-        found: Result | None
+        started, spent = time.perf_counter(), time.thread_time()
+        result: Result | None
         try:
             refuse(problem)
-            found = _decided(problem)
+            result = _decided(problem)
         except ModuleNotFoundError as error:
             if error.name not in LIBRARIES:
                 raise
@@ -240,40 +240,40 @@ def solve(
         except SolverError:
             if not passed():
                 raise
-            found = None
-        found = found if found is not None and not passed() else _cut_short(problem, found)
-        # what a method made of the problem is of the same file
-        found = replace(found, problem=replace(found.problem, origin=problem.origin))
+            result = None
+        result = result if result is not None and not passed() else _cut_short(problem, result)
+        # a method may have changed the problem, but its file is the same
+        result = replace(result, problem=replace(result.problem, origin=problem.origin))
         if reports:
-            return without_proof(found, reports[0])
-        found = walked(problem, found, time.thread_time() - spent)
-        if not further or found.status is Status.FEASIBLE:
-            return found
-        if found.status is Status.OPTIMAL:
-            return replace(found, free=free_decisions(found))
-        found = with_attainable_limits(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
-        return without_proof(found, reports[0]) if reports else found
+            return without_proof(result, reports[0])
+        result = walked(problem, result, time.thread_time() - spent)
+        if not further or result.status is Status.FEASIBLE:
+            return result
+        if result.status is Status.OPTIMAL:
+            return replace(result, free=free_decisions(result))
+        result = with_attainable_limits(result, problem, kinds_of(problem), time.perf_counter() - started, _decided)
+        return without_proof(result, reports[0]) if reports else result
 
 
-def _cut_short(problem: Problem, found: Result | None) -> Result:
-    """Return the result when time is over: the best design found, or the initial design if it is feasible."""
-    if found is None or found.status is Status.FAILED:
+def _cut_short(problem: Problem, result: Result | None) -> Result:
+    """Return the result at the time limit: the best design so far, or the initial design if it is feasible."""
+    if result is None or result.status is Status.FAILED:
         with suppress(ModelError):
-            given = evaluate_design(problem, problem.start)
+            initial = evaluate_design(problem, problem.start)
             if (
                 problem.phasing is None
-                and max(given.violation, violation_at_fine_sampling(problem, given.evaluation)) <= KEPT
+                and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= KEPT
             ):
-                shown = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {CUT_SHORT}")
-                return build_result(given, given.evaluation, shown, {})
-    if found is None:
+                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {CUT_SHORT}")
+                return build_result(initial, initial.evaluation, proof, {})
+    if result is None:
         raise SolverError("no design was found within the time limit; raise it")
-    if found.status is Status.FAILED:
-        return replace(found, message=f"{found.message}; {CUT_SHORT}")
-    own = found.certificate
-    if own is None or own.kind is Proof.GLOBAL:
-        return found
-    return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
+    if result.status is Status.FAILED:
+        return replace(result, message=f"{result.message}; {CUT_SHORT}")
+    certificate = result.certificate
+    if certificate is None or certificate.kind is Proof.GLOBAL:
+        return result
+    return replace(result, certificate=replace(certificate, method=f"{certificate.method}; {CUT_SHORT}"))
 
 
 def _method(problem: Problem) -> Method:
@@ -282,16 +282,18 @@ def _method(problem: Problem) -> Method:
 
 
 def refuse(problem: Problem) -> None:
-    """Refuse what no method decides, before anything is solved: `solve` and `check` say the same of a problem.
+    """Raise an error for a problem that no method solves; `solve` and `check` call it first.
 
     Raises
     ------
     ModelError
-        If nothing is minimised of what is open, or what is asked is not decided together.
+        If the objective depends on no open number, or a combination of open numbers has no method.
     """
-    own = next((one for one in reductions() if one.refuse is not None and one.applies(problem)), None)
-    if own is not None and own.refuse is not None:
-        own.refuse(problem)
+    reduction = next(
+        (reduction for reduction in reductions() if reduction.refuse is not None and reduction.applies(problem)), None
+    )
+    if reduction is not None and reduction.refuse is not None:
+        reduction.refuse(problem)
         return
     kinds = kinds_of(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
@@ -305,18 +307,17 @@ def refuse(problem: Problem) -> None:
         _refuse_long_cranks(problem)
 
 
-def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
-    left = reductions() if left is None else left
-    for k, reduction in enumerate(left):
+def _decided(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
+    remaining = reductions() if remaining is None else remaining
+    for k, reduction in enumerate(remaining):
         if reduction.applies(problem):
-            return reduction.solve(problem, _decided, partial(_decided, left=left[k + 1 :]))
+            return reduction.solve(problem, _decided, partial(_decided, remaining=remaining[k + 1 :]))
     return _by_method(problem)
 
 
 def _by_method(problem: Problem) -> Result:
-    """Decide a problem by the first method that suits it, with the bound of another where that closes."""
+    """Solve a problem by the first method that suits it, with the bound of an exact method for part of its measures."""
     method, kinds = _method(problem), kinds_of(problem)
-    # what is decided apart is asked once more, each part by itself
     report_progress(method.name)
     conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
@@ -324,8 +325,8 @@ def _by_method(problem: Problem) -> Result:
     closing = _closing(problem, kinds, method)
     if closing is None:
         return method.solve(problem)
-    other, fewer = closing
-    return solve_by_relaxation(problem, fewer, other.solve, method.solve)
+    other, relaxed = closing
+    return solve_by_relaxation(problem, relaxed, other.solve, method.solve)
 
 
 def _refuse_any_rank(problem: Problem) -> None:
@@ -340,15 +341,15 @@ def _fixed_limits(problem: Problem) -> list[Limit]:
 
 def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result:
     fixed = _fixed_limits(problem)
-    given = evaluate_start(problem)
-    # what cannot be evaluated is refused first
-    objective_value(problem, given)
-    problem, minimum = exclude_collisions(problem, fixed, given)
-    broken = broken_limits(fixed, with_fine_sampling(minimum))
-    if broken:
-        return infeasible_result(problem, given, broken, {})
-    moved = tuple(limit for limit in problem.limits if limit not in fixed)
-    return with_limits(decide(problem.changed(limits=moved)), problem.limits)
+    initial = evaluate_start(problem)
+    # raise ModelError first if the initial design cannot be evaluated
+    objective_value(problem, initial)
+    problem, least_shafts = exclude_collisions(problem, fixed, initial)
+    violated = broken_limits(fixed, with_fine_sampling(least_shafts))
+    if violated:
+        return infeasible_result(problem, initial, violated, {})
+    open_limits = tuple(limit for limit in problem.limits if limit not in fixed)
+    return with_limits(decide(problem.changed(limits=open_limits)), problem.limits)
 
 
 def _is_settled(problem: Problem) -> bool:
@@ -362,26 +363,26 @@ def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Resul
     design = evaluate_design(problem, problem.start)
     if design.violation > KEPT:
         return rest(problem)
-    shown = ProofData(design.value, ProofStrength.EXACT, 0.0, "nothing open changes what is minimised")
-    return build_result(design, design.evaluation, shown, {})
+    proof = ProofData(design.value, ProofStrength.EXACT, 0.0, "nothing open changes what is minimised")
+    return build_result(design, design.evaluation, proof, {})
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """A kind of problem that is decided by deciding simpler ones.
+    """Solution of one kind of problem by simpler problems.
 
     Attributes
     ----------
     name
-        In words.
+        Name for messages.
     applies
-        Return whether it decides a problem.
+        Return True if the reduction solves a problem.
     solve
-        Decide it; the first callable decides a simpler problem by all reductions, the second by those that follow.
+        Solve a problem. The second argument solves a simpler problem by all reductions, the third by the later ones.
     refuse
-        Raise `ModelError` for what it does not decide, before anything is solved; None where methods say it.
+        Raise `ModelError` for a problem that it cannot solve; None if the check of methods is sufficient.
     before
-        Name of the reduction that one of an extension stands before; else it is the last.
+        Name of the reduction that follows one of an extension; empty for the last place.
     """
 
     name: str
@@ -398,29 +399,29 @@ REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
     Reduction("an objective that nothing open moves", _is_settled, _solve_without_decisions),
 )  # fmt: skip
-"""Reductions of the core in the order in which they are looked for."""
+"""Reductions of the core, in the order in which they are tried."""
 
 
 @cache
 def reductions() -> tuple[Reduction, ...]:
-    """Return all reductions in the order in which they are looked for; methods decide what none of them applies to."""
-    found: tuple[Reduction, ...] = in_order("reductions", Reduction, REDUCTIONS)
-    return found
+    """Return the reductions of core and extensions, in the order in which they are tried."""
+    table: tuple[Reduction, ...] = in_order("reductions", Reduction, REDUCTIONS)
+    return table
 
 
 def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
-    """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
+    """Return an exact method for part of the measures, and the problem with these measures; None if there is none."""
     if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None
     for other in METHODS:
         if other.strength is not ProofStrength.EXACT or not kinds <= other.decides:
             continue
-        free = problem.changed(limits=())
-        terms = tuple(term for term in problem.objective if other.suits(free.changed(objective=(term,))))
-        # what is left out of a sum has to be no less than zero
-        left = [term.measure for term in problem.objective if term not in terms]
-        if terms and all(measure.is_load or measure.is_mounting for measure in left):
-            fewer = free.changed(objective=terms)
-            limits = tuple(limit for limit in problem.limits if other.suits(fewer.changed(limits=(limit,))))
-            return other, fewer.changed(limits=limits)
+        unlimited = problem.changed(limits=())
+        terms = tuple(term for term in problem.objective if other.suits(unlimited.changed(objective=(term,))))
+        # missing terms must be non-negative for the bound to hold
+        missing = [term.measure for term in problem.objective if term not in terms]
+        if terms and all(measure.is_load or measure.is_mounting for measure in missing):
+            relaxed = unlimited.changed(objective=terms)
+            limits = tuple(limit for limit in problem.limits if other.suits(relaxed.changed(limits=(limit,))))
+            return other, relaxed.changed(limits=limits)
     return None

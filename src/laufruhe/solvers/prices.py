@@ -19,24 +19,24 @@ from laufruhe.solvers.cones.cone_program import ConeRows, run_clarabel
 ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
 INDEPENDENT, BALANCED = 1e-3, 1e-2
-"""Least share of its length that a slope has across all others, and what may be left of all, where prices are told."""
+"""Smallest relative singular value of independent slopes, and largest relative residual of their balance."""
 _SPARE = 1e-6
 ACTIVE = 1e-5
-"""Share of a limit, and of the scale of a decision, by which it may be missed and be active."""
+"""Relative distance to a limit, or to a bound of a decision, within which it is active."""
 MOST_VANISHING, _WAYS, MOST_CORNERS = 64, 8, 256
-"""Rows that vanish of a number that is told, ways in which a segment stands for a disc, and corners of a hull."""
+"""Largest number of zero rows of a norm, segments that approximate a disc, and largest number of rows of a hull."""
 
 
 @dataclass(frozen=True)
 class Price:
-    """Price of an edge [unit of the objective per unit of the edge].
+    """Shadow price of a limit or bound [unit of the objective per unit of the limit].
 
     Attributes
     ----------
     relaxed
-        Fall of the objective as the edge is relaxed.
+        Fall of the objective as the limit is relaxed.
     tightened
-        Rise as it is tightened; not a number where that is not known.
+        Rise of the objective as the limit is tightened; NaN if unknown.
     """
 
     relaxed: float
@@ -48,39 +48,39 @@ class Price:
 
     @classmethod
     def both(cls, price: float) -> Price:
-        """Return the price of an edge that is worth the same on both sides."""
+        """Return a price that is equal for relaxing and tightening."""
         return cls(price, price)
 
     def __add__(self, other: Price) -> Price:
-        """Return the price of two edges that move together."""
+        """Return the price of two limits that move together."""
         return Price(self.relaxed + other.relaxed, self.tightened + other.tightened)
 
     @property
     def is_one(self) -> bool:
-        """Tell if both sides are alike."""
+        """True if both prices are equal within `ALIKE`."""
         return self.relaxed >= (1.0 - ALIKE) * self.tightened
 
     @property
     def other(self) -> float | None:
-        """The price as it is tightened, None where that is the same."""
+        """Price of tightening; None if it is equal to that of relaxing."""
         return None if self.is_one or math.isnan(self.relaxed) else self.tightened
 
     def felt(self, minimum: float) -> Price:
-        """Return it without what is no more than a rounding."""
+        """Return the price with values up to `minimum` set to zero."""
         relaxed, tightened = (0.0 if price <= minimum else price for price in (self.relaxed, self.tightened))
         return Price(relaxed, tightened)
 
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """Subgradients of a convex function at a design: a convex hull, and segments added to it (P19).
+    """Subgradients of a convex function at a design: convex hull plus segments (P19).
 
     Attributes
     ----------
     hull
-        Shape (m, n): one row of a number that is smooth there.
+        Gradients whose convex hull is meant, shape (m, n); one row for a smooth function.
     segments
-        Shape (s, n): each may be added up to once, in both senses.
+        Half-lengths of segments, shape (s, n): each enters with a factor from -1 to 1.
     """
 
     hull: Array
@@ -88,18 +88,18 @@ class Slopes:
 
     @classmethod
     def smooth(cls, slope: Array) -> Slopes:
-        """Return the only slope of a number without a kink."""
+        """Return the subgradients of a smooth function, from its gradient, shape (n,)."""
         return cls(slope[None], np.zeros((0, len(slope))))
 
     def scaled(self, units: Array) -> Slopes:
-        """Return them in other units of the decisions."""
+        """Return the slopes with decisions in other units, shape (n,)."""
         return Slopes(self.hull * units, self.segments * units)
 
     @property
     def corners(self) -> Array:
-        """The hull, or of a large one its outermost rows in as many directions as corners are told.
+        """Rows of the hull; for a large hull its extreme rows in `MOST_CORNERS` directions.
 
-        All rows of a signal of constant length are as long as the longest; a circle of 256 corners lacks 1e-4.
+        All rows of a signal of constant length may be extreme. A circle with 256 corners has a relative error of 1e-4.
         """
         step = -(-len(self.hull) // MOST_CORNERS)
         if step == 1:
@@ -109,74 +109,76 @@ class Slopes:
 
     @property
     def is_smooth(self) -> bool:
-        """Tell if there is one slope alone."""
+        """True if the function has one gradient only."""
         return len(self.hull) + len(self.segments) == 1
 
 
 def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
-    """Return the price of every limit, then of every edge of a set (P19).
+    """Return the price of every active limit, then of every active bound (P19).
 
     Parameters
     ----------
     objective
-        Of every term, its weight in it.
+        Slopes of every term times its weight.
     limits
-        Of those that the design stands at.
+        Slopes of active limits.
     edges
-        Outward normals of the sets' edges that it stands at, shape (edges, n).
+        Outward normals of active bounds, shape (bounds, n).
 
     Returns
     -------
-    None where slopes do not balance: the design is no optimum to first order, or a kink of it is not told.
+    None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
     """
     count = len(limits) + len(edges)
     if not count:
         return []
-    slope = np.sum([own.hull[0] for own in objective], axis=0)
-    turns = [rows for own in objective for rows in (np.ptp(own.hull, axis=0), own.segments)]
+    slope = np.sum([slopes.hull[0] for slopes in objective], axis=0)
+    turns = [rows for slopes in objective for rows in (np.ptp(slopes.hull, axis=0), slopes.segments)]
     size = max(float(np.abs(rows).max(initial=0.0)) for rows in (slope, *turns))
     if not size:
         return None
-    if all(own.is_smooth for own in (*objective, *limits)):
-        unique = _unique(np.concatenate([*(own.hull for own in limits), edges]), slope)
+    if all(slopes.is_smooth for slopes in (*objective, *limits)):
+        unique = _unique(np.concatenate([*(slopes.hull for slopes in limits), edges]), slope)
         if unique is not None:
             return [Price.both(price) for price in unique]
     return _ranges(objective, limits, edges, size)
 
 
 def _unique(rows: Array, slope: Array) -> list[float] | None:
-    # None for dependent slopes, or slopes that do not balance
+    # None if slopes are dependent or do not balance
     lengths = np.linalg.norm(rows, axis=1)
     if not lengths.all():
         return None
     scaled = rows / lengths[:, None]
     if np.linalg.svd(scaled, compute_uv=False).min() < INDEPENDENT or len(rows) > rows.shape[1]:
         return None
-    found = np.linalg.lstsq(scaled.T, -slope)[0]
-    if np.abs(scaled.T @ found + slope).max() > BALANCED * np.abs(slope).max():
+    multipliers = np.linalg.lstsq(scaled.T, -slope)[0]
+    if np.abs(scaled.T @ multipliers + slope).max() > BALANCED * np.abs(slope).max():
         return None
-    return [float(price) for price in np.maximum(found, 0.0) / lengths]
+    return [float(price) for price in np.maximum(multipliers, 0.0) / lengths]
 
 
 def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
-    """Return least and largest multiplier of each by linear programs over all that balance."""
+    """Return smallest and largest multiplier of every limit and bound, by linear programs over balanced slopes."""
     shares, count = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)], len(objective)
-    sizes = [max(float(np.abs(rows).max(initial=0.0)) for rows in (own.hull, own.segments)) for own in shares]
-    scales = [size] * count + [own or 1.0 for own in sizes[count:]]
-    parts = [part / scale for own, scale in zip(shares, scales, strict=True) for part in (own.corners, own.segments)]
+    sizes = [max(float(np.abs(rows).max(initial=0.0)) for rows in (slopes.hull, slopes.segments)) for slopes in shares]
+    scales = [size] * count + [slopes or 1.0 for slopes in sizes[count:]]
+    parts = [
+        part / scale for slopes, scale in zip(shares, scales, strict=True) for part in (slopes.corners, slopes.segments)
+    ]
     columns = np.concatenate(parts)
     numbers = np.split(np.arange(len(columns)), np.cumsum([len(part) for part in parts])[:-1])
-    # the last number is what is left of the balance
+    # the last variable is the residual of the balance
     each, last = np.eye(len(columns) + 1), len(columns)
-    totals = np.array([each[own].sum(axis=0) for own in numbers[::2]])
+    totals = np.array([each[slopes].sum(axis=0) for slopes in numbers[::2]])
     pullback = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
-    above = [pullback - each[last], -pullback - each[last], *(-each[own] for own in numbers[::2]), -each[last:]]
+    above = [pullback - each[last], -pullback - each[last], *(-each[slopes] for slopes in numbers[::2]), -each[last:]]
     maximum = [np.zeros(sum(map(len, above)))]
-    for k, own in enumerate(numbers[1::2]):
-        # a segment of the objective is added once, that of a limit as often as its price
+    for k, slopes in enumerate(numbers[1::2]):
+        # a segment of the objective has factors up to one, a segment of a limit up to its price
         held = totals[k] if k >= count else np.zeros(last + 1)
-        above += [each[own] - held, -each[own] - held]
-        maximum.append(np.full(2 * len(own), 1.0 if k < count else 0.0))
+        above += [each[slopes] - held, -each[slopes] - held]
+        maximum.append(np.full(2 * len(slopes), 1.0 if k < count else 0.0))
     program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *maximum]), count)
     left = program.minimum(each[last])
     if not left <= BALANCED:
@@ -193,18 +195,18 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """Linear program of numbers: the first rows are equal to the right, the others no more."""
+    """Linear program: the first `equal` rows are equal to the right-hand side, the others are at most that."""
 
     rows: Array
     right: Array
     equal: int
 
     def under(self, row: Array, maximum: float) -> _Program:
-        """Return it with one more row."""
+        """Return the program with one more row, shape (n,), and its upper bound."""
         return replace(self, rows=np.vstack([self.rows, row]), right=np.append(self.right, maximum))
 
     def minimum(self, cost: Array) -> float:
-        """Return the least cost; less than any number where it has none, and no number where the solver stopped."""
+        """Return the minimum of a cost, shape (n,); -inf if unbounded, NaN if the solver failed."""
         import clarabel
 
         rows = ConeRows(len(cost))
@@ -218,36 +220,42 @@ class _Program:
 
 
 def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
-    """Outward normals of the edges that a decision stands at, by the name of its size or angle, shape (width,)."""
-    own = decision.set
-    if own.width == 1:
-        reach = (own.scale if decision.is_affine else own.upper - own.lower) * ACTIVE
-        at = float(column[0])
-        found = {decision.name: np.ones(1)} if at >= own.upper - reach else {}
-        return {decision.name: -np.ones(1)} if at <= own.lower + reach else found
+    """Return outward normals of active bounds of a decision, shape (width,), by the name of its size or angle.
+
+    Parameters
+    ----------
+    column
+        Value of the decision [SI], shape (width,).
+    """
+    bounds = decision.set
+    if bounds.width == 1:
+        tolerance = (bounds.scale if decision.is_affine else bounds.upper - bounds.lower) * ACTIVE
+        value = float(column[0])
+        found = {decision.name: np.ones(1)} if value >= bounds.upper - tolerance else {}
+        return {decision.name: -np.ones(1)} if value <= bounds.lower + tolerance else found
     size = float(np.hypot(*column))
-    if size <= own.scale * ACTIVE:
+    if size <= bounds.scale * ACTIVE:
         return {}
-    along = column / size
-    found = {decision.name: along} if size >= own.upper - own.scale * ACTIVE else {}
-    turn = np.array([-along[1], along[0]])
-    for edge, sign in zip(own.edges, (-1.0, 1.0), strict=False):
-        if along @ edge >= 1.0 - EDGE:
-            # a turn of one radian moves as far as the size
+    direction = column / size
+    found = {decision.name: direction} if size >= bounds.upper - bounds.scale * ACTIVE else {}
+    turn = np.array([-direction[1], direction[0]])
+    for edge, sign in zip(bounds.edges, (-1.0, 1.0), strict=False):
+        if direction @ edge >= 1.0 - EDGE:
+            # a rotation by one radian moves the vector by its size
             found[angle_name(decision)] = sign * turn / size
     return found
 
 
 def _at_nothing(decision: Decision, column: Array) -> list[Array]:
-    # outward normals of the edges of an angle, at a size of zero, shape (2,) each
-    own = decision.set
-    if own.width == 1 or own.free_angle or float(np.hypot(*column)) > own.scale * ACTIVE:
+    # outward normals of the bounds of an angle at size zero, shape (2,) each
+    bounds = decision.set
+    if bounds.width == 1 or bounds.free_angle or float(np.hypot(*column)) > bounds.scale * ACTIVE:
         return []
-    return [sign * np.array([-edge[1], edge[0]]) for edge, sign in zip(own.edges, (-1.0, 1.0), strict=False)]
+    return [sign * np.array([-edge[1], edge[0]]) for edge, sign in zip(bounds.edges, (-1.0, 1.0), strict=False)]
 
 
 def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Price]:
-    """Return prices of the edges that a decision stands at, where this slope is left of all else."""
+    """Return prices of active bounds of a decision from the gradient of the Lagrangian without them, shape (width,)."""
     edges = edges_at(decision, column).items()
     return {name: Price.both(max(-float(slope @ normal) / float(normal @ normal), 0.0)) for name, normal in edges}
 
@@ -256,10 +264,10 @@ def affine_prices(
     problem: AffineProblem, limits: Sequence[Limit], x: Array, bound: Bound
 ) -> tuple[dict[Side, Price], dict[str, Price]]:
     """Return prices of limits and of the bounds of sizes and angles, at an optimum of affine norms (P19)."""
-    found = bound.multipliers
-    solver = found.shadow_prices(problem)
+    multipliers = bound.multipliers
+    solver = multipliers.shadow_prices(problem)
     prices = {
-        # no design is under a limit of nothing
+        # no design lies below a limit of zero
         (limit, "at most"): Price(price, math.inf if maximum == 0.0 else price)
         for limit, price, (maximum, _) in zip(limits, solver, problem.limits, strict=True)
     }  # fmt: skip
@@ -271,24 +279,26 @@ def affine_prices(
     }
     if not active and not edges:
         return prices, {}
-    objective = [_slopes(norm, x, z, weight) for (weight, norm), z in zip(problem.terms, found.terms, strict=True)]
-    held = [
-        _slopes(problem.limits[k][1], x, found.limits[k] / solver[k] if solver[k] else None) for k in active
+    objective = [
+        _slopes(norm, x, z, weight) for (weight, norm), z in zip(problem.terms, multipliers.terms, strict=True)
+    ]
+    limit_slopes = [
+        _slopes(problem.limits[k][1], x, multipliers.limits[k] / solver[k] if solver[k] else None) for k in active
     ]  # fmt: skip
-    # at nothing a size is held by the edges of its angle, which have no prices there
+    # bounds of an angle act on a size of zero and have no price there
     apex = [
         (domain.columns, own) for domain in problem.domains for own in _at_nothing(domain.decision, x[domain.columns])
     ]
     normals = np.zeros((len(edges) + len(apex), problem.size))
     for row, (columns, normal) in zip(normals, [*edges.values(), *apex], strict=True):
         row[columns] = normal
-    scaled = [None if own is None else own.scaled(problem.units) for own in (*objective, *held)]
+    scaled = [None if own is None else own.scaled(problem.units) for own in (*objective, *limit_slopes)]
     known = [own for own in scaled if own is not None]
     count, ranges = len(objective), None
     if len(known) == len(scaled) and not problem.groups:
         ranges = prices_of(known[:count], known[count:], normals * problem.units)
     if ranges is None:
-        # what the bound itself leaves over prices the edges; how far the sides lie apart is not known
+        # the gradient of the dual bound prices the bounds; the price of tightening is unknown
         left: dict[str, Price] = {}
         for domain in problem.domains:
             left |= bounds_of(domain.decision, x[domain.columns], bound.gradient[domain.columns])
@@ -304,15 +314,17 @@ def affine_prices(
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """Return all slopes of a norm at a design; None where they are not known, or too much of it vanishes."""
+    """Return all slopes of a norm at a design; None if unknown, or if too many rows are zero."""
     rows = norm.rows(x)
     kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
     if kinks is None or len(kinks.vanishing) > MOST_VANISHING:
         return None
-    hull = np.array([norm.pullback(own) for own in (kinks.base, *kinks.others)])
+    hull = np.array([norm.pullback(multiplier) for multiplier in (kinks.base, *kinks.others)])
     if len(kinks.longest):
-        own = rows[kinks.longest]
-        hull = np.einsum("ad,adn->an", own / np.linalg.norm(own, axis=1)[:, None], norm.slope[kinks.longest])
+        multiplier = rows[kinks.longest]
+        hull = np.einsum(
+            "ad,adn->an", multiplier / np.linalg.norm(multiplier, axis=1)[:, None], norm.slope[kinks.longest]
+        )
     segments = [
         segment for k in kinks.vanishing for segment in _disc(float(norm.grid.weights[k]) * norm.slope[k])
     ]  # fmt: skip
@@ -320,7 +332,7 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
 
 
 def _disc(slope: Array) -> list[Array]:
-    # segments whose sum is the image of the unit ball, shape (n,) each
+    # segments that add up to the image of the unit ball, shape (n,) each
     sizes, ways = np.linalg.svd(slope, full_matrices=False)[1:]
     strong = sizes > EDGE * sizes.max(initial=0.0)
     axes = sizes[strong, None] * ways[strong]
@@ -331,5 +343,5 @@ def _disc(slope: Array) -> list[Array]:
 
 
 def angle_name(decision: Decision) -> str:
-    """Name the angle of an open size."""
+    """Return the name of the angle that belongs to an open size."""
     return decision.name.rsplit(".", 1)[0] + ".angle"

@@ -1,4 +1,4 @@
-"""What a solved or evaluated problem returns."""
+"""Result of a solve or an evaluation."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Status(StrEnum):
 
     @property
     def has_design(self) -> bool:
-        """Tell if the result has a design within its limits."""
+        """True if the result has a design that meets all limits."""
         return self in (Status.OPTIMAL, Status.FEASIBLE)
 
 
@@ -78,9 +78,15 @@ class ResultContent:
     def __repr__(self) -> str:
         lines = [f"<{type(self).__name__} {self.name}: {self.status}"]
         if self.objective is not None:
-            o = self.objective
-            given = f"{o.initial:.6g} {o.unit}".rstrip() if math.isfinite(o.initial) else "on a resonance"
-            lines.append(f"  {o.name} {f'{o.value:.6g} {o.unit}'.rstrip()} (as given {given})")
+            objective = self.objective
+            initial = (
+                f"{objective.initial:.6g} {objective.unit}".rstrip()
+                if math.isfinite(objective.initial)
+                else "on a resonance"
+            )
+            lines.append(
+                f"  {objective.name} {f'{objective.value:.6g} {objective.unit}'.rstrip()} (as given {initial})"
+            )
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
         lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in meaningful(self.decisions)]
@@ -98,44 +104,44 @@ class Details:
 
     @property
     def measured(self) -> Evaluation | None:
-        """Evaluation that the objective is of; None for that of the design."""
+        """Evaluation whose objective the result states; None for that of the final design."""
         return None
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(ResultContent):
-    """A design, what was proven of it, and everything a report shows.
+    """Design with its certificate and everything that a report shows.
 
     Attributes
     ----------
     problem
-        As it was given.
+        Problem that was solved.
     status
-        How the solve ended.
+        Outcome of the solve.
     objective, certificate, decisions, limits
-        Of the design; None or empty where there is none.
+        Numbers of the design; None or empty if there is no design.
     initial, final
-        The exact model's evaluation of the design as given and as decided.
+        Evaluations of the baseline and of the optimised design by the exact model.
     message
-        Why there is no design, or what the reader should know.
+        Reason why there is no design, or a remark for the reader.
     conflict
         Names of limits that no design meets together.
     error
-        What tells the relative error of the objective from sampling the cycle; `error_estimate` asks it once.
+        Function that computes the relative error of the objective from sampling; `error_estimate` calls it once.
     timing
-        Seconds by what they were spent on.
+        Duration of each stage of the solve [s], by its name.
     phasing
-        Ranking of stars and firing orders, where these were open.
+        Ranking of stars and firing orders, if these were open.
     details
-        What the extension that decided tells beside the design.
+        Further data of the extension that solved the problem.
     ranks
-        Of several objectives in order, where there are.
+        Results of all objectives, if there are several in lexicographic order.
     reached
-        Without a design: what each of the limits that conflict can reach while the others hold.
+        Without a design: value that each limit in conflict can attain while the others hold.
     nearest
-        Where no design was found, and none is proven not to exist: the one that breaks limits least.
+        If the search failed: infeasible design with the smallest violation.
     free
-        Ranges of decisions that the optimum leaves free, as far as designs were found; None where not looked at.
+        Ranges of decisions among equally good designs; None if they were not computed.
     """
 
     problem: Problem
@@ -157,43 +163,49 @@ class Result(ResultContent):
 
     @property
     def measured(self) -> Evaluation:
-        """Evaluation that the objective is of: the design, or what its details name."""
-        other = None if self.details is None else self.details.measured
-        return self.final if other is None else other
+        """Evaluation whose objective the result states: that of `details`, or that of the final design."""
+        measured = None if self.details is None else self.details.measured
+        return self.final if measured is None else measured
 
     @cached_property
     def error_estimate(self) -> float:
-        """Relative error of the objective from sampling the cycle; studies keep none, and do not wait for it."""
+        """Relative error of the objective from sampling the cycle, computed at first use."""
         return self.error()
 
     @property
     def designs(self) -> dict[str, Evaluation]:
-        """Evaluations of the initial and the decided design by name; the initial one alone if nothing was decided."""
-        given = {AS_GIVEN: self.initial}
-        return given if self.final is self.initial else given | {AS_DECIDED: self.final}
+        """Evaluations of baseline and optimised design by name; the baseline only if nothing was optimised."""
+        initial = {AS_GIVEN: self.initial}
+        return initial if self.final is self.initial else initial | {AS_DECIDED: self.final}
 
     def forces(self, steps: int = STEPS) -> xr.Dataset:
-        """Loads on block, mounts and bearings over the crank angle, and how far mounts move, with units [xarray]."""
+        """Return loads on block, mounts and bearings, and mount deflections, over the crank angle [xarray]."""
         return forces_of(self._with_loads, steps).dataset()
 
     def orders(self) -> xr.Dataset:
-        """Amplitudes by order of the same loads, with units [xarray]."""
+        """Return amplitudes of loads and mount deflections by order [xarray]."""
         return orders_of(self._with_loads).dataset()
 
     def modes(self) -> xr.Dataset:
-        """Natural frequencies, loss and energy of a block on elastic mounts [xarray]; `ModelError` on rigid ones."""
+        """Return natural frequencies, loss factors and energy shares of a block on elastic mounts [xarray].
+
+        Raises
+        ------
+        ModelError
+            If the mounts are rigid.
+        """
         return modes_of(self.designs).dataset()
 
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
-        # a design on an undamped resonance has no loads
-        found = {name: design for name, design in self.designs.items() if not design.resonance}
-        if not found:
+        # a design at an undamped resonance has no finite loads
+        designs = {name: design for name, design in self.designs.items() if not design.resonance}
+        if not designs:
             raise ModelError(f"there are no finite loads: {self.final.resonance}; add damping")
-        return found
+        return designs
 
     @property
     def prices(self) -> dict[Side, Price]:
-        """Shadow prices of the limits, at the sides that the design stands at."""
+        """Shadow prices by limit and active side."""
         pairs = zip(self.problem.limits, self.limits, strict=True)
-        return {(limit, shown.side): shown.price for limit, shown in pairs}
+        return {(limit, value.side): value.price for limit, value in pairs}

@@ -1,7 +1,7 @@
-"""What many angles tell otherwise than those of a fidelity: a mean at few is not what it is over the cycle (P7).
+"""Solve again with more samples where too few of them change the result (P7).
 
-Whichever method decides, a design that keeps a limit at its own angles alone is none, one that these alone forbid is
-not to be missed, and a gap is not to be left open for what they read too much: it is solved again at more of them.
+A mean of few samples differs from the mean over the cycle. This may hide a violation, exclude a feasible design, or
+leave a gap open.
 """
 
 from __future__ import annotations
@@ -30,108 +30,110 @@ from laufruhe.solvers.conclusion import KEPT, broken_message, limit_values
 from laufruhe.solvers.result import Result, Status
 
 ROUNDS, MOST_TIMES = 4, 16
-"""Times that more angles are taken, and how many times as many at once."""
+"""Largest number of refinements, and largest factor of the samples in one of them."""
 FELT, LEAST_TIMES = 0.1, 2.0
-"""Share of the tolerance by which an objective may be misread, and tolerances that more count as at least."""
+"""Sampling error of the objective that counts as none, and smallest sampling error that counts; in tolerances."""
 
 
 def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Solve, and again at more angles where many tell otherwise than these do; what time leaves is judged at many."""
+    """Solve with more samples until fine sampling confirms limits and gap; the last result has fine sampling."""
     result = solve(problem)
     for _ in rounds(ROUNDS):
-        own = problem.fidelity
-        untold = _sampling_disagreement(result) if own.samples < FINE_SAMPLES else 0.0
-        if untold <= 1.0:
+        fidelity = problem.fidelity
+        disagreement = _sampling_disagreement(result) if fidelity.samples < FINE_SAMPLES else 0.0
+        if disagreement <= 1.0:
             return result
-        # means at equal steps come nearer by the square of these; the gas keeps its own
-        problem = finer(problem, min(math.ceil(math.sqrt(2.0 * untold)), MOST_TIMES))
+        # the error of a mean falls with the square of the step; the gas pressure keeps its samples
+        problem = finer(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MOST_TIMES))
         result = solve(problem)
     return result if _sampling_disagreement(result) <= 1.0 else _evaluated_at_fine_sampling(result)
 
 
 def _sampling_disagreement(result: Result) -> float:
-    # disagreement at many angles, relative to the tolerances
+    # largest difference to fine sampling, in tolerances
     return max(_untold(result) / KEPT, _misproven(result))
 
 
 def _evaluated_at_fine_sampling(result: Result) -> Result:
-    """A design whose angles were too few, and which time or rounds left so, judged at many."""
-    problem, told, proof = result.problem, result.objective, result.certificate
-    if told is None or proof is None or not result.status.has_design:
+    """Return the result of a design with values, limits and gap at fine sampling."""
+    problem, objective, proof = result.problem, result.objective, result.certificate
+    if objective is None or proof is None or not result.status.has_design:
         return result
-    value = told.value - _misread(problem, result.measured)
+    value = objective.value - _misread(problem, result.measured)
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
     zero_level = numerical_zero(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, zero_level)
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, zero_level + doubt)
-    weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
-    met = violation_at_fine_sampling(problem, result.final) <= KEPT or result.measured is not result.final
-    kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
-    status = Status.FAILED if not met else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
+    weaker_kind = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
+    is_feasible = violation_at_fine_sampling(problem, result.final) <= KEPT or result.measured is not result.final
+    kind = Proof.NONE if not is_feasible else Proof.GLOBAL if gap <= problem.tolerance else weaker_kind
+    status = Status.FAILED if not is_feasible else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
         result,
         status=status,
-        objective=replace(told, value=value),
+        objective=replace(objective, value=value),
         certificate=replace(proof, kind=kind, gap=gap),
         limits=limit_values(problem, final, result.prices, value) if result.measured is result.final else result.limits,
         final=final,
-        message=result.message if met else broken_message(problem, final),
+        message=result.message if is_feasible else broken_message(problem, final),
     )
 
 
 def violation_at_fine_sampling(problem: Problem, evaluation: Evaluation) -> float:
-    """Largest relative excess that many angles tell over a limit which few tell of; negative where all have room."""
+    """Return the largest relative violation of coarsely sampled limits at fine sampling; -inf without such limits."""
     limits = _coarsely_sampled_limits(problem, evaluation)
     return with_fine_sampling(evaluation).violation(limits) if limits else -math.inf
 
 
 def _coarsely_sampled_limits(problem: Problem, evaluation: Evaluation) -> list[Limit]:
-    # load limits evaluated at few angles
+    # limits on loads with few samples
     loads = [limit for limit in problem.load_limits if limit.measure.is_load]
     return [limit for limit in loads if is_coarsely_sampled(limit.measure, evaluation.samples)]
 
 
 def _untold(result: Result) -> float:
-    # relative violation at many angles; without a design, the difference between few and many
-    problem, own = result.problem, result.final
-    if result.status is Status.INFEASIBLE or own.resonance:
+    # relative violation at fine sampling; without a design, the difference between coarse and fine sampling
+    problem, evaluation = result.problem, result.final
+    if result.status is Status.INFEASIBLE or evaluation.resonance:
         return 0.0
     if result.status.has_design:
-        return violation_at_fine_sampling(problem, own)
-    few = replace(own, samples=problem.fidelity.samples)
-    limits, many = _coarsely_sampled_limits(problem, few), with_fine_sampling(few)
-    # what a search missed at fewer angles than by default is sought at these, wherever the design as given stands
-    minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
-    return max((max(minimum, abs(many.standing(x).violation - few.standing(x).violation)) for x in limits), default=0.0)
+        return violation_at_fine_sampling(problem, evaluation)
+    coarse = replace(evaluation, samples=problem.fidelity.samples)
+    limits, fine = _coarsely_sampled_limits(problem, coarse), with_fine_sampling(coarse)
+    # a failed search with fewer samples than the default is repeated with the default
+    minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / coarse.samples) ** 2
+    return max(
+        (max(minimum, abs(fine.standing(x).violation - coarse.standing(x).violation)) for x in limits), default=0.0
+    )
 
 
 def _misread(problem: Problem, evaluation: Evaluation) -> float:
-    # objective at few angles less that at many
+    # objective at coarse sampling less that at fine sampling
     terms = [term for term in problem.load_terms if is_coarsely_sampled(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
         return 0.0
-    told = replace(problem, objective=tuple(terms))
-    return objective_value(told, evaluation) - objective_value(told, with_fine_sampling(evaluation))
+    part = replace(problem, objective=tuple(terms))
+    return objective_value(part, evaluation) - objective_value(part, with_fine_sampling(evaluation))
 
 
 def over_read(problem: Problem, evaluation: Evaluation) -> float:
-    """Return the excess of an objective at few angles over that at many; zero within the tolerance."""
-    over = _misread(problem, evaluation)
-    return over if over > problem.tolerance * objective_value(problem, evaluation) else 0.0
+    """Return the excess of an objective at coarse sampling over that at fine sampling; zero within the tolerance."""
+    excess = _misread(problem, evaluation)
+    return excess if excess > problem.tolerance * objective_value(problem, evaluation) else 0.0
 
 
 def _misproven(result: Result) -> float:
-    """Tolerances by which an objective is misread, where many angles tell otherwise of its proof; else zero."""
-    problem, proof, told = result.problem, result.certificate, result.objective
-    if proof is None or told is None or not result.status.has_design or not problem.search.proves:
+    """Return the sampling error of the objective in tolerances if it changes the proof, else zero."""
+    problem, proof, objective = result.problem, result.certificate, result.objective
+    if proof is None or objective is None or not result.status.has_design or not problem.search.proves:
         return 0.0
-    over = _misread(problem, result.measured)
-    value = told.value - over
-    if abs(over) <= FELT * problem.tolerance * value:
+    excess = _misread(problem, result.measured)
+    value = objective.value - excess
+    if abs(excess) <= FELT * problem.tolerance * value:
         return 0.0
     zero_level = numerical_zero(problem, result.final.engine)
     proven = gap_of(value, proof.lower_bound, zero_level) <= problem.tolerance
-    # a bound over the value is none
-    agree = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)
-    return 0.0 if agree else max(abs(over) / (problem.tolerance * value), LEAST_TIMES)
+    # a lower bound above the objective proves nothing
+    is_same = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)
+    return 0.0 if is_same else max(abs(excess) / (problem.tolerance * value), LEAST_TIMES)

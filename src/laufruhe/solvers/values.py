@@ -1,4 +1,4 @@
-"""Numbers that a result tells: decisions, limits, objectives, and what may be reached where there is no design."""
+"""Numbers of a result: decisions, limits, objectives, and attainable limits."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class DecisionValue:
     Attributes
     ----------
     shadow_price
-        Fall of the objective per unit by which the bound it stands at is moved outwards.
+        Fall of the objective per unit by which the active bound is moved outwards.
     tightening_price
-        Rise per unit by which it is moved inwards, where that is another.
+        Rise of the objective per unit by which the active bound is moved inwards; None if equal to `shadow_price`.
     """
 
     name: str
@@ -41,25 +41,25 @@ class DecisionValue:
 
     @property
     def price(self) -> Price:
-        """Price of the bound on both sides."""
+        """Shadow price of the active bound."""
         other = self.tightening_price
         return Price(self.shadow_price, self.shadow_price if other is None else other)
 
     @property
     def is_zero(self) -> bool:
-        """Tell if the value is zero up to rounding, relative to its bounds."""
+        """True if the value is zero up to rounding, relative to its bounds."""
         return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
 
 
 def meaningful(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
-    """Without angles of sizes that are none."""
+    """Return the decisions without angles of zero sizes."""
     pairs = pairwise([None, *decisions])
     return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_zero)]
 
 
 @dataclass(frozen=True)
 class DecisionRange:
-    """Least and largest value of a decision among designs that an objective does not tell apart [SI]."""
+    """Smallest and largest value of a decision among equally good designs [SI]."""
 
     name: str
     unit: str
@@ -74,15 +74,15 @@ class RankValue:
     Attributes
     ----------
     minimum, lower_bound, gap, proof
-        What was found under the limits of those before it, and how good that is.
+        Optimum under the limits on earlier objectives, with its certificate.
     initial, final
-        Of the design as given, and of that of the last rank.
+        Value at the initial design, and at the design of the last rank.
     limit
-        What those after it may make of it; None of the last.
+        Limit on this objective for later ranks; None for the last rank.
     price
-        Fall of the last objective per unit by which this one may be exceeded.
+        Fall of the last objective per unit by which the limit is relaxed.
     designs
-        Ends of every decision among the designs that are best by this one and those before it.
+        Range of every decision among the designs that are optimal for this and all earlier ranks.
     """
 
     name: str
@@ -99,9 +99,9 @@ class RankValue:
 
     @property
     def equal(self) -> tuple[DecisionRange, ...]:
-        """Decisions whose ends are two designs, and not what the solver's tolerance leaves of one."""
-        maximum = {found.unit: max(abs(d.high) for d in self.designs if d.unit == found.unit) for found in self.designs}
-        return tuple(found for found in self.designs if found.high - found.low > APART * maximum[found.unit])
+        """Decisions with a range wider than the tolerance of the solver."""
+        maximum = {entry.unit: max(abs(d.high) for d in self.designs if d.unit == entry.unit) for entry in self.designs}
+        return tuple(entry for entry in self.designs if entry.high - entry.low > APART * maximum[entry.unit])
 
 
 @dataclass(frozen=True)
@@ -111,14 +111,14 @@ class LimitValue:
     Attributes
     ----------
     shadow_price
-        Fall of the objective per unit by which the limit is relaxed; not a number where that is not known.
+        Fall of the objective per unit by which the limit is relaxed; NaN if unknown.
     side
         "at most" or "at least".
     error_estimate
-        What samples over the cycle may have missed of the value, relative, not exceeded.
+        Upper bound of the relative error of the value from sampling.
     tightening_price
-        Rise of the objective per unit by which the limit is tightened, where that is another; infinite where no design
-        is left.
+        Rise of the objective per unit by which the limit is tightened; None if equal to `shadow_price`, infinite if no
+        design remains.
     """
 
     name: str
@@ -133,29 +133,29 @@ class LimitValue:
 
     @property
     def price(self) -> Price:
-        """Price on both sides."""
+        """Shadow price of the limit."""
         other = self.tightening_price
         return Price(self.shadow_price, self.shadow_price if other is None else other)
 
 
 @dataclass(frozen=True)
 class AttainableLimit:
-    """Closest value that a broken limit can reach while the other limits hold [SI].
+    """Closest value that a violated limit can attain while the other limits hold [SI].
 
     Attributes
     ----------
     side, limit
-        "at most" or "at least", and what was asked for.
+        "at most" or "at least", and the limit of the problem.
     value
-        Of the design found that comes nearest, or of every one; not a number where none is told.
+        Value of the limited measure at the nearest design; NaN if no design was found.
     bound
-        What no design that keeps the other limits goes beyond; not a number where that is not known.
+        Bound of the measure over all designs that meet the other limits; NaN if unknown.
     proof
-        Of the value.
+        Kind of proof of the value.
     decisions
-        Of that design.
+        Decisions of the nearest design.
     why, ended
-        Why no design is told, and whether the search for one was ended for want of time.
+        Reason why there is no design, and True if the time limit ended the search.
     """
 
     name: str
@@ -172,14 +172,14 @@ class AttainableLimit:
 
 @dataclass(frozen=True)
 class Nearest:
-    """The design found that breaks limits least, which is no answer: the limit that it breaks most, and how [SI].
+    """Infeasible design with the smallest violation, described by the limit with the largest violation [SI].
 
     Attributes
     ----------
     value, violation
-        Of the measure that is limited, and the share by which it is beyond the limit.
+        Value of the limited measure, and relative violation of the limit.
     broken
-        Names of all limits that it breaks.
+        Names of all violated limits.
     """
 
     name: str
@@ -194,7 +194,7 @@ class Nearest:
 
 @dataclass(frozen=True)
 class ObjectiveValue:
-    """The objective of the design and of the one given, which is infinite where that stands on a resonance."""
+    """Objective of the final and of the initial design [SI]; infinite at an undamped resonance."""
 
     name: str
     value: float
@@ -214,7 +214,7 @@ class ObjectiveValue:
 
     @property
     def reduction(self) -> float:
-        """Share by which the initial value fell; not a number where that is infinite."""
+        """Relative reduction of the initial value; NaN if that is infinite."""
         if math.isinf(self.initial):
             return math.nan
         return 1.0 - self.value / self.initial if self.initial else 0.0

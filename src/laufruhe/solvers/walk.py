@@ -1,7 +1,7 @@
-"""A second witness: a walk by exact evaluations from the decided design.
+"""Check lower bounds by an independent local search from the optimised design.
 
-The walk knows the bounds, the limits and the exact model. It shares nothing with the search that found the design, nor
-with the proof. A design on its way that lies under the lower bound shows that the bound is false.
+The search ("walk") uses bounds, limits and the exact model only. It shares no code with the method that found the
+design or its proof. A feasible design below the lower bound shows that the bound is wrong.
 """
 
 from __future__ import annotations
@@ -36,29 +36,29 @@ from laufruhe.solvers.stars.star_results import phase_decisions
 from laufruhe.solvers.values import ObjectiveValue, RankValue
 
 MOST, SEED = 64, 0
-"""Evaluations of a walk at most, and the seed of its random directions."""
+"""Largest number of evaluations, and seed of the random directions."""
 SHARE, SECONDS = 0.03, 0.01
-"""Processor time of a walk: so many seconds, or a share of the time of the solve where that is more."""
+"""Processor time of a walk: share of the time of the solve, and smallest time [s]."""
 STEP, SHORTER, LONGER = 0.1, 0.2, 2.0
-"""First step as a share of the bounds, and its factors after a failure and after a success."""
+"""First step relative to the range of a decision, and its factors after a failure and after a success."""
 ORDERS = 6
-"""Firing orders of one star that are tried."""
+"""Number of firing orders of one star that the walk tries."""
 ROUNDING = 1e-9
 """Relative difference that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Stand:
-    """A design before it is evaluated.
+    """Design before its evaluation.
 
     Attributes
     ----------
     problem
-        With its star.
+        Problem with the star of the design.
     values
-        Of the decisions.
+        Values of the decisions [SI].
     candidate
-        Star and firing order; None where neither is open.
+        Star and firing order; None if neither is open.
     """
 
     problem: Problem
@@ -67,21 +67,21 @@ class Stand:
 
 
 Move = Callable[[Stand, float], Stand | None]
-"""Gives the design that is a signed share of the bounds away; None where the bounds leave none."""
+"""Function that returns a design at a signed step, relative to the range of the decisions; None if bounds forbid it."""
 
 
 @dataclass(frozen=True, eq=False)
 class Visit:
-    """A design by the exact model.
+    """Design evaluated by the exact model.
 
     Attributes
     ----------
     value
         Objective.
     violation
-        Largest relative excess over a limit.
+        Largest relative violation of a limit.
     sure
-        The same with what samples may have missed of each limit.
+        Largest relative violation plus sampling error of a limit.
     """
 
     stand: Stand
@@ -91,96 +91,98 @@ class Visit:
     sure: float
 
     def is_better(self, other: Visit, allowed: float) -> bool:
-        """Compare by the limits first, then by the objective."""
-        own, theirs = (max(each.violation, allowed) for each in (self, other))
-        return (own, self.value) < (theirs, other.value)
+        """Return True if the violation above `allowed` is smaller, or equal and the objective smaller."""
+        key, other_key = (max(visit.violation, allowed) for visit in (self, other))
+        return (key, self.value) < (other_key, other.value)
 
 
-def walked(problem: Problem, found: Result, spent: float) -> Result:
-    """Return the result, its proof withheld where a walk from its design shows that it is false.
+def walked(problem: Problem, result: Result, spent: float) -> Result:
+    """Return the result, without proof if a walk from its design finds a better feasible design than the bound allows.
 
     Parameters
     ----------
     problem
-        As it was asked.
+        Problem as the caller of `solve` gave it.
     spent
         Processor time of the solve [s].
     """
-    is_none = found.status is Status.INFEASIBLE
-    bound = found.certificate.lower_bound if found.certificate is not None else 0.0
-    claims = bool(found.limits) and problem.phasing is None if is_none else found.status.has_design and bound > 0.0
+    is_infeasible = result.status is Status.INFEASIBLE
+    bound = result.certificate.lower_bound if result.certificate is not None else 0.0
+    claims = (
+        bool(result.limits) and problem.phasing is None if is_infeasible else result.status.has_design and bound > 0.0
+    )
     if not claims or problem.extras:
-        return found
-    start = _start(found)
-    # a step may lead onto a resonance
+        return result
+    start = _start(result)
+    # a step may lead to a resonance
     with np.errstate(all="ignore"):
-        witness = _Walk(found, start).run(max(SHARE * spent, SECONDS))
-        if witness is None or not _is_shown(found, witness, None if is_none else bound):
-            return found
-    return _withheld(problem, found, witness, bound)
+        witness = _Walk(result, start).run(max(SHARE * spent, SECONDS))
+        if witness is None or not _is_shown(result, witness, None if is_infeasible else bound):
+            return result
+    return _withheld(problem, result, witness, bound)
 
 
-def _start(found: Result) -> Stand:
-    # the initial design if none was decided
-    problem = found.problem
-    values = tuple(values_of(problem, found))
-    if problem.phasing is not None and found.phasing is not None:
-        candidate = next(iter(candidates_of(problem.phasing, found.phasing.ranking[:1])), None)
+def _start(result: Result) -> Stand:
+    # the initial design if the result has none
+    problem = result.problem
+    values = tuple(values_of(problem, result))
+    if problem.phasing is not None and result.phasing is not None:
+        candidate = next(iter(candidates_of(problem.phasing, result.phasing.ranking[:1])), None)
         return Stand(problem, values, candidate)
     return Stand(problem, values)
 
 
 class _Walk:
-    """Steps from a design to better ones while time is left."""
+    """Local search by steps from a design to better ones until a time limit."""
 
-    def __init__(self, found: Result, start: Stand) -> None:
-        self.limits, self.samples = found.problem.limits, found.final.samples
-        errors = [limit.error_estimate for limit in found.limits]
+    def __init__(self, result: Result, start: Stand) -> None:
+        self.limits, self.samples = result.problem.limits, result.final.samples
+        errors = [limit.error_estimate for limit in result.limits]
         self.errors = errors if len(errors) == len(self.limits) else [0.0] * len(self.limits)
         self.random = np.random.default_rng(SEED)
-        self.start, self.is_none, self.final = start, found.status is Status.INFEASIBLE, found.final
-        self.phasing = found.problem.phasing
+        self.start, self.is_none, self.final = start, result.status is Status.INFEASIBLE, result.final
+        self.phasing = result.problem.phasing
 
     def run(self, seconds: float) -> Visit | None:
-        """Return the best design that surely keeps the limits; None where no step found a better one."""
+        """Return the best feasible design within a processor time [s]; None if no step leads to one."""
         is_over = _timer(seconds)
-        here = self._visit(self.start, None)
-        if here is None:
+        best = self._visit(self.start, None)
+        if best is None:
             return None
-        allowed, witness = 0.0 if self.is_none else max(here.violation, 0.0), None
+        allowed, witness = 0.0 if self.is_none else max(best.violation, 0.0), None
         sources = [self._choices(), self._steps()]
-        coming = [next(source, None) for source in sources]
-        seen = 0
+        pending = [next(source, None) for source in sources]
+        count = 0
         for k in itertools.cycle(range(len(sources))):
-            if not any(coming) or seen >= MOST or is_over():
+            if not any(pending) or count >= MOST or is_over():
                 return witness
-            if (step := coming[k]) is None:
+            if (step := pending[k]) is None:
                 continue
             move, share = step
-            stand = move(here.stand, share)
-            visit = None if stand is None else self._visit(stand, here)
-            seen += stand is not None
-            won = visit is not None and visit.is_better(here, allowed)
+            stand = move(best.stand, share)
+            visit = None if stand is None else self._visit(stand, best)
+            count += stand is not None
+            is_improved = visit is not None and visit.is_better(best, allowed)
             if visit is not None and visit.sure <= 0.0 and (witness is None or visit.value < witness.value):
                 witness = visit
-            if won and visit is not None:
-                here = visit
+            if is_improved and visit is not None:
+                best = visit
             try:
-                coming[k] = sources[k].send(won)
+                pending[k] = sources[k].send(is_improved)
             except StopIteration:
-                coming[k] = None
+                pending[k] = None
         return witness
 
-    def _visit(self, stand: Stand, here: Visit | None) -> Visit | None:
-        """The design by the exact model; None where it has no loads. Limits are read where it may be better."""
+    def _visit(self, stand: Stand, best: Visit | None) -> Visit | None:
+        """Evaluate a design; None without finite loads, or if its objective is not below that of the best one."""
         problem = stand.problem
         try:
             engine, final = problem.design(stand.values), self.final
-            # the exact model has evaluated the design that is told
-            is_told = engine == final.engine and problem.fidelity == final.fidelity
-            evaluation = final if is_told else evaluate(problem, engine, self.samples)
+            # the final design has been evaluated before
+            is_final = engine == final.engine and problem.fidelity == final.fidelity
+            evaluation = final if is_final else evaluate(problem, engine, self.samples)
             value = objective_value(problem, evaluation)
-            if not math.isfinite(value) or (here is not None and here.violation <= 0.0 and value >= here.value):
+            if not math.isfinite(value) or (best is not None and best.violation <= 0.0 and value >= best.value):
                 return None
             excesses = [evaluation.standing(limit).violation for limit in self.limits]
         except LaufruheError:
@@ -189,7 +191,7 @@ class _Walk:
         return Visit(stand, evaluation, value, max(excesses, default=0.0), sure)
 
     def _steps(self) -> Generator[tuple[Move, float], bool, None]:
-        """Steps along coordinates, and along random directions beside them; each goes on while it leads down."""
+        """Yield steps along coordinates and random directions; repeat each while it leads to better designs."""
         moves = [*_coordinates(self.start.problem), *self._angles()]
         sizes = [STEP] * len(moves)
         for size in STEP * SHORTER ** np.arange(8.0):
@@ -215,14 +217,14 @@ class _Walk:
     def _choices(self) -> Generator[tuple[Move, float], bool, None]:
         # ends when no neighbour is better
         moves = self._stars()
-        failed = 0
+        failures = 0
         for k in itertools.cycle(self.random.permutation(len(moves))):
-            failed = 0 if (yield moves[k], 1.0) else failed + 1
-            if failed == len(moves):
+            failures = 0 if (yield moves[k], 1.0) else failures + 1
+            if failures == len(moves):
                 return
 
     def _stars(self) -> list[Move]:
-        """Throws that change places, alone or with those of the other end; other firing orders and optional shafts."""
+        """Return exchanges of throws, alone or symmetric to the middle, and other firing orders and optional shafts."""
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None:
             return []
@@ -235,11 +237,14 @@ class _Walk:
                     moves.append(_swapped(phasing, [(i, j), (last - i, last - j)]))
         if phasing.firing_order is None:
             moves += [_fired(phasing, k) for k in range(ORDERS)]
-        return [*moves, *(_built(phasing, built) for built in phasing.shafts.allowed if phasing.shafts.optional)]
+        return [*moves, *(_built(phasing, shafts) for shafts in phasing.shafts.allowed if phasing.shafts.optional)]
 
 
 def _timer(seconds: float) -> Callable[[], bool]:
-    """Return whether so much processor time of this thread has passed; a clock on the wall is never behind it."""
+    """Return a function that returns True after a processor time of this thread [s].
+
+    Processor time never exceeds wall time, so it is read only once the wall time has passed.
+    """
     until, ends = time.thread_time() + seconds, time.perf_counter() + seconds
 
     def is_over() -> bool:
@@ -262,15 +267,15 @@ def _coordinates(problem: Problem) -> list[Move]:
 
 
 def _along(direction: Array) -> Move:
-    """Step along a direction in shares of the bounds, back into them."""
+    """Return a step along a direction relative to the ranges of the decisions, shape (n,), with projection."""
 
-    def move(stand: Stand, share: float) -> Stand | None:
+    def move(stand: Stand, step: float) -> Stand | None:
         domains = domains_of(stand.problem.decisions)
         x = vector_of(domains, stand.values)
         if len(x) != len(direction):
             return None
-        wide = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
-        moved = x + share * direction * np.array(wide)
+        widths = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
+        moved = x + step * direction * np.array(widths)
         for domain in domains:
             moved[domain.columns] = domain.project(moved)
         if np.array_equal(moved, x):
@@ -289,56 +294,56 @@ def _value(domain: Domain, x: Array) -> Value:
 
 
 def _throw(phasing: Phasing, k: int) -> Move:
-    """Move one throw; the first one is where cylinder 1 fires unless it has bounds of its own (C5)."""
+    """Return a move of throw `k`; the first throw stays at zero without bounds of its own (C5)."""
     bounds = phasing.throw_bounds
-    wide = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
+    width = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
 
-    def move(stand: Stand, share: float) -> Stand | None:
+    def move(stand: Stand, step: float) -> Stand | None:
         assert stand.candidate is not None
         throws = list(stand.candidate.throws)
         if bounds is None:
-            throws[k] += share * wide if k else 0.0
+            throws[k] += step * width if k else 0.0
         else:
             low, high = bounds[k]
-            throws[k] = min(max(throws[k] + share * (high - low), low), high)
+            throws[k] = min(max(throws[k] + step * (high - low), low), high)
         return _realised(phasing, stand, replace(stand.candidate, throws=tuple(throws)))
 
     return move
 
 
 def _angle(phasing: Phasing, name: str) -> Move:
-    """Move the bank angle or the split pins."""
+    """Return a move of the bank angle or of the split pins."""
     low, high = (phasing.bank if name == "bank_angle" else phasing.split) or (0.0, 0.0)
 
-    def move(stand: Stand, share: float) -> Stand | None:
+    def move(stand: Stand, step: float) -> Stand | None:
         assert stand.candidate is not None
-        given = getattr(stand.candidate, name)
-        if given is None:
+        angle = getattr(stand.candidate, name)
+        if angle is None:
             return None
-        angle = min(max(given + share * (high - low), low), high)
+        angle = min(max(angle + step * (high - low), low), high)
         return _realised(phasing, stand, replace(stand.candidate, **{name: angle}))
 
     return move
 
 
 def _swapped(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
-    """Throws of each pair change places, and their cylinders their turns in the firing order."""
+    """Return a move that exchanges the throws of each pair, and their cylinders in the firing order."""
 
     def move(stand: Stand, _: float) -> Stand | None:
         candidate = stand.candidate
         assert candidate is not None
         pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
         for i, j in pairs:
-            own, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
-            if len(own) != len(other) or order is None:
+            cylinders, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
+            if len(cylinders) != len(other) or order is None:
                 return None
             throws[i], throws[j] = throws[j], throws[i]
-            changed = dict(zip((*own, *other), (*other, *own), strict=True))
+            changed = dict(zip((*cylinders, *other), (*other, *cylinders), strict=True))
             order = from_one([changed.get(number, number) for number in order])
-        # cylinder 1 stays where it fires (C5)
-        back = candidate.throws[0] - throws[0]
-        turned = tuple((angle + back) % math.tau for angle in throws)
-        return _realised(phasing, stand, replace(candidate, throws=turned, firing_order=order))
+        # cylinder 1 keeps its angle (C5)
+        shift = candidate.throws[0] - throws[0]
+        rotated = tuple((angle + shift) % math.tau for angle in throws)
+        return _realised(phasing, stand, replace(candidate, throws=rotated, firing_order=order))
 
     return move
 
@@ -365,7 +370,7 @@ def _built(phasing: Phasing, built: Sequence[int]) -> Move:
 
 
 def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | None:
-    """The design of a candidate with the decisions as they stand; None where it fires as is not allowed."""
+    """Return the design of a candidate with the present decisions; None if its firing order is not permitted."""
     if candidate == stand.candidate:
         return None
     if phasing.firing_order is not None and candidate.firing_order != phasing.firing_order:
@@ -379,70 +384,71 @@ def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | N
         problem = phasing.realise(candidate)
     except LaufruheError:
         return None
-    known = dict(zip((d.name for d in stand.problem.decisions), stand.values, strict=True))
-    values = [known.get(decision.name, decision.start) for decision in problem.decisions]
+    values_by_name = dict(zip((d.name for d in stand.problem.decisions), stand.values, strict=True))
+    values = [values_by_name.get(decision.name, decision.start) for decision in problem.decisions]
     domains = domains_of(problem.decisions)
     x = columns_of(domains, values)
     return Stand(problem, tuple(_value(domain, x) for domain in domains), candidate)
 
 
-# --- what a walk shows
+# --- contradictions between designs and bounds
 
 
-def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
-    """Tell if a design keeps the limits, and lies under the bound if there is one, by more than samples may miss."""
-    problem, own = witness.stand.problem, witness.evaluation
+def _is_shown(result: Result, witness: Visit, bound: float | None) -> bool:
+    """Return True if a design is feasible and below the bound by more than the sampling error; no bound is None."""
+    problem, evaluation = witness.stand.problem, witness.evaluation
     if bound is not None:
         if witness.value >= bound:
             return False
-        # the bound may be of as few angles as the fidelity has
-        coarse = replace(own, samples=min(own.samples, found.problem.fidelity.samples))
-        over = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
-        if witness.value * over + numerical_zero(problem, own.engine) >= bound:
+        # the bound may hold for the samples of the fidelity only
+        coarse = replace(evaluation, samples=min(evaluation.samples, result.problem.fidelity.samples))
+        factor = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
+        if witness.value * factor + numerical_zero(problem, evaluation.engine) >= bound:
             return False
-    standings = ((limit, own.standing(limit)) for limit in problem.limits)
-    kept = all(
-        stands.violation + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings
+    standings = ((limit, evaluation.standing(limit)) for limit in problem.limits)
+    is_feasible = all(
+        standing.violation + relative(missed(limit.measure, evaluation), standing.value) <= 0.0
+        for limit, standing in standings
     )
-    return kept and violation_at_fine_sampling(problem, own) <= 0.0
+    return is_feasible and violation_at_fine_sampling(problem, evaluation) <= 0.0
 
 
-def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> Result:
-    """The design of the walk, of which nothing is proven."""
-    stand, candidate, own = witness.stand, witness.stand.candidate, found.problem
-    shown = replace(stand.problem, phasing=own.phasing)
-    design = Design(shown, stand.values, witness.evaluation, witness.value, witness.violation)
-    decisions, details = decided(design), found.phasing
-    if details is not None and candidate is not None and own.phasing is not None:
-        decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)
-        if candidate != next(iter(candidates_of(own.phasing, details.ranking[:1])), None):
-            first = ranked_star(own.phasing, candidate, None, witness.value, 0.0, False)
+def _withheld(problem: Problem, result: Result, witness: Visit, bound: float) -> Result:
+    """Return the design of the walk as a result without proof."""
+    stand, candidate, original = witness.stand, witness.stand.candidate, result.problem
+    problem_of_design = replace(stand.problem, phasing=original.phasing)
+    design = Design(problem_of_design, stand.values, witness.evaluation, witness.value, witness.violation)
+    decisions, details = decided(design), result.phasing
+    if details is not None and candidate is not None and original.phasing is not None:
+        decisions = (*phase_decisions(problem, original.phasing, candidate), *decisions)
+        if candidate != next(iter(candidates_of(original.phasing, details.ranking[:1])), None):
+            first = ranked_star(original.phasing, candidate, None, witness.value, 0.0, False)
             details = replace(details, ranking=(first, *details.ranking))
-    moved = replace(
-        found,
-        problem=shown,
+    unproven = replace(
+        result,
+        problem=problem_of_design,
         status=Status.FEASIBLE,
-        objective=ObjectiveValue.of(own, witness.value, objective_value(own, found.initial)),
+        objective=ObjectiveValue.of(original, witness.value, objective_value(original, result.initial)),
         certificate=unproven_certificate(witness.value, math.inf, "a walk by exact evaluations, which proves nothing"),
         decisions=decisions,
-        limits=limit_values(shown, witness.evaluation),
+        limits=limit_values(problem_of_design, witness.evaluation),
         final=witness.evaluation,
         message="",
-        error=partial(error_of, shown, witness.evaluation),
+        error=partial(error_of, problem_of_design, witness.evaluation),
         phasing=details,
-        ranks=_reached(found, witness),
+        ranks=_reached(result, witness),
         nearest=None,
     )
-    what, minimum = "a walk", bound
-    if found.status is Status.INFEASIBLE:
-        what, minimum = "a walk; it was said that no design keeps the limits", math.inf
-    return without_proof(moved, BoundError(what, minimum, witness.value))
+    source, claim = "a walk", bound
+    if result.status is Status.INFEASIBLE:
+        source, claim = "a walk; it was said that no design keeps the limits", math.inf
+    return without_proof(unproven, BoundError(source, claim, witness.value))
 
 
-def _reached(found: Result, witness: Visit) -> tuple[RankValue, ...]:
-    own = found.problem
-    values = [objective_value(replace(own, objective=rank.terms), witness.evaluation) for rank in own.ranks]
+def _reached(result: Result, witness: Visit) -> tuple[RankValue, ...]:
+    problem = result.problem
+    values = [objective_value(replace(problem, objective=rank.terms), witness.evaluation) for rank in problem.ranks]
     return tuple(
         replace(rank, minimum=min(rank.minimum, value) if k == 0 else rank.minimum, final=value, price=math.nan)
-        for k, (rank, value) in enumerate(zip(found.ranks, values, strict=False))
+        for k, (rank, value) in enumerate(zip(result.ranks, values, strict=False))
     )

@@ -1,7 +1,4 @@
-"""A problem that differs little from one that is solved, decided from the designs that are known of that (F14).
-
-Nothing is proven of what is found, so nothing is divided for a proof either.
-"""
+"""Optimise a problem from the result of a similar one, without proof (F14)."""
 
 from __future__ import annotations
 
@@ -27,17 +24,17 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import candidates_of
 
 STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
-"""Of a first search where mounts are open, and stars that are ranked; fewer of them where mounts or throws move too."""
+"""Starts of the first search, stars that it ranks, and fewer stars if mounts or throws are open too."""
 BOXES, NEAR_BOXES = 100, 30
-"""Of places and leads at most, each of which has a design in its middle; fewer where a design is known."""
+"""Largest number of boxes of positions and leads: of the first search, and of a search from a known design."""
 LIKE = 0.1
-"""Share by which what is minimised of a design known may differ where searches from it are enough."""
+"""Relative difference of the objective up to which a search from the known design alone is sufficient."""
 STEPS = 96
-"""Over the cycle, by which stars that stand on even steps are ranked."""
+"""Samples per cycle for the ranking of stars with even firing."""
 
 
 def is_convex(problem: Problem) -> bool:
-    """Tell if all decisions are unbalances, phasing is fixed, and no measure needs a simulation."""
+    """Return True if all decisions are unbalances, phasing is fixed, and no measure needs a simulation."""
     return (
         problem.phasing is None
         and len(problem.unbalances) == len(problem.decisions)
@@ -46,51 +43,59 @@ def is_convex(problem: Problem) -> bool:
 
 
 def compares_stars(problem: Problem) -> bool:
-    """Tell if all stars are compared: phasing is open, but throws and mounts are fixed."""
+    """Return True if all stars are compared: phasing is open, throws stand on even steps, and mounts are fixed."""
     return problem.phasing is not None and not (problem.phasing.continuous or problem.mount_decisions)
 
 
 def by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
-    """The best unbalances at some steps over the period of the loads, all by default, without refinement."""
+    """Return the engine with optimal unbalances by one cone program; None if it has no solution.
+
+    Parameters
+    ----------
+    samples
+        Samples over the period of the loads; all of the model if None.
+    """
     model = AffineModel(problem)
     x = solve_cones(model.at(samples or model.full_samples)).x
     return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
 
 
 def first_of(problem: Problem) -> Result | None:
-    """A search as `solve` has it, with a few starts, and without boxes that prove no more than a design."""
+    """Return the result of `solve` with few starts and boxes, without proof; None if it found no feasible design."""
     phasing = problem.phasing
     if phasing is not None:
-        moves = phasing.continuous or bool(problem.mount_decisions)
-        few = min(phasing.best, STARS_THAT_MOVE if moves else STARS)
-        problem = replace(problem, phasing=replace(phasing, best=few, thorough=False))
-    # what is made of each star is not proven either
+        is_continuous = phasing.continuous or bool(problem.mount_decisions)
+        count = min(phasing.best, STARS_THAT_MOVE if is_continuous else STARS)
+        problem = replace(problem, phasing=replace(phasing, best=count, thorough=False))
+    # the design of each star needs no proof
     result = solve(problem.changed(search=_unproven(problem, STARTS, BOXES)))
     return result if result.status.has_design else None
 
 
-def next_to(problem: Problem, known: Result) -> Engine | None:
-    """The best engine that searches from known designs find; None where none of them ends within the limits.
+def next_to(problem: Problem, neighbour: Result) -> Engine | None:
+    """Return the best engine of searches from a known result; None if no search ends within the limits.
 
     Parameters
     ----------
-    known
-        Of a problem with the same decisions: where numbers are sought from, and the stars that are compared.
+    neighbour
+        Result of a problem with the same decisions. It gives the start values and the stars to compare.
     """
     if compares_stars(problem):
-        # the best of many stars may be far from the best known
-        return _of_stars(problem, first_of(problem.at(_coarse(problem.fidelity))) or known)
-    engines = [_from(problem, known) if problem.phasing is None else _of_stars(problem, known)]
-    if not _is_like(problem, known):
+        # the best star may differ from the best one of the neighbour
+        return _of_stars(problem, first_of(problem.at(_coarse(problem.fidelity))) or neighbour)
+    engines = [_from(problem, neighbour) if problem.phasing is None else _of_stars(problem, neighbour)]
+    if not _is_like(problem, neighbour):
         with suppress(SolverError, ModelError):
             engines.append(_engine(first_of(problem)))
     return _best(problem, engines)
 
 
-def _is_like(problem: Problem, known: Result) -> bool:
-    # the known design is worth about the same for this problem
-    value = objective_value(problem, evaluate(problem, known.final.engine))
-    return known.objective is not None and abs(value - known.objective.value) <= LIKE * known.objective.value
+def _is_like(problem: Problem, neighbour: Result) -> bool:
+    # the design of the neighbour has about the same objective in this problem
+    value = objective_value(problem, evaluate(problem, neighbour.final.engine))
+    return (
+        neighbour.objective is not None and abs(value - neighbour.objective.value) <= LIKE * neighbour.objective.value
+    )
 
 
 def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
@@ -99,62 +104,62 @@ def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
     return None if best is None else best.evaluation.engine
 
 
-def _of_stars(problem: Problem, known: Result) -> Engine | None:
-    """The best of the stars that rank first, with throws that move from it where these may."""
+def _of_stars(problem: Problem, neighbour: Result) -> Engine | None:
+    """Return the best engine of the first-ranked stars; open throws may then leave the best star."""
     phasing = problem.phasing
-    if phasing is None or known.phasing is None:
+    if phasing is None or neighbour.phasing is None:
         return None
     stars: dict[Engine, Candidate] = {}
-    for candidate in candidates_of(phasing, known.phasing.ranking)[:STARS]:
+    for candidate in candidates_of(phasing, neighbour.phasing.ranking)[:STARS]:
         star = replace(phasing.realise(candidate), phasing=None)
-        engine = _from(star, known) if star.decisions else star.engine
+        engine = _from(star, neighbour) if star.decisions else star.engine
         if engine is not None:
             stars[engine] = candidate
     best = _best(problem, [*stars])
     if best is None or not phasing.continuous:
         return best
-    return _moved(phasing, stars[best], known) or best
+    return _moved(phasing, stars[best], neighbour) or best
 
 
 def _coarse(fidelity: Fidelity) -> Fidelity:
     return replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
 
 
-def _moved(phasing: Phasing, star: Candidate, known: Result) -> Engine | None:
+def _moved(phasing: Phasing, star: Candidate, neighbour: Result) -> Engine | None:
     problem = replace(phasing.realise(star), phasing=None)
     if problem.mount_decisions:
         from laufruhe.solvers.mounts.nonlinear import solve_moved
 
         moves = ThrowMoves(phasing, phasing.layout_of(star), star, phasing.intervals)
-        return _engine(solve_moved(_begun(problem, known), moves, None)[0])
+        return _engine(solve_moved(_begun(problem, neighbour), moves, None)[0])
     from laufruhe.solvers.throws.uneven_throws import local_optimum
 
-    found = local_optimum(phasing, star, phasing.intervals, nudged=False)
-    return None if found is None else _engine(found.result)
+    optimum = local_optimum(phasing, star, phasing.intervals, nudged=False)
+    return None if optimum is None else _engine(optimum.result)
 
 
-def _from(problem: Problem, known: Result) -> Engine | None:
+def _from(problem: Problem, neighbour: Result) -> Engine | None:
     # a convex problem needs no start
-    return by_cones(problem) if is_convex(problem) else _engine(solve(_begun(problem, known)))
+    return by_cones(problem) if is_convex(problem) else _engine(solve(_begun(problem, neighbour)))
 
 
-def _begun(problem: Problem, known: Result) -> Problem:
-    # the problem with known values as its only start
-    values = values_of(problem, known)
+def _begun(problem: Problem, neighbour: Result) -> Problem:
+    # the problem with the values of the neighbour as its only start
+    values = values_of(problem, neighbour)
     pairs = list(zip(problem.decisions, values, strict=True))
     numbers = [(decision, value) for decision, value in pairs if decision.address_drives]
-    drawn = problem.fixed_at([value for _, value in numbers], [decision for decision, _ in numbers])
-    known_there = {decision.name: decision for decision in drawn.decisions}
-    decisions = tuple(replace(known_there.get(d.name, d), start=value) for d, value in pairs)
+    fixed = problem.fixed_at([value for _, value in numbers], [decision for decision, _ in numbers])
+    rebuilt = {decision.name: decision for decision in fixed.decisions}
+    decisions = tuple(replace(rebuilt.get(d.name, d), start=value) for d, value in pairs)
     return replace(problem.fixed_at(values), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES))
 
 
-def _unproven(problem: Problem, starts: int, few: int) -> Search:
+def _unproven(problem: Problem, starts: int, maximum: int) -> Search:
     # search settings with few starts and boxes, without proof
-    boxes = min(problem.search.boxes_or(few), few) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
+    boxes = min(problem.search.boxes_or(maximum), maximum) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 
 
 def _engine(result: Result | None) -> Engine | None:
-    met = result is not None and result.status.has_design
-    return result.final.engine if result is not None and met else None
+    is_feasible = result is not None and result.status.has_design
+    return result.final.engine if result is not None and is_feasible else None

@@ -181,7 +181,7 @@ class MountSearch:
     def turns(self) -> Array:
         """Deviations of the throws of the best design from their star [rad]."""
         optimum = self.best.optimum if self.best is not None else None
-        return self.joint.turns(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
+        return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
 
     @property
     def _is_feasible(self) -> bool:
@@ -203,7 +203,7 @@ class MountSearch:
                 x = around[k % len(around)].x
                 centre, columns = _split(joint, x)
                 mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
-                starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
+                starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.throw_deviations(x)))
             more = self._solve(starts, try_all, len(points))
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
@@ -278,7 +278,7 @@ class MountSearch:
             return None
         mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
         try:
-            problem = self.problem if self.moves is None else joint.designed(optimum.x)
+            problem = self.problem if self.moves is None else joint.problem_at(optimum.x)
         except ModelError:
             # throws at an end that is no optimum may not fire in their order
             return None
@@ -288,7 +288,7 @@ class MountSearch:
     def _nudged(self, generator: np.random.Generator, k: int) -> Array:
         # a symmetric star may be a saddle, so later starts are random
         if self.moves is None or k == 0:
-            return self.joint.turns(np.zeros(self.joint.program.x.numel()))
+            return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()))
         nudge = NUDGE * generator.normal(size=self.moves.size)
         return np.clip(nudge, self.moves.lower, self.moves.upper)
 

@@ -1,4 +1,4 @@
-"""A block under loads that are held, as expressions of what is open (E55)."""
+"""Static positions of a block under constant loads, as expressions of the open numbers (E55)."""
 
 from __future__ import annotations
 
@@ -16,53 +16,59 @@ from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.channels import counted_cases
 from laufruhe.problem.measure import Measure
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 
-# of a gap, over which a stop sets in: under it all along, so that a design does not stand better than it is
+# share of a gap over which the force of a stop sets in; the smooth force is never larger than the true one
 SOFT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class MountResponse:
-    """Travel and force of the mounts, shape (3 mounts,)."""
+    """Deflection [m] and force [N] of the mounts, shape (3 mounts,)."""
 
     travel: Any
     force: Any
 
 
 class StaticCases:
-    """Static positions of the block; with bump stops, their forces are variables under an equilibrium constraint.
+    """Static positions of the block under load cases.
+
+    With bump stops the position is a variable with an equilibrium constraint.
 
     Parameters
     ----------
-    held
-        What the program holds.
+    root
+        Map to coordinates in which the mass matrix is one, shape (6, 6).
+    constraints
+        Constraints of the program, to which those of the cases are added.
     """
 
-    def __init__(self, mounts: SymbolicMounts, mounting: ElasticMounting, root: Array, held: Gathered) -> None:
-        self._mounts, self._mounting, self._root, self._held = mounts, mounting, root, held
-        self._stops, self._found = stops_of(mounting), dict[LoadCase, MountResponse]()
+    def __init__(
+        self, mounts: SymbolicMounts, mounting: ElasticMounting, root: Array, constraints: ConstraintCollector
+    ) -> None:
+        self._mounts, self._mounting, self._root, self._constraints = mounts, mounting, root, constraints
+        self._stops, self._cache = stops_of(mounting), dict[LoadCase, MountResponse]()
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
-        """A variable that no length of a measure exceeds, in units of what the mounts as given have (E22)."""
-        part, chosen = measure.channel.of_cases, measure.places([mount.name for mount in engine.mounts])
+        """Return a variable constrained to be at least every length of a measure, scaled by the initial one (E22)."""
+        part, selected = measure.channel.of_cases, measure.places([mount.name for mount in engine.mounts])
         assert part is not None
         cases, weights = counted_cases(measure, engine), ca.DM(list(measure.direction_weights or (1.0, 1.0, 1.0)))
-        given = [np.linalg.norm(part(settled(self._mounting, case)), axis=1).max() for case in cases]
-        unit, signals = max(map(float, given)) or 1.0, [part(self._symbols(case)) for case in cases]
+        initial = [np.linalg.norm(part(settled(self._mounting, case)), axis=1).max() for case in cases]
+        unit, signals = max(map(float, initial)) or 1.0, [part(self._symbols(case)) for case in cases]
         squares = ca.vertcat(
-            *(ca.sumsqr(weights * signal[3 * k : 3 * k + 3] / unit) for signal in signals for k in chosen)
+            *(ca.sumsqr(weights * signal[3 * k : 3 * k + 3] / unit) for signal in signals for k in selected)
         )
-        named = self._held.named(measure.name)
-        # where a search starts, a balance with bump stops is not known yet: it starts at what is given
-        top = named.head(ca.MX(1.0))
-        named.hold(squares - top * top)
-        return unit * top
+        collector = self._constraints.named(measure.name)
+        # the start value is that of the initial mounts, because equilibrium with bump stops is not yet known
+        largest = collector.head(ca.MX(1.0))
+        collector.hold(squares - largest * largest)
+        return unit * largest
 
     def _symbols(self, case: LoadCase) -> MountResponse:
-        if case not in self._found:
-            self._found[case] = self._solved(case)
-        return self._found[case]
+        if case not in self._cache:
+            self._cache[case] = self._solved(case)
+        return self._cache[case]
 
     def _solved(self, case: LoadCase) -> MountResponse:
         mounts, load = self._mounts, self._root @ case_wrench(self._mounting.block, case)
@@ -70,19 +76,21 @@ class StaticCases:
         stops = np.flatnonzero(self._stops.stiffness)
         if not len(stops):
             return MountResponse(mounts.travels @ y, mounts.springs @ y)
-        named, rows = self._held.named(case.name), stops.tolist()
+        collector, rows = self._constraints.named(case.name), stops.tolist()
         size = float(np.linalg.norm(np.linalg.solve(self._root.T, settled(self._mounting, case).motion)))
-        y = size * named.free((y / size).T).T
-        own, gaps = mounts.own[rows, :], self._stops.gaps[stops]
-        pushed = ca.DM(self._stops.stiffness[stops]) * (_beyond(own @ y, gaps) - _beyond(-(own @ y), gaps))
-        balance = mounts.stiffness @ y + own.T @ pushed - ca.DM(load)
-        self._held.add(balance / float(np.linalg.norm(load)), 0.0, 0.0, "balance")
+        y = size * collector.free((y / size).T).T
+        stop_rows, gaps = mounts.own[rows, :], self._stops.gaps[stops]
+        stop_forces = ca.DM(self._stops.stiffness[stops]) * (
+            _excess_travel(stop_rows @ y, gaps) - _excess_travel(-(stop_rows @ y), gaps)
+        )
+        balance = mounts.stiffness @ y + stop_rows.T @ stop_forces - ca.DM(load)
+        self._constraints.add(balance / float(np.linalg.norm(load)), 0.0, 0.0, "balance")
         directions = ca.DM(np.ascontiguousarray(self._stops.directions[:, stops]))
-        return MountResponse(mounts.travels @ y, mounts.springs @ y + directions @ pushed)
+        return MountResponse(mounts.travels @ y, mounts.springs @ y + directions @ stop_forces)
 
 
-def _beyond(travel: Any, gaps: Array) -> Any:
-    # travel beyond a one-sided gap: a lower estimate with a continuous derivative
+def _excess_travel(travel: Any, gaps: Array) -> Any:
+    # deflection beyond a one-sided gap: a lower estimate with a continuous derivative
     soft, over = ca.DM(SOFT * gaps), travel - ca.DM(gaps)
     within = ca.fmin(ca.fmax(over, 0.0), soft)
     return within * within / (2.0 * soft) + ca.fmax(over - soft, 0.0)

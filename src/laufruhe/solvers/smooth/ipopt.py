@@ -1,4 +1,4 @@
-"""IPOPT from given points, its ends judged by derivatives taken anew (N2)."""
+"""Run IPOPT from start points, and compute the KKT residual of its solutions (N2)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from laufruhe.numerics.budget import in_time, left, passed
 from laufruhe.numerics.progress import report_progress, with_progress
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
-# residual (N2) of what counts as a local optimum, however the solver ended there
+# largest KKT residual (N2) of a local optimum
 ACCEPTABLE = 1e-7
-# seconds that a start has where time is over
+# smallest time limit of a start [s]
 SHORTEST = 0.25
-# of a program whose numbers are differences of a model outside
+# tolerance for programs with finite differences of an external model
 LOOSER = 1e-8
-# numbers of an array, on average, above which whole arrays have their second derivatives sooner than their numbers
+# mean array length above which second derivatives of arrays are faster than those of scalars
 LONG = 100
-# programs that are kept built
+# number of programs in the cache
 _BUILT = 4
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
 _OPTIONS = {
@@ -36,12 +36,12 @@ _OPTIONS = {
     "mu_strategy": "adaptive",
     "bound_relax_factor": 1e-10,
 }
-# a barrier so small that a start is not pushed away from where it stands
+# a small barrier that does not push the start away from its bounds
 _NEAR = {"mu_strategy": "monotone", "mu_init": 1e-4} | dict.fromkeys(
     ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), 1e-6
 )
-# share by which an end is worse than its start that is followed again by such a barrier, and what that start may break:
-# norms are softened less from stage to stage, so that the end of one breaks the next by as much
+# relative rise of the objective from start to end that calls for a small barrier, and largest violation of that start:
+# norms are softened less from stage to stage, so the end of one stage may violate constraints of the next
 STRAYED, SOFTENED = 1e-3, 2e-2
 
 _ENDINGS = {
@@ -57,27 +57,30 @@ _ENDINGS = {
 
 
 class ExternalModel(Protocol):
-    """A model outside a program, that another process can read."""
+    """Model outside CasADi; it can be pickled."""
 
-    def values(self, asked: Array) -> Array:
-        """Return the values at the arguments; not a number where the evaluation fails."""
+    def values(self, arguments: Array) -> Array:
+        """Return the values at the arguments, shape (values,); NaN if the evaluation fails."""
 
-    def slopes(self, asked: Array) -> Array:
-        """Return the derivatives of the values by the arguments, shape (values, asked)."""
+    def slopes(self, arguments: Array) -> Array:
+        """Return the derivatives of the values by the arguments, shape (values, arguments)."""
 
 
 @dataclass(frozen=True, eq=False)
 class SerializedExternal:
-    """Numbers that a teller gives, of a serialized function of the variables; the oracle has them as its input r."""
+    """External model with its arguments as a serialized function of the variables.
 
-    asked: str
+    The values of the model are the input r of the oracle.
+    """
+
+    arguments: str
     model: ExternalModel
     count: int
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A program in a form that another process can read."""
+    """Nonlinear program that can be pickled; its variables are scaled."""
 
     oracle: str
     lower: Array
@@ -90,22 +93,25 @@ class Task:
     max_iterations: int
     max_seconds: float
     expand: bool
-    outside: SerializedExternal | None = None
+    external_model: SerializedExternal | None = None
     deciding: int | None = None
 
 
 def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
-    """Optima from some points of a program, with their numbers."""
+    """Return the local optima from numbered start points of a program."""
     task, points = share
     if not points:
         return []
     report_progress("derivatives of the smooth program")
-    built = _of_task(task)
-    return [_from_start(task, built, k, point) for k, point in in_time(with_progress("starts", points))]
+    program = _compile_task(task)
+    return [_from_start(task, program, k, point) for k, point in in_time(with_progress("starts", points))]
 
 
 class _Clock(ca.Callback):
-    """Asked by IPOPT after every iteration whether time is over; a limit of its own would be built into the program."""
+    """Iteration callback that stops IPOPT at a deadline.
+
+    The time limit of IPOPT itself would be fixed in the cached program.
+    """
 
     def __init__(self, sizes: dict[str, int]) -> None:
         ca.Callback.__init__(self)
@@ -125,7 +131,7 @@ class _Clock(ca.Callback):
         return 1
 
     def get_sparsity_in(self, k: int) -> Any:
-        """Shape of what IPOPT tells."""
+        """Return the sparsity of an input: a dense column."""
         return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(k)], 1)
 
     def eval(self, _: Any) -> list[float]:
@@ -134,7 +140,7 @@ class _Clock(ca.Callback):
 
 
 class _ExternalFunction(ca.Callback):
-    """A function of columns that Python answers; its derivative is another one."""
+    """CasADi function whose values and derivatives Python computes."""
 
     def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
         ca.Callback.__init__(self)
@@ -143,7 +149,7 @@ class _ExternalFunction(ca.Callback):
         self.construct(name, {})
 
     def get_n_in(self) -> int:
-        """Columns."""
+        """Return the number of input columns."""
         return len(self._sizes)
 
     def get_n_out(self) -> int:
@@ -159,15 +165,15 @@ class _ExternalFunction(ca.Callback):
         return ca.Sparsity.dense(*self._shape)
 
     def eval(self, external: Any) -> list[Any]:
-        """Return the answer at the first input; a derivative also receives the values, and ignores them."""
+        """Return the output at the first input; a derivative also receives the values, and ignores them."""
         return [ca.DM(self._answer(_flat(external[0])))]
 
     def has_jacobian(self, *_: Any) -> bool:
-        """Tell if derivatives are available."""
+        """Return True if derivatives are available."""
         return self._slopes is not None
 
     def get_jacobian(self, name: str, *_: Any) -> Any:
-        """Kept, for CasADi does not."""
+        """Return the function of derivatives, and keep a reference, because CasADi keeps none."""
         count = self._shape[0]
         self._derivative = _ExternalFunction(name, (*self._sizes, count), (count, self._sizes[0]), self._slopes, None)
         return self._derivative
@@ -175,37 +181,37 @@ class _ExternalFunction(ca.Callback):
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """The solver of a program, its clock, and what has to be kept for it."""
+    """Compiled solver of a program, its clock, and a reference to its external function."""
 
     solver: Any
     clock: _Clock
     kept: Any = None
 
     def value(self, y: Array, parameters: Sequence[float]) -> float:
-        """Objective at a point."""
+        """Return the objective at a point."""
         return float(self.solver.get_function("nlp_f")(y, list(parameters)))
 
     def slopes(self, y: Array, parameters: Sequence[float]) -> tuple[float, Array, Array, Array]:
-        """Objective, constraints, gradient and Jacobian at a point, evaluated anew."""
+        """Return objective, constraints, gradient and Jacobian at a point."""
         f, gradient = self.solver.get_function("nlp_grad_f")(y, list(parameters))
         g, jacobian = self.solver.get_function("nlp_jac_g")(y, list(parameters))
         return float(f), _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float)
 
 
 @lru_cache(maxsize=_BUILT)
-def _built(
-    oracle: str, expand: bool, max_iterations: int, outside: SerializedExternal | None, near: bool = False
+def _compiled_program(
+    oracle: str, expand: bool, max_iterations: int, external_model: SerializedExternal | None, stay_near: bool = False
 ) -> _Program:
-    """A program that can be solved, and stays `near` its start: to build it costs as much as some starts."""
+    """Return the compiled solver of a program; with `stay_near` its barrier is small. Compiling takes seconds."""
     function, external = ca.Function.deserialize(oracle), None
     if expand:
         scalars = function.expand()
         if scalars.n_instructions() <= LONG * function.n_instructions():
             function = scalars
-    solver = {**_OPTIONS, **(_NEAR if near else {}), "max_iter": max_iterations}
-    if outside is not None:
-        function, external = _with_outside(function, outside)
-        # slopes are told, and no bends
+    solver = {**_OPTIONS, **(_NEAR if stay_near else {}), "max_iter": max_iterations}
+    if external_model is not None:
+        function, external = _with_external_model(function, external_model)
+        # an external model has first derivatives only
         solver |= {"hessian_approximation": "limited-memory", "tol": LOOSER}
     n, m = function.size1_in("x"), function.size1_out("g")
     clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
@@ -213,39 +219,49 @@ def _built(
     return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, external)
 
 
-def _with_outside(function: Any, outside: SerializedExternal) -> tuple[Any, _ExternalFunction]:
-    asked, model, count = ca.Function.deserialize(outside.asked), outside.model, outside.count
-    external = _ExternalFunction("told", (asked.size1_out(0),), (count, 1), model.values, model.slopes)
+def _with_external_model(function: Any, external_model: SerializedExternal) -> tuple[Any, _ExternalFunction]:
+    arguments_function, model, count = (
+        ca.Function.deserialize(external_model.arguments),
+        external_model.model,
+        external_model.count,
+    )
+    external = _ExternalFunction("told", (arguments_function.size1_out(0),), (count, 1), model.values, model.slopes)
     x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
-    found = function(x=x, p=p, r=external(asked(x)))
-    return ca.Function("oracle", {"x": x, "p": p, "f": found["f"], "g": found["g"]}, ["x", "p"], ["f", "g"]), external
+    outputs = function(x=x, p=p, r=external(arguments_function(x)))
+    return ca.Function(
+        "oracle", {"x": x, "p": p, "f": outputs["f"], "g": outputs["g"]}, ["x", "p"], ["f", "g"]
+    ), external
 
 
-def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
-    began = time.process_time()
-    y, iterations, ending, begun = point / task.scales, 0, Ending.FAILED, 0
+def _from_start(task: Task, program: _Program, k: int, point: Array) -> LocalOptimum:
+    started = time.process_time()
+    y, iterations, ending, stages_run = point / task.scales, 0, Ending.FAILED, 0
     m = b = np.zeros(0)
     for number, stage in enumerate(task.stages):
         if number and passed():
             ending = Ending.UNFINISHED
             break
-        end, begun = _ended(task, built, y, stage), number + 1
-        iterations += end.iterations
-        if _strayed(task, built, y, end, stage):
-            again = _ended(task, _of_task(task, near=True), y, stage)
-            iterations += again.iterations
-            found = again.ending in (Ending.CONVERGED, Ending.ACCEPTABLE)
-            end = again if found and built.value(again.y, stage) < built.value(end.y, stage) else end
-        y, m, b, ending = end.y, end.m, end.b, end.ending
+        stage_end, stages_run = _run_stage(task, program, y, stage), number + 1
+        iterations += stage_end.iterations
+        if _is_worse_than_start(task, program, y, stage_end, stage):
+            retry = _run_stage(task, _compile_task(task, stay_near=True), y, stage)
+            iterations += retry.iterations
+            is_converged = retry.ending in (Ending.CONVERGED, Ending.ACCEPTABLE)
+            stage_end = (
+                retry
+                if is_converged and program.value(retry.y, stage) < program.value(stage_end.y, stage)
+                else stage_end
+            )
+        y, m, b, ending = stage_end.y, stage_end.m, stage_end.b, stage_end.ending
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
-    f, g, gradient, jacobian = built.slopes(y, task.stages[-1])
+    f, g, gradient, jacobian = program.slopes(y, task.stages[-1])
     with np.errstate(invalid="ignore"):
-        # of a point without numbers nothing is a number, and that is all that is asked of it
-        residual, violation = _judged(task, y, g, gradient, jacobian, m, b)
+        # the residual of a point with NaN is NaN
+        residual, violation = _kkt_residual(task, y, g, gradient, jacobian, m, b)
     if not np.isfinite(residual) or not np.isfinite(f):
         ending, residual, violation = Ending.FAILED, np.inf, np.inf
-    elif ending is Ending.UNFINISHED and begun == len(task.stages) and residual <= ACCEPTABLE:
+    elif ending is Ending.UNFINISHED and stages_run == len(task.stages) and residual <= ACCEPTABLE:
         ending = Ending.ACCEPTABLE
     return LocalOptimum(
         x=y * task.scales,
@@ -255,7 +271,7 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
         kkt_residual=residual,
         violation=violation,
         iterations=iterations,
-        seconds=time.process_time() - began,
+        seconds=time.process_time() - started,
         ending=ending,
         start=k,
     )
@@ -272,56 +288,61 @@ class _End:
     iterations: int
 
 
-def _of_task(task: Task, near: bool = False) -> _Program:
-    return _built(task.oracle, task.expand, task.max_iterations, task.outside, near)
+def _compile_task(task: Task, stay_near: bool = False) -> _Program:
+    return _compiled_program(task.oracle, task.expand, task.max_iterations, task.external_model, stay_near)
 
 
-def _ended(task: Task, built: _Program, y: Array, stage: Sequence[float]) -> _End:
+def _run_stage(task: Task, program: _Program, y: Array, stage: Sequence[float]) -> _End:
     # run one stage from a point
-    built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
-    found = built.solver(
+    program.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
+    solution = program.solver(
         x0=y, p=list(stage), lbx=task.lower, ubx=task.upper, lbg=task.constraint_lower, ubg=task.constraint_upper
     )
-    stats = built.solver.stats()
+    stats = program.solver.stats()
     ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
-    end = np.clip(_flat(found["x"]), task.lower, task.upper)
-    return _End(end, _flat(found["lam_g"]), _flat(found["lam_x"]), ending, int(stats["iter_count"]))
+    end = np.clip(_flat(solution["x"]), task.lower, task.upper)
+    return _End(end, _flat(solution["lam_g"]), _flat(solution["lam_x"]), ending, int(stats["iter_count"]))
 
 
-def _strayed(task: Task, built: _Program, start: Array, end: _End, stage: Sequence[float]) -> bool:
-    """Tell if a feasible start is better than the end point: the barrier led the search away.
+def _is_worse_than_start(task: Task, program: _Program, start: Array, stage_end: _End, stage: Sequence[float]) -> bool:
+    """Return True if a feasible start has a lower objective than the end point, because of the barrier.
 
-    Programs that are told numbers from outside are taken as they are, for each look costs.
+    Programs with an external model are not checked, because its evaluation is slow.
     """
-    if task.outside is not None or passed():
+    if task.external_model is not None or passed():
         return False
-    last, first, g, *_ = built.value(end.y, stage), *built.slopes(start, stage)
-    over = max(_outside(g, task.constraint_lower, task.constraint_upper), _outside(start, task.lower, task.upper))
-    return bool(over <= SOFTENED and first + over < last - STRAYED * abs(last))
+    end_value, start_value, g, *_ = program.value(stage_end.y, stage), *program.slopes(start, stage)
+    violation = max(
+        _violation(g, task.constraint_lower, task.constraint_upper), _violation(start, task.lower, task.upper)
+    )
+    return bool(violation <= SOFTENED and start_value + violation < end_value - STRAYED * abs(end_value))
 
 
 def _flat(value: Any) -> Array:
     return np.array(value, dtype=float).reshape(-1)
 
 
-def _judged(
+def _kkt_residual(
     task: Task, y: Array, g: Array, gradient: Array, jacobian: Array, m: Array, b: Array
 ) -> tuple[float, float]:
     # N2: relative KKT residual, and violation of the limits
-    balance = gradient + jacobian.T @ m + b
-    reach = max(1.0, float((np.abs(gradient) + np.abs(jacobian).T @ np.abs(m) + np.abs(b)).max(initial=0.0)))
-    violation = max(_outside(g, task.constraint_lower, task.constraint_upper), _outside(y, task.lower, task.upper))
-    slack = max(_slack(m, g, task.constraint_lower, task.constraint_upper), _slack(b, y, task.lower, task.upper))
-    return max(float(np.abs(balance).max(initial=0.0)) / reach, violation, slack / reach), violation
+    residual = gradient + jacobian.T @ m + b
+    scale = max(1.0, float((np.abs(gradient) + np.abs(jacobian).T @ np.abs(m) + np.abs(b)).max(initial=0.0)))
+    violation = max(_violation(g, task.constraint_lower, task.constraint_upper), _violation(y, task.lower, task.upper))
+    slack = max(
+        _complementarity(m, g, task.constraint_lower, task.constraint_upper),
+        _complementarity(b, y, task.lower, task.upper),
+    )
+    return max(float(np.abs(residual).max(initial=0.0)) / scale, violation, slack / scale), violation
 
 
-def _outside(value: Array, lower: Array, upper: Array) -> float:
+def _violation(value: Array, lower: Array, upper: Array) -> float:
     return float(np.maximum(lower - value, value - upper).max(initial=0.0))
 
 
-def _slack(multiplier: Array, value: Array, lower: Array, upper: Array) -> float:
+def _complementarity(multiplier: Array, value: Array, lower: Array, upper: Array) -> float:
     # largest product of multiplier and distance to its side
     size = np.abs(multiplier)
     distance = np.abs(np.where(multiplier > 0.0, upper - value, value - lower))
-    # a side at infinity can carry nothing: its multiplier itself is the violation
+    # an infinite bound has no multiplier: any multiplier is a violation
     return float((size * np.where(np.isfinite(distance), distance, 1.0)).max(initial=0.0))

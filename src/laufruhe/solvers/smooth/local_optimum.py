@@ -1,4 +1,4 @@
-"""Where starts of a nonlinear program end, and when enough of them have been tried (N2, N5)."""
+"""Local optima of a nonlinear program, and the stopping rule of a multistart search (N2, N5)."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from enum import StrEnum
 from laufruhe.numerics.arrays import Array
 
 _NEAR = 1e-6
-# share of their scale within which values are the same
+# relative difference of equal objectives
 _SAME = 1e-4
-# chance that one more start leads to what is better than all, under which no other is tried
+# probability of a better optimum from one more start, below which the search ends
 _MISSED = 1.0 / 36.0
 
 
@@ -32,25 +32,25 @@ class LocalOptimum:
     Attributes
     ----------
     x
-        Shape (n,), within the bounds.
+        Variables within their bounds, shape (n,).
     value
-        Objective at the last stage's parameters.
+        Objective with the parameters of the last stage.
     constraints
-        Values, shape (m,).
+        Values of the constraints, shape (m,).
     multipliers
-        In the program's own units, positive where an upper side holds (N2).
+        Multipliers in the units of the program, positive at an upper bound (N2), shape (m,).
     kkt_residual
-        Largest violation of N2 and of the limits, each over its own scale.
+        Largest relative violation of N2 and of the constraints.
     violation
-        The part of it that the limits alone have.
+        Largest relative violation of the constraints.
     iterations, seconds
-        Over all stages; seconds of the processor.
+        Iterations and processor time [s] of all stages.
     ending
-        In words.
+        Outcome of the start.
     start
-        Index of the start; the first of those that lead here.
+        Smallest index of the starts that lead to this point.
     starts
-        How many lead here.
+        Number of starts that lead to this point.
     """
 
     x: Array
@@ -67,40 +67,40 @@ class LocalOptimum:
 
     @property
     def usable(self) -> bool:
-        """Tell if the solver converged and the limits are kept."""
+        """True if the solver converged and the constraints are met."""
         return self.ending in (Ending.CONVERGED, Ending.ACCEPTABLE) and self.violation <= _NEAR
 
 
 def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
-    """Return usable optima of distinct values, best first; values within `tolerance` times `scale` count as one."""
-    kept: list[LocalOptimum] = []
+    """Return usable optima, best first, whose objectives differ by more than `tolerance * scale`."""
+    best_optima: list[LocalOptimum] = []
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: o.value):
-        if not kept or optimum.value - kept[-1].value > tolerance * scale:
-            kept.append(optimum)
-    return tuple(kept)
+        if not best_optima or optimum.value - best_optima[-1].value > tolerance * scale:
+            best_optima.append(optimum)
+    return tuple(best_optima)
 
 
-def ends_in_words(optima: Sequence[LocalOptimum], apart: int) -> str:
-    """Return a text on the number of IPOPT starts and of different optima found."""
+def ends_in_words(optima: Sequence[LocalOptimum], count: int) -> str:
+    """Return a text with the number of IPOPT starts and of different optima."""
     if not optima:
         return "a design to start from"
-    starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
+    starts, usable = (sum(o.starts for o in group) for group in (optima, [o for o in optima if o.usable]))
     text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, "
     if not usable:
         return f"{text}{'none of which' if starts > 1 else 'which never'} converged"
-    ends = "one and the same optimum" if apart == 1 else f"{apart} different optima"
+    ends = "one and the same optimum" if count == 1 else f"{count} different optima"
     return f"{text}{usable} of which ended at {ends}" if starts > 1 else f"{text}which ended at an optimum"
 
 
 def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
-    """Tell if random starts have very likely met the best optimum, and more than once (N5).
+    """Return True if random starts have very likely found the best optimum, and more than once (N5).
 
-    Where n starts led to w different ones, the next one leads to another with a chance of w (w + 1) / (n (n - 1))
-    (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80); that is the best of w + 1 with a chance of one in so
-    many. A start that leads to none counts as one of its own.
+    If n starts found w different optima, the next start finds a new one with probability w (w + 1) / (n (n - 1))
+    (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80). The new one is the best of all w + 1 with probability
+    1 / (w + 1). A start without a usable optimum counts as a new optimum.
     """
-    n, apart = sum(optimum.starts for optimum in optima), distinct(optima, scale)
-    w = len(apart) + sum(optimum.starts for optimum in optima if not optimum.usable)
-    near = apart[0].value + _SAME * scale if apart else 0.0
-    met = sum(optimum.starts for optimum in optima if optimum.usable and optimum.value <= near)
-    return met > 1 and w <= _MISSED * n * (n - 1)
+    n, best_optima = sum(optimum.starts for optimum in optima), distinct(optima, scale)
+    w = len(best_optima) + sum(optimum.starts for optimum in optima if not optimum.usable)
+    best_value = best_optima[0].value + _SAME * scale if best_optima else 0.0
+    best_starts = sum(optimum.starts for optimum in optima if optimum.usable and optimum.value <= best_value)
+    return best_starts > 1 and w <= _MISSED * n * (n - 1)

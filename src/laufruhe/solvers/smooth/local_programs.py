@@ -1,4 +1,4 @@
-"""Local programs over the shares of the bounds, 0 to 1: sequential quadratic programs from several starts."""
+"""Local search over decisions scaled to 0..1: sequential quadratic programs from several starts."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from laufruhe.solvers.conclusion import KEPT, Design, ProofData, evaluate_design
 from laufruhe.solvers.prices import Price, Slopes, bounds_of, edges_at, prices_of
 from laufruhe.solvers.sampling_refinement import over_read
 
-# designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
+# designs evaluated for each start; step of differences, margin of an active limit, and value of an infinite objective
 LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
-# searches from where boxes are least
+# searches from the boxes with the smallest bound
 TRIES = 2
 
 
 @dataclass(frozen=True, eq=False)
 class LocalProgram:
-    """Objective and room of every limit over the shares of the bounds, 0 to 1, of every column of a decision.
+    """Objective and margins of all limits as functions of scaled decisions ("shares", 0 to 1, shape (n,)).
 
-    A column of an unbalance whose angle is open lies between its sizes in both senses.
+    An unbalance with an open angle has two columns, each between minus and plus its largest size.
     """
 
     problem: Problem
@@ -44,33 +44,33 @@ class LocalProgram:
 
     @classmethod
     def of(cls, problem: Problem) -> Self:
-        """Over the bounds of all that is open."""
+        """Return the program of all open numbers of a problem."""
         return cls(problem, *ends_of(domains_of(problem.decisions)))
 
     @cached_property
     def domains(self) -> tuple[Domain, ...]:
-        """Domains of all decisions."""
+        """Domain of each decision."""
         return domains_of(self.problem.decisions)
 
     def shares(self, values: Sequence[Value] | Array) -> Array:
-        """Return decision values as shares of their bounds, from 0 to 1."""
-        own = vector_of(self.domains, values)
-        return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
+        """Return decision values as shares, shape (n,)."""
+        columns = vector_of(self.domains, values)
+        return np.asarray(np.clip((columns - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
     def columns(self, shares: Array) -> Array:
-        """Return the columns of all decisions at these shares of their bounds."""
+        """Return the columns of all decisions at shares [SI], shape (n,)."""
         return np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper)
 
     def values(self, shares: Array) -> list[Value]:
-        """Decisions, inside their sets."""
-        own = self.columns(shares)
-        inside = np.concatenate([domain.project(own) for domain in self.domains])
+        """Return decision values at shares, projected into their sets."""
+        columns = self.columns(shares)
+        inside = np.concatenate([domain.project(columns) for domain in self.domains])
         return [d.complex_value(inside) if d.decision.is_affine else float(inside[d.start]) for d in self.domains]
 
     def numbers(self, shares: Array) -> Array:
-        """The objective, then the least relative room inside each limit, and inside each set that is no interval.
+        """Return the objective, the relative margin of each limit, and the margins of each set that is no interval.
 
-        On a resonance the objective is far off.
+        The objective is infinite at an undamped resonance.
         """
         edges = self.edges(shares)
         try:
@@ -81,95 +81,105 @@ class LocalProgram:
             return np.array([math.inf, *(-1.0 for _ in self.problem.limits), *edges])
 
     def edges(self, shares: Array) -> list[float]:
-        """Relative rooms inside the sets that are no intervals."""
-        own = self.columns(shares)
-        return [room for domain in self.domains for room in domain.set.margins(own[domain.columns])]
+        """Return relative margins inside the sets that are no intervals."""
+        columns = self.columns(shares)
+        return [room for domain in self.domains for room in domain.set.margins(columns[domain.columns])]
 
     def place(self, values: Array) -> Array:
-        """Shares to seek a design from where boxes are least."""
+        """Return the start point of a search from decision values of a box."""
         return self.shares(values)
 
     def by_decision(self, values: Array) -> dict[str, Array]:
-        """Return the entries of each decision by its name."""
+        """Return the entries of a vector, shape (n,), by the name of their decision."""
         return {domain.decision.name: values[domain.columns] for domain in self.domains}
 
     def slopes(self, shares: Array) -> Array:
         """Return derivatives of `numbers` by central differences within the bounds, shape (1 + limits, n)."""
-        found = []
+        rows = []
         for k in range(len(shares)):
             ends = [np.clip(shares + sign * STEP * np.eye(len(shares))[k], 0.0, 1.0) for sign in (-1.0, 1.0)]
             low, high = (self.numbers(end) for end in ends)
-            # no engine on either side says nothing of a slope
+            # inf - inf is NaN where neither design can be evaluated
             with np.errstate(invalid="ignore"):
-                found.append((high - low) / (ends[1][k] - ends[0][k]))
-        return np.ascontiguousarray(np.array(found).T)
+                rows.append((high - low) / (ends[1][k] - ends[0][k]))
+        return np.ascontiguousarray(np.array(rows).T)
 
     def rank(self, shares: Array) -> tuple[float, float]:
-        """Designs within their limits by their objective, others by what they exceed these by."""
+        """Return the sort key: violation above the tolerance first, then objective."""
         return _rank(self.numbers(shares))
 
 
 def spread_starts(problem: Problem) -> list[Array]:
-    """Designs spread evenly over the bounds of every column."""
-    rng, many = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
-    # of each number one in every share of its bounds
-    columns = [(rng.permutation(many) + rng.random(many)) / many for d in problem.decisions for _ in range(d.set.width)]
+    """Return start points by Latin hypercube sampling, shape (n,) each."""
+    rng, count = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
+    # one point in each of `count` equal intervals of every column
+    columns = [
+        (rng.permutation(count) + rng.random(count)) / count for d in problem.decisions for _ in range(d.set.width)
+    ]
     return list(np.array(columns).T)
 
 
 def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) -> Array:
-    """The best design of local programs from the best of some places."""
+    """Return the best point of local searches from the best start points.
+
+    Parameters
+    ----------
+    places
+        Start points as shares, shape (n,) each.
+    starts
+        Largest number of local searches.
+    """
     ranked = sorted(in_time(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, LOOKS))]:
         if passed():
             break
-        best = min(best, _local(program, place), key=program.rank)
+        best = min(best, _local_optimum(program, place), key=program.rank)
     return best
 
 
-def _local(program: LocalProgram, place: Array) -> Array:
-    """A local optimum by sequential quadratic programs, its slopes by differences."""
+def _local_optimum(program: LocalProgram, place: Array) -> Array:
+    """Return a local optimum by SLSQP with derivatives by differences."""
     from scipy.optimize import minimize
 
-    first = program.numbers(place)
-    unit = first[0] if math.isfinite(first[0]) and first[0] > 0.0 else 1.0
-    known: dict[bytes, Array] = {}
-    best = place, _rank(first)
+    initial = program.numbers(place)
+    unit = initial[0] if math.isfinite(initial[0]) and initial[0] > 0.0 else 1.0
+    cache: dict[bytes, Array] = {}
+    best = place, _rank(initial)
 
     def numbers(x: Array) -> Array:
         nonlocal best
-        own = np.clip(x, 0.0, 1.0)
-        if own.tobytes() not in known:
+        point = np.clip(x, 0.0, 1.0)
+        if point.tobytes() not in cache:
             if passed():
-                raise _OverError
-            found = program.numbers(own)
-            best = min(best, (own, _rank(found)), key=lambda pair: pair[1])
-            known[own.tobytes()] = np.append(min(found[0] / unit, FAR), found[1:])
-        return known[own.tobytes()]
+                raise _TimeOverError
+            result = program.numbers(point)
+            best = min(best, (point, _rank(result)), key=lambda pair: pair[1])
+            cache[point.tobytes()] = np.append(min(result[0] / unit, FAR), result[1:])
+        return cache[point.tobytes()]
 
     def slopes(x: Array) -> Array:
         if passed():
-            raise _OverError
-        found = program.slopes(np.clip(x, 0.0, 1.0))
-        found[0] /= unit
-        return np.nan_to_num(found, posinf=FAR, neginf=-FAR)
+            raise _TimeOverError
+        result = program.slopes(np.clip(x, 0.0, 1.0))
+        result[0] /= unit
+        return np.nan_to_num(result, posinf=FAR, neginf=-FAR)
 
-    limits = len(first) - 1
+    limits = len(initial) - 1
     inside: Any = [{"type": "ineq", "fun": lambda x: numbers(x)[1:], "jac": lambda x: slopes(x)[1:]}] if limits else []
     run: Any = minimize
     try:
-        found = run(
+        result = run(
             lambda x: numbers(x)[0], place, jac=lambda x: slopes(x)[0], method="SLSQP",
             bounds=[(0.0, 1.0)] * len(place), constraints=inside, options={"maxiter": 60, "ftol": 1e-10},
         )  # fmt: skip
-    except _OverError:
+    except _TimeOverError:
         return best[0]
-    return np.asarray(np.clip(found.x, 0.0, 1.0))
+    return np.asarray(np.clip(result.x, 0.0, 1.0))
 
 
-class _OverError(Exception):
-    """Ends a program between two evaluations when time is over."""
+class _TimeOverError(Exception):
+    """Signal that the time limit is over; it ends a search between two evaluations."""
 
 
 def _rank(numbers: Array) -> tuple[float, float]:
@@ -179,12 +189,12 @@ def _rank(numbers: Array) -> tuple[float, float]:
 
 
 BoundedBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
-"""What no design goes under, where one of this value is known and another by less than this room no better; the one."""
+"""Function of objective, gap tolerance and design that returns a lower bound by boxes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proven:
-    """The best design, as shares of its bounds and by the exact model, and what boxes tell of all others."""
+    """Best design, as shares and evaluated, with the lower bound by boxes."""
 
     shares: Array
     design: Design
@@ -192,89 +202,109 @@ class Proven:
 
     @property
     def excludes_all(self) -> bool:
-        """Tell if no design keeps the limits."""
+        """True if boxes prove that no design meets the limits."""
         return self.design.violation > KEPT and self.divided.bound == math.inf
 
     @property
     def bound(self) -> float:
-        """Lower bound of the objective; zero if the design breaks a limit."""
+        """Lower bound of the objective; zero if the design violates a limit."""
         return self.divided.bound if self.design.violation <= KEPT else 0.0
 
 
 def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
-    """A design and its bound, sought once more where boxes promise more than what was found."""
+    """Return a design with its bound; search again from the boxes with the smallest bound while a gap is open.
+
+    Parameters
+    ----------
+    best
+        Best known point as shares, shape (n,).
+    bounded
+        Lower bound by boxes.
+    """
     problem = program.problem
-    found = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
+    result = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
     for _ in range(TRIES):
         if passed():
             break
         value, room = math.inf, 0.0
-        if found.design.violation <= KEPT:
-            value = found.design.value
-            room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine))
-            # boxes do not make good what few angles read too much
-            value -= over_read(problem, found.design.evaluation)
-        found = replace(found, divided=bounded(value, room, found.design))
-        places = [program.place(x) for x in found.divided.places]
-        if not places or found.divided.bound >= value - room:
+        if result.design.violation <= KEPT:
+            value = result.design.value
+            room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, result.design.evaluation.engine))
+            # boxes cannot close the part of the gap that is a sampling error
+            value -= over_read(problem, result.design.evaluation)
+        result = replace(result, divided=bounded(value, room, result.design))
+        places = [program.place(x) for x in result.divided.places]
+        if not places or result.divided.bound >= value - room:
             break
-        again = best_local_optimum(program, [found.shares, *places], len(places) + 1)
-        if program.rank(again) >= program.rank(found.shares):
+        retry = best_local_optimum(program, [result.shares, *places], len(places) + 1)
+        if program.rank(retry) >= program.rank(result.shares):
             break
-        found = Proven(again, evaluate_design(problem, program.values(again)), found.divided)
-    return found
+        result = Proven(retry, evaluate_design(problem, program.values(retry)), result.divided)
+    return result
 
 
-def proof_data(program: LocalProgram, design: Design, bound: float, strength: ProofStrength, method: str) -> ProofData:
-    """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
+def proof_data(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
+    """Return a lower bound with shadow prices of active limits and bounds, and the residual of their balance.
+
+    Parameters
+    ----------
+    bound
+        Lower bound of the objective.
+    strength
+        Kind of proof that the bound can give.
+    method
+        Text for the certificate.
+    """
     from scipy.optimize import nnls
 
     problem, best = program.problem, program.shares(design.values)
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
     size = float(np.abs(slopes[0]).max()) or 1.0
-    held = [k for k, room in enumerate(rooms) if room <= HELD]
+    active_rooms = [k for k, room in enumerate(rooms) if room <= HELD]
     low, high = best <= HELD, best >= 1.0 - HELD
-    columns = [-slopes[1 + k] / (float(np.abs(slopes[1 + k]).max()) or 1.0) for k in held]
+    columns = [-slopes[1 + k] / (float(np.abs(slopes[1 + k]).max()) or 1.0) for k in active_rooms]
     columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
     scale = max(size, design.value)
-    shares, rest = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else (np.zeros(0), size / scale)
+    shares, residual = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else (np.zeros(0), size / scale)
     prices: dict[Side, Price] = {}
-    left, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
-    for k, share in zip(held, shares, strict=False):
+    remainder, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
+    for k, share in zip(active_rooms, shares, strict=False):
         if k >= len(problem.limits):
-            # a set's own edge, which its decision has a price for
+            # an edge of a set, which is priced as a bound of its decision
             continue
         limit = problem.limits[k]
-        steep = float(np.abs(slopes[1 + k]).max()) or 1.0
+        largest = float(np.abs(slopes[1 + k]).max()) or 1.0
         _, edge, side = limit.room(design.evaluation.standing(limit).value)
-        # rooms are relative to the edge of their limit
+        # margins are relative to the limit
         sides.append((k, (limit, side), abs(edge) or 1.0))
-        prices[limit, side] = Price.both(float(share) * scale / (steep * (abs(edge) or 1.0)))
-        left = left - float(share) * scale / steep * slopes[1 + k]
-    bounds = _both_sides(program, best, slopes, left, sides, prices)
-    return ProofData(bound, strength, float(rest), method, prices, bounds)
+        prices[limit, side] = Price.both(float(share) * scale / (largest * (abs(edge) or 1.0)))
+        remainder = remainder - float(share) * scale / largest * slopes[1 + k]
+    bounds = _two_sided_prices(program, best, slopes, remainder, sides, prices)
+    return ProofData(bound, reach, float(residual), method, prices, bounds)
 
 
-def _both_sides(
-    program: LocalProgram, shares: Array, slopes: Array, left: Array, sides: Sequence[tuple[int, Side, float]],
+def _two_sided_prices(
+    program: LocalProgram, shares: Array, slopes: Array, remainder: Array, sides: Sequence[tuple[int, Side, float]],
     prices: dict[Side, Price],
 ) -> dict[str, Price]:  # fmt: skip
-    """Prices of bounds, and of limits where their two sides differ."""
+    """Return prices of bounds, and update prices of limits for which relaxing and tightening differ."""
     widths, columns = program.upper - program.lower, program.columns(shares)
-    rest = program.by_decision(left / widths)
-    found, normals = dict[str, Price](), list[Array]()
+    remainders = program.by_decision(remainder / widths)
+    bound_prices, normals = dict[str, Price](), list[Array]()
     for domain in program.domains:
-        at = columns[domain.columns]
-        found |= bounds_of(domain.decision, at, rest[domain.decision.name])
-        for normal in edges_at(domain.decision, at).values():
+        column = columns[domain.columns]
+        bound_prices |= bounds_of(domain.decision, column, remainders[domain.decision.name])
+        for normal in edges_at(domain.decision, column).values():
             normals.append(np.zeros(len(shares)))
             normals[-1][domain.columns] = normal
-    held = [Slopes.smooth(-slopes[1 + k]) for k, *_ in sides]
-    told = prices_of([Slopes.smooth(slopes[0])], held, np.array(normals).reshape(-1, len(shares)) * widths)
-    if told is None:
-        return found
-    for (_, side, edge), price in zip(sides, told, strict=False):
+    limit_slopes = [Slopes.smooth(-slopes[1 + k]) for k, *_ in sides]
+    prices_by_side = prices_of(
+        [Slopes.smooth(slopes[0])], limit_slopes, np.array(normals).reshape(-1, len(shares)) * widths
+    )
+    if prices_by_side is None:
+        return bound_prices
+    for (_, side, edge), price in zip(sides, prices_by_side, strict=False):
         if not price.is_one:
             prices[side] = Price(price.relaxed / edge, price.tightened / edge)
-    return dict(zip(found, told[len(sides) :], strict=True))
+    return dict(zip(bound_prices, prices_by_side[len(sides) :], strict=True))

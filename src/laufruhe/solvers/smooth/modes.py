@@ -1,4 +1,4 @@
-"""Natural modes as variables of a smooth program, and what is asked of them (E21, E23, E24)."""
+"""Natural modes as variables of a smooth program, with objectives and limits on them (E21, E23, E24)."""
 
 from __future__ import annotations
 
@@ -16,50 +16,60 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, motion_indices
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 
 _ORDERS = np.array(list(permutations(range(6))))
 OF_MODES = (channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL)
 
 
 class ModeVariables:
-    """Shapes V and squares l of the modes, where a problem asks of them; else of no length.
+    """Shapes V and squared frequencies l of the modes; empty if the problem has no measure of modes.
 
     Parameters
     ----------
-    held
-        What the program holds, to which their conditions are added.
+    constraints
+        Constraints of the program, to which those of the modes are added.
     """
 
-    def __init__(self, problem: Problem, held: Gathered) -> None:
-        asked = (*(limit.measure for limit in problem.limits), *(term.measure for term in problem.objective))
-        self.asked = any(measure.channel in OF_MODES for measure in asked)
-        self._held, self._bands = held, list[tuple[Limit, int]]()
-        self._vectors, self._squares = ca.MX.sym("V", 36 * self.asked), ca.MX.sym("l", 6 * self.asked)
+    def __init__(self, problem: Problem, constraints: ConstraintCollector) -> None:
+        measures = (*(limit.measure for limit in problem.limits), *(term.measure for term in problem.objective))
+        self.has_modes = any(measure.channel in OF_MODES for measure in measures)
+        self._constraints, self._bands = constraints, list[tuple[Limit, int]]()
+        self._vectors, self._squares = ca.MX.sym("V", 36 * self.has_modes), ca.MX.sym("l", 6 * self.has_modes)
 
     @property
     def symbols(self) -> Any:
-        """Shapes, then squares."""
+        """Column of shapes, then squared frequencies."""
         return ca.vertcat(self._vectors, self._squares)
 
-    def hold(self, stiffness: Any, root: Array, given: ElasticMounting) -> None:
-        """The modes are modes of a stiffness, in coordinates in which the mass is one (E21)."""
-        self._root, self._unit = root, float(np.trace(root @ given.stiffness @ root.T)) / 6.0
-        if not self.asked:
+    def hold(self, stiffness: Any, root: Array, mounting: ElasticMounting) -> None:
+        """Constrain the variables to modes of a stiffness, in coordinates in which the mass matrix is one (E21).
+
+        Parameters
+        ----------
+        stiffness
+            Expression of the stiffness in these coordinates, shape (6, 6).
+        root
+            Map to these coordinates, shape (6, 6).
+        mounting
+            Initial mounting, which sets the unit of squared frequencies.
+        """
+        self._root, self._unit = root, float(np.trace(root @ mounting.stiffness @ root.T)) / 6.0
+        if not self.has_modes:
             return
         v = ca.reshape(self._vectors, 6, 6)
-        unit = v.T @ v - ca.DM.eye(6)
-        apart = v.T @ (stiffness / self._unit) @ v - ca.diag(self._squares)
+        identity = v.T @ v - ca.DM.eye(6)
+        diagonal = v.T @ (stiffness / self._unit) @ v - ca.diag(self._squares)
         lower = [(j, k) for j in range(6) for k in range(j + 1)]
-        for matrix in (unit, apart):
-            self._held.add(ca.vertcat(*(matrix[j, k] for j, k in lower)), 0.0, 0.0, "modes")
+        for matrix in (identity, diagonal):
+            self._constraints.add(ca.vertcat(*(matrix[j, k] for j, k in lower)), 0.0, 0.0, "modes")
 
     def limit(self, limit: Limit) -> bool:
-        """Hold a limit; whether it is one on modes."""
-        hold = self._limits.get(limit.measure.channel)
-        if hold is not None:
-            hold(limit)
-        return hold is not None
+        """Add a limit on modes; return False for a limit on another measure."""
+        add_limit = self._limits.get(limit.measure.channel)
+        if add_limit is not None:
+            add_limit(limit)
+        return add_limit is not None
 
     @property
     def _limits(self) -> Mapping[Channel, Callable[[Limit], None]]:
@@ -74,17 +84,17 @@ class ModeVariables:
     def _least_shares(self, limit: Limit) -> None:
         for share in self._shares(limit.measure):
             minimum = (limit, "at least"), 1.0
-            self._held.add(share, max(limit.minimum, 0.0), np.inf, limit.name, minimum)
+            self._constraints.add(share, max(limit.minimum, 0.0), np.inf, limit.name, minimum)
 
     def shortfall(self, measure: Measure) -> Any:
-        """Sum of variables, each over nothing and over what is wanting to a share (E47)."""
-        found, held = ca.MX(0.0), self._held.named(measure.name)
+        """Return the sum of variables, each at least zero and at least the missing share of energy (E47)."""
+        total, collector = ca.MX(0.0), self._constraints.named(measure.name)
         for share in self._shares(measure):
-            # where a search starts, modes are not known yet: it starts at all that is wanted
-            top = held.head(ca.MX(measure.wanted))
-            held.hold(measure.wanted - share - top)
-            found += top
-        return found
+            # the start value is the whole share, because modes are not yet known
+            shortfall = collector.head(ca.MX(measure.wanted))
+            collector.hold(measure.wanted - share - shortfall)
+            total += shortfall
+        return total
 
     def _frequencies(self, limit: Limit) -> None:
         # E23 for bands; each side is relative to its squared edge, so its slope is 2 / edge
@@ -92,35 +102,35 @@ class ModeVariables:
             if math.isfinite(edge):
                 low, high = (1.0, np.inf) if side == "at least" else (-np.inf, 1.0)
                 slope = (limit, side), 2.0 / edge
-                self._held.add(self._squares / self._square(edge), low, high, limit.name, slope, slope)
+                self._constraints.add(self._squares / self._square(edge), low, high, limit.name, slope, slope)
         if limit.outside is not None:
             a, b = (self._square(edge) for edge in limit.outside)
-            self._bands.append((limit, len(self._held.lower)))
-            self._held.add((self._squares - a) * (self._squares - b) / (b * b), 0.0, np.inf, limit.name)
+            self._bands.append((limit, len(self._constraints.lower)))
+            self._constraints.add((self._squares - a) * (self._squares - b) / (b * b), 0.0, np.inf, limit.name)
 
     def _square(self, frequency: float) -> float:
         # from a frequency [Hz] to the unit of the program
         return float((math.tau * frequency) ** 2 / self._unit)
 
     def prices(self, values: Array, multipliers: Array) -> dict[Side, float]:
-        """Fall of the objective per unit by which each edge of a band is relaxed; `values` of the symbols."""
-        found: dict[Side, float] = {}
+        """Return shadow prices of the edges of frequency bands, from values of the symbols and multipliers."""
+        prices_by_side: dict[Side, float] = {}
         for limit, row in self._bands:
             low, high = limit.outside or (math.nan, math.nan)
             a, b = self._square(low), self._square(high)
             for square, m in zip(values[36:], multipliers[row : row + 6], strict=True):
-                # each mode is held by the edge on its own side
+                # the nearer edge of the band limits each mode
                 side, slope = ("at most", 2.0 * a / low) if 2.0 * square < a + b else ("at least", 2.0 * b / high)
-                own = float(max(-m, 0.0) * slope * (b - a) / (b * b))
-                found[limit, side] = found.get((limit, side), 0.0) + own
-        return found
+                price = float(max(-m, 0.0) * slope * (b - a) / (b * b))
+                prices_by_side[limit, side] = prices_by_side.get((limit, side), 0.0) + price
+        return prices_by_side
 
     def start(self, mounting: ElasticMounting) -> list[Array]:
-        """Values at given mounts, each mode in the column of the motion that is most its own."""
-        if not self.asked:
+        """Return start values of shapes and squares, each mode in the column of its main motion."""
+        if not self.has_modes:
             return []
         modes = mounting.modes
-        # of all ways to give each motion a mode of its own, that of most energy
+        # assignment of modes to motions with the largest total energy
         order = _ORDERS[modes.energy[np.arange(6), _ORDERS].sum(axis=1).argmax()]
         vectors = np.linalg.solve(self._root.T, modes.shapes)[:, order]
         return [np.asarray(vectors.T.reshape(-1), dtype=np.float64), modes.squares[order] / self._unit]

@@ -1,23 +1,21 @@
-"""Smooth nonlinear programs with exact derivatives: CasADi and IPOPT from many starts (N1-N4).
+"""Solve smooth nonlinear programs with exact derivatives: CasADi and IPOPT from many starts (N1-N4).
 
-What is solved, in units that make every variable and function of size one:
+The program, with variables and functions scaled to size one:
 
-    least f(x, p)  with  l <= x <= u,  gl <= g(x, p) <= gu                              (N1)
+    min f(x, p)  with  l <= x <= u,  gl <= g(x, p) <= gu                                (N1)
 
-IPOPT proposes points and multipliers. They are judged here, by derivatives taken anew:
-with multipliers m of g and b of the bounds, positive where an upper side holds,
+IPOPT proposes points and multipliers. Their residual is computed here: with multipliers m of g and b of the bounds,
+positive at an upper bound,
 
-    grad f + J' m + b = 0,   m and b zero where no side is reached                       (N2)
+    grad f + J' m + b = 0,   m and b zero at inactive bounds                             (N2)
 
-and the largest violation of these and of the limits, each over its own scale, is the
-KKT residual of a `LocalOptimum`. A length |v| has no gradient at v = 0, where a balanced
-engine lies, so it is replaced by
+and the largest relative violation of these and of the constraints is the KKT residual of a `LocalOptimum`. A length
+|v| has no gradient at v = 0, the optimum of a balanced engine, so it is replaced by
 
     |v|_e = sqrt(|v|^2 + e^2) - e,    |v| - e <= |v|_e <= |v|                             (N3)
 
-with e a parameter p that falls from stage to stage (N4), each stage started at the
-optimum of the one before: smooth, convex where |v| is, exactly zero at zero, and never more
-than the last e from the truth.
+with e a parameter p that falls from stage to stage (N4). Each stage starts at the optimum of the one before. The
+function is smooth, convex if |v| is, zero at zero, and differs from |v| by e at most.
 """
 
 from __future__ import annotations
@@ -48,27 +46,27 @@ from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 StopWhen: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
 Share: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
-Several: TypeAlias = Callable[[Share], list[LocalOptimum]]
+RunStarts: TypeAlias = Callable[[Share], list[LocalOptimum]]
 
 WORTH_EXPANDING = 3
-# starts of one round
+# number of starts in one round
 ROUND = 6
-# share of the value, or of this share of its scale, and of every variable's scale, within which two ends are the same
+# two ends are equal within this relative difference of the objective, of its scale, and of every variable
 SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class ExternalNumbers:
-    """Column of symbols, what a teller is asked for them as an expression of the variables, and who tells."""
+    """Values of an external model: their symbols, the arguments as an expression of the variables, and the model."""
 
     symbols: Any
-    asked: Any
+    arguments: Any
     model: ExternalModel
 
 
 @dataclass(frozen=True, eq=False)
 class NonlinearProgram:
-    """A smooth program in CasADi symbols (N1).
+    """Smooth program in CasADi symbols (N1).
 
     Attributes
     ----------
@@ -81,23 +79,23 @@ class NonlinearProgram:
     constraints
         Column of expressions, shape (m,).
     constraint_lower, constraint_upper
-        Sides of the constraints, shape (m,); infinite where there is none.
+        Bounds of the constraints, shape (m,); infinite if there is none.
     constraint_names
-        As a report prints them.
+        Names for reports.
     scales
-        Typical sizes of the variables; the width of their bounds when left out.
+        Typical sizes of the variables, shape (n,); the width of their bounds if None.
     objective_scale
         Typical size of the objective; that of every constraint is one.
     parameters, stages
-        Symbols and their values, one row a stage (N4).
+        Symbols and their values, one row for each stage (N4).
     expand
-        Whether the expressions may be written out as scalars where several starts share
-        the cost and arrays are short: three times as fast to evaluate, and slower to set up.
+        True if arrays may be expanded to scalars when several starts share the cost. Evaluation is then three times
+        as fast for short arrays, and compilation is slower.
     external
-        Numbers in the expressions that a model outside tells.
+        Values in the expressions that an external model computes.
     deciding
-        How many of the first variables tell two ends apart: all when None. Shapes of modes, that
-        follow from the rest, may have either sign.
+        Number of the leading variables that distinguish two optima; all if None. Shapes of modes follow from them,
+        with either sign.
     """
 
     x: Any
@@ -143,73 +141,73 @@ def solve_nonlinear(
     stop_when: StopWhen | None = None,
     known: int = 0,
 ) -> tuple[LocalOptimum, ...]:
-    """Local optima that the starts lead to, the best usable one first.
+    """Return the local optima of a multistart search, the best usable one first.
 
-    A search of many starts, which `stop_when` may end, takes all through the first stage; of those that end there at
-    one point, one goes on, and none that is worse there than the best is in the end: what softens norms less makes no
-    end better (N4). Else each goes through all stages: from one point a solver may come to several optima.
+    With `stop_when`, all starts run the first stage. One start of each distinct end runs the later stages, if its
+    objective is below that of the best final optimum: later stages never lower the objective (N4). Without it, each
+    start runs all stages, because one point may lead to several optima.
 
     Parameters
     ----------
     program
-        What is to be least, and under what.
+        Program to solve.
     starts
-        Points, each of shape (n,); those outside the bounds are brought in.
+        Start points, shape (n,) each, projected into the bounds.
     workers
-        Workers at most; as many as processors when left out, and none where the work is over sooner.
+        Largest number of worker processes; the number of processors if None. Short searches use none.
     max_iterations, max_seconds
-        Of every start and stage.
+        Limits of every start and stage.
     stop_when
-        Whether the ends of the first stage so far tell all; all starts are tried when left out.
+        Return True if the ends of the first stage so far are sufficient; None runs all starts.
     known
-        Starts that the program has had before, for which it was built.
+        Number of starts that the same program ran before.
 
     Raises
     ------
     SolverError
-        Where workers die again and again.
+        If worker processes die repeatedly.
     """
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
     task = _task(program, max_iterations, max_seconds, known + len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
         if stop_when is None:
-            optima = _first_ends(task, points, workers, None, stack)[0]
+            optima = _run_first_stage(task, points, workers, None, stack)[0]
         else:
-            first = replace(task, stages=task.stages[:1])
-            found, several = _first_ends(first, points, workers, stop_when, stack)
-            optima = _polished(task, _grouped(found, task), several)
+            first_stage = replace(task, stages=task.stages[:1])
+            first_ends, run_starts = _run_first_stage(first_stage, points, workers, stop_when, stack)
+            optima = _run_later_stages(task, _merge_equal(first_ends, task), run_starts)
     return tuple(sorted(optima, key=lambda o: (not o.usable, o.value if o.usable else o.violation, o.start)))
 
 
-def _first_ends(
+def _run_first_stage(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, stop_when: StopWhen | None, stack: ExitStack
-) -> tuple[list[LocalOptimum], Several]:
-    """Return the optima that the starts end at, and the function that ran them."""
+) -> tuple[list[LocalOptimum], RunStarts]:
+    """Return the optima of the starts, and the function that runs further starts."""
     rest = points[1:]
     count = min(len(rest), workers if workers is not None else worker_count())
-    # threads would share a linear solver that knows of one alone
-    at_hand = _AtHand(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
-    if at_hand is not None:
-        at_hand.begin((task, rest[:ROUND] if stop_when is not None else rest))
-    # one start tells whether the others are worth processes of their own
-    began = time.process_time()
-    found = run((task, points[:1]))
-    spent = sum(o.seconds for o in found)
-    pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - began - spent)
-    several: Several = at_hand or (_Shared(stack, count) if count > 1 and pays else run)
-    while rest and not passed() and not (stop_when is not None and stop_when(_grouped(found, task))):
-        some, rest = (rest[:ROUND], rest[ROUND:]) if stop_when is not None else (rest, [])
-        found += several((task, some))
-    return found, several
+    # the linear solver is not safe for threads
+    ready_workers = _ReadyWorkers(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
+    if ready_workers is not None:
+        ready_workers.begin((task, rest[:ROUND] if stop_when is not None else rest))
+    # the duration of one start decides if the others run in processes
+    started = time.process_time()
+    optima = run((task, points[:1]))
+    spent = sum(o.seconds for o in optima)
+    pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - started - spent)
+    run_starts: RunStarts = ready_workers or (_SharedStarts(stack, count) if count > 1 and pays else run)
+    while rest and not passed() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
+        batch, rest = (rest[:ROUND], rest[ROUND:]) if stop_when is not None else (rest, [])
+        optima += run_starts((task, batch))
+    return optima, run_starts
 
 
 def try_all(_: Sequence[LocalOptimum]) -> bool:
-    """Never enough: all starts are tried, and one of those that end alike goes on."""
+    """Return False: the first stage runs all starts."""
     return False
 
 
-class _Shared:
-    """Workers that share starts: to set the program up costs as much as a start, so each has its own share of all."""
+class _SharedStarts:
+    """Worker processes with one equal share of the starts each, because compiling takes as long as a start."""
 
     def __init__(self, stack: ExitStack, count: int) -> None:
         self._count, self._executor = count, stack.enter_context(executor_for(count))
@@ -219,11 +217,11 @@ class _Shared:
         task, points = share
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
-            return sorted((optimum for _, some in answers for optimum in some), key=lambda o: o.start)
+            return sorted((optimum for _, batch in answers for optimum in batch), key=lambda o: o.start)
 
 
-class _AtHand:
-    """Workers that are there before they are asked, and so may begin before it is known that they will be."""
+class _ReadyWorkers:
+    """Pool of running worker processes, which can begin starts before they are known to be needed."""
 
     def __init__(self, stack: ExitStack, count: int) -> None:
         self._count, self._ahead = count, stack.enter_context(speculation(run))
@@ -237,79 +235,79 @@ class _AtHand:
         if len(share[1]) == 1:
             return run(share)
         self.begin(share)
-        found = [optimum for key, own in self._shares(share) for optimum in self._ahead.result(key, own)]
-        return sorted(found, key=lambda o: o.start)
+        optima = [optimum for key, part in self._shares(share) for optimum in self._ahead.result(key, part)]
+        return sorted(optima, key=lambda o: o.start)
 
     def _shares(self, share: Share) -> list[tuple[Hashable, Share]]:
         task, points = share
         shares = [points[k :: self._count] for k in range(min(self._count, len(points)))]
-        return [((task.stages, tuple(number for number, _ in own)), (task, own)) for own in shares]
+        return [((task.stages, tuple(number for number, _ in part)), (task, part)) for part in shares]
 
 
-def _grouped(found: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
-    """Return one optimum per end point with its number of starts; unusable optima stay separate."""
+def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
+    """Return one optimum for each end point with its number of starts; unusable optima stay separate."""
     groups: list[LocalOptimum] = []
-    for end in sorted((o for o in found if o.usable), key=lambda o: (o.value, o.start)):
-        number = next((k for k, known in enumerate(groups) if _is_same(end, known, task)), None)
-        if number is None:
-            groups.append(end)
+    for optimum in sorted((o for o in optima if o.usable), key=lambda o: (o.value, o.start)):
+        index = next((k for k, same in enumerate(groups) if _is_same(optimum, same, task)), None)
+        if index is None:
+            groups.append(optimum)
         else:
-            known = groups[number]
-            groups[number] = replace(known, start=min(known.start, end.start), starts=known.starts + end.starts)
-    return [*groups, *(o for o in found if not o.usable)]
+            same = groups[index]
+            groups[index] = replace(same, start=min(same.start, optimum.start), starts=same.starts + optimum.starts)
+    return [*groups, *(o for o in optima if not o.usable)]
 
 
-def _is_same(end: LocalOptimum, known: LocalOptimum, task: Task) -> bool:
-    near = SAME_END * max(abs(known.value), LEAST_SCALE * task.objective_scale)
-    apart = np.abs(end.x - known.x)[: task.deciding] > SAME_PLACE * task.scales[: task.deciding]
-    return end.value - known.value <= near and not apart.any()
+def _is_same(optimum: LocalOptimum, other: LocalOptimum, task: Task) -> bool:
+    value_tolerance = SAME_END * max(abs(other.value), LEAST_SCALE * task.objective_scale)
+    is_apart = np.abs(optimum.x - other.x)[: task.deciding] > SAME_PLACE * task.scales[: task.deciding]
+    return optimum.value - other.value <= value_tolerance and not is_apart.any()
 
 
-def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> list[LocalOptimum]:
-    """Through the other stages; where time is over, an end stays where it is."""
+def _run_later_stages(task: Task, groups: Sequence[LocalOptimum], run_starts: RunStarts) -> list[LocalOptimum]:
+    """Run the later stages from the ends of the first; at the time limit an end stays as it is."""
     if len(task.stages) < 2:
         return list(groups)
     if passed():
-        return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
-    minimum = min((end.value for end in groups if end.usable), default=math.inf)
-    # what is not there yet and worse than what is goes no further
-    going = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
-             and (end.usable or end.value < minimum)]  # fmt: skip
-    further, later = replace(task, stages=task.stages[1:]), dict[int, LocalOptimum]()
-    # the best first: what is worse where norms are softened more is so where they are softened less (N4)
-    for some in (going[:1], going[1:]):
-        best = min((o.value for o in later.values() if o.usable), default=math.inf)
-        later |= {o.start: o for o in several((further, [(o.start, o.x) for o in some if o.value < best]))}
-    found = []
-    for end in groups:
-        own = later.get(end.start)
-        if own is not None:
-            spent = (end.iterations + own.iterations, end.seconds + own.seconds)
-            found.append(replace(own, starts=end.starts, iterations=spent[0], seconds=spent[1]))
+        return [replace(optimum, ending=Ending.UNFINISHED) if optimum.usable else optimum for optimum in groups]
+    minimum = min((optimum.value for optimum in groups if optimum.usable), default=math.inf)
+    # an unconverged end that is worse than the best converged one goes no further
+    candidates = [optimum for optimum in groups if optimum.ending not in (Ending.FAILED, Ending.INFEASIBLE)
+             and (optimum.usable or optimum.value < minimum)]  # fmt: skip
+    later_stages, ends = replace(task, stages=task.stages[1:]), dict[int, LocalOptimum]()
+    # the best end first: less softening never lowers the objective of the others (N4)
+    for batch in (candidates[:1], candidates[1:]):
+        best = min((o.value for o in ends.values() if o.usable), default=math.inf)
+        ends |= {o.start: o for o in run_starts((later_stages, [(o.start, o.x) for o in batch if o.value < best]))}
+    results = []
+    for optimum in groups:
+        end = ends.get(optimum.start)
+        if end is not None:
+            totals = (optimum.iterations + end.iterations, optimum.seconds + end.seconds)
+            results.append(replace(end, starts=optimum.starts, iterations=totals[0], seconds=totals[1]))
         else:
-            found.append(replace(end, ending=Ending.UNFINISHED) if end.usable and passed() else end)
-    return found
+            results.append(replace(optimum, ending=Ending.UNFINISHED) if optimum.usable and passed() else optimum)
+    return results
 
 
-def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, many: bool) -> Task:
+def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, is_shared: bool) -> Task:
     symbol = type(program.x)
     scales = program.variable_scales
     constraints = symbol(0, 1) if program.constraints is None else program.constraints
     parameters = symbol(0, 1) if program.parameters is None else program.parameters
-    y, external, outside = symbol.sym("y", program.x.numel()), program.external, None
-    f, g, asked = ca.substitute(
+    y, external, external_model = symbol.sym("y", program.x.numel()), program.external, None
+    f, g, arguments = ca.substitute(
         [program.objective / program.objective_scale, constraints,
-         symbol(0, 1) if external is None else external.asked], [program.x], [y * ca.DM(scales)]
+         symbol(0, 1) if external is None else external.arguments], [program.x], [y * ca.DM(scales)]
     )  # fmt: skip
     inputs = {"x": y, "p": parameters}
     if external is not None:
         inputs["r"] = external.symbols
-        outside = SerializedExternal(
-            ca.Function("asked", [y], [asked]).serialize(), external.model, external.symbols.numel()
+        external_model = SerializedExternal(
+            ca.Function("asked", [y], [arguments]).serialize(), external.model, external.symbols.numel()
         )
     oracle = ca.Function("oracle", {**inputs, "f": f, "g": g}, list(inputs), ["f", "g"])
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower,
         program.constraint_upper, scales, program.objective_scale, program.stages,
-        max_iterations, max_seconds, program.expand and many, outside, program.deciding,
+        max_iterations, max_seconds, program.expand and is_shared, external_model, program.deciding,
     )  # fmt: skip

@@ -1,14 +1,12 @@
-"""Mounts, unbalances and throws together as one smooth program (E20-E24, S20).
+"""Build one smooth program of mounts, unbalances and throws (E20-E24, S20).
 
-Variables are the open numbers of the mounts, the columns of the unbalances, deviations of
-the throws from a star, and where modes are asked for the modes themselves, held to be
-modes by
+Variables are the open numbers of the mounts, the columns of the unbalances, and the deviations of the throws from a
+star. For measures of modes the shapes V and squared frequencies l are variables too, with the constraints
 
     V' V = 1,    V' A V = diag(l)                                                       (E21)
 
-so that a natural frequency or a share of energy is an explicit, smooth expression. A
-largest value is a variable that no sample exceeds (E22); a mean of lengths is softened
-(N3); a band without natural frequencies is (l - a)(l - b) >= 0 (E23).
+so that natural frequencies and shares of energy are smooth expressions. A maximum is an epigraph variable (E22), a
+mean of lengths is softened (N3), and a band without natural frequencies is (l - a)(l - b) >= 0 (E23).
 """
 
 from __future__ import annotations
@@ -46,16 +44,16 @@ from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.smooth.cases import StaticCases
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum
 from laufruhe.solvers.smooth.modes import ModeVariables
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
 from laufruhe.solvers.smooth.simulated import SimulatedVariables
 
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
-# bounds of a stiffness that are further apart leave a start no place between them
+# a stiffness whose bounds have a larger ratio is replaced by its logarithm
 WIDE = 100.0
-# orders that a complaint names
+# number of orders in an error message
 MOST_NAMED = 6
 SIDES = ("at least", "at most")
 # a typical deviation of a throw [rad]
@@ -63,24 +61,24 @@ TURN = 0.1
 
 
 class SmoothProgram:
-    """The program of a problem, and the way between its variables and the problem's decisions.
+    """Nonlinear program of a problem, with the maps between its variables and the decisions.
 
     Parameters
     ----------
     problem
-        With one star and one firing order.
+        Problem with one star and one firing order.
     unit
-        Size of the objective.
+        Typical size of the objective.
     margin
-        Share by which limits on loads are tightened, for they are kept at few samples.
+        Share by which limits on loads are tightened, because the program has few samples.
     moves
-        Throws that may leave the star of the problem; none when left out.
+        Open throws, which may leave the star of the problem; None if they are fixed.
     slack
         Share by which all limits are tightened.
     softest
-        Share of the objective that norms are softened by in the last stage (N4).
+        Softening of norms in the last stage, as a share of the objective (N4).
     coarser
-        Times as long as those of the last word steps of simulations are.
+        Time step of simulations relative to that of the final evaluation.
     """
 
     def __init__(
@@ -94,34 +92,40 @@ class SmoothProgram:
         self._count = len(self._decisions)
         self.columns = sum(domain.width for domain in self.domains)
         self._by_ratio = np.array([d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in self._decisions], bool)
-        self._v, self._u = ca.MX.sym("mounts", self._count), ca.MX.sym("unbalances", self.columns)
-        numbers = [ca.exp(self._v[k]) if wide else self._v[k] for k, wide in enumerate(self._by_ratio)]
-        self._d = ca.vertcat(*numbers) if numbers else self._v
-        self._t = ca.MX.sym("throws", 0 if moves is None else moves.size)
+        self._mount_variables = ca.MX.sym("mounts", self._count)
+        self._unbalance_columns = ca.MX.sym("unbalances", self.columns)
+        numbers = [
+            ca.exp(self._mount_variables[k]) if wide else self._mount_variables[k]
+            for k, wide in enumerate(self._by_ratio)
+        ]
+        self._mount_numbers = ca.vertcat(*numbers) if numbers else self._mount_variables
+        self._throw_deviations = ca.MX.sym("throws", 0 if moves is None else moves.size)
         self._loads = self._loads_of(moves)
-        self._e = ca.MX.sym("softness")
-        self._held = Gathered()
-        self._modes = ModeVariables(problem, self._held)
-        self._simulated = SimulatedVariables(problem, ca.vertcat(self._d, self._u), self._held, coarser)
+        self._softness = ca.MX.sym("softness")
+        self._constraints = ConstraintCollector()
+        self._modes = ModeVariables(problem, self._constraints)
+        self._simulated = SimulatedVariables(
+            problem, ca.vertcat(self._mount_numbers, self._unbalance_columns), self._constraints, coarser
+        )
         self.unit = unit
         self._points: list[PointResponse] = []
         if problem.uses_mounts:
             self._mounting = mounting_in(problem.engine)
             self._root = mass_root(self._mounting.block)
-            self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)
-            self._cases = StaticCases(self._mounts, self._mounting, self._root, self._held)
+            self._mounts = symbolic_mounts(problem, self._mounting.block, self._mount_numbers)
+            self._cases = StaticCases(self._mounts, self._mounting, self._root, self._constraints)
             self._points = self._responses()
             self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
-        self.program = self._built()
+        self.program = self._build()
 
     def _loads_of(self, moves: ThrowMoves | None) -> Loads:
         if moves is None:
-            # loads and unbalances alone are taken from it, whatever the mounts
-            return FixedThrows(self.problem, AffineModel(off_resonance(self.problem)), self._u)
+            # the affine model gives loads and unbalances, which do not depend on the mounts
+            return FixedThrows(self.problem, AffineModel(off_resonance(self.problem)), self._unbalance_columns)
         model = UnevenModel(self.problem, moves.layout, rides_of(moves.phasing, moves.start))
-        return MovedThrows(self.problem, moves, model, self._t, self._u)
+        return MovedThrows(self.problem, moves, model, self._throw_deviations, self._unbalance_columns)
 
-    def _built(self) -> NonlinearProgram:
+    def _build(self) -> NonlinearProgram:
         minimum = ca.MX(0.0)
         for term in self.problem.objective:
             minimum += term.weight * self._minimum(term.measure, self.unit / (term.weight or 1.0))
@@ -129,28 +133,30 @@ class SmoothProgram:
             self._limit(limit)
         self._hold_unbalances()
         if self.moves is not None:
-            rows, names = self.moves.firing(self._t)
+            rows, names = self.moves.firing(self._throw_deviations)
             for row, name in zip(rows, names, strict=True):
-                self._held.add(row, self.moves.intervals.minimum, self.moves.intervals.maximum, name)
-        tops = ca.vertcat(*(top for top, _ in self._held.heads)) if self._held.heads else ca.MX(0, 1)
+                self._constraints.add(row, self.moves.intervals.minimum, self.moves.intervals.maximum, name)
+        largest = ca.vertcat(*(top for top, _ in self._constraints.heads)) if self._constraints.heads else ca.MX(0, 1)
         lower, upper = self._bounds()
-        constraints = ca.densify(ca.vertcat(*self._held.expressions)) if self._held.expressions else None
+        constraints = ca.densify(ca.vertcat(*self._constraints.expressions)) if self._constraints.expressions else None
         return NonlinearProgram(
-            ca.vertcat(self._v, self._u, self._t, self._modes.symbols, tops),
+            ca.vertcat(
+                self._mount_variables, self._unbalance_columns, self._throw_deviations, self._modes.symbols, largest
+            ),
             minimum,
             lower,
             upper,
             constraints=constraints,
-            constraint_lower=np.array(self._held.lower),
-            constraint_upper=np.array(self._held.upper),
-            constraint_names=tuple(self._held.names),
+            constraint_lower=np.array(self._constraints.lower),
+            constraint_upper=np.array(self._constraints.upper),
+            constraint_names=tuple(self._constraints.names),
             scales=self._scales(lower, upper),
             objective_scale=self.unit,
-            parameters=self._e,
+            parameters=self._softness,
             stages=self._stages,
             expand=True,
             external=self._simulated.external,
-            deciding=self._turned.stop,
+            deciding=self._throw_columns.stop,
         )
 
     @property
@@ -160,8 +166,8 @@ class SmoothProgram:
         return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
     def _bounds(self) -> tuple[Array, Array]:
-        low = self._inner([d.lower for d in self._decisions]).tolist()
-        high = self._inner([d.upper for d in self._decisions]).tolist()
+        low = self._to_variables([d.lower for d in self._decisions]).tolist()
+        high = self._to_variables([d.upper for d in self._decisions]).tolist()
         for domain in self.domains:
             maximum = domain.set.upper
             low += [domain.set.lower] if domain.width == 1 else [-maximum, -maximum]
@@ -170,31 +176,31 @@ class SmoothProgram:
             low += self.moves.lower.tolist()
             high += self.moves.upper.tolist()
         modes = self._modes.symbols.numel()
-        free = np.full(modes + len(self._held.floors), np.inf)
-        below = -free
-        below[modes:] = self._held.floors
-        return np.concatenate([low, below]), np.concatenate([high, free])
+        free = np.full(modes + len(self._constraints.floors), np.inf)
+        free_lower = -free
+        free_lower[modes:] = self._constraints.floors
+        return np.concatenate([low, free_lower]), np.concatenate([high, free])
 
     def _scales(self, lower: Array, upper: Array) -> Array:
         width = upper - lower
         scales = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
-        scales[self._turned] = TURN
+        scales[self._throw_columns] = TURN
         return scales
 
     @property
-    def _turned(self) -> slice:
+    def _throw_columns(self) -> slice:
         first = self._count + self.columns
-        return slice(first, first + self._t.numel())
+        return slice(first, first + self._throw_deviations.numel())
 
     # loads
 
     def _responses(self) -> list[PointResponse]:
         # E4
-        moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
+        wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
-            PointResponse(point.name, point.weight, w.base, w.orders,
-                   response(self._mounts, w.orders * point.speed, w.real, w.imaginary))
-            for point, w in zip(self.problem.points, self._loads.wrenches(moved), strict=True)
+            PointResponse(point.name, point.weight, wrench.base, wrench.orders,
+                   response(self._mounts, wrench.orders * point.speed, wrench.real, wrench.imaginary))
+            for point, wrench in zip(self.problem.points, self._loads.wrenches(wrench_map), strict=True)
         ]  # fmt: skip
 
     def _rows(self, measure: Measure) -> tuple[Any, Grid]:
@@ -209,49 +215,51 @@ class SmoothProgram:
         if not depends(measure.channel, kinds, self.problem):
             return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
-            return self._mount_number(measure)
+            return self._mounting_expression(measure)
         if measure.channel.simulation:
             return self._simulated.minimum(measure)
         rows, grid = self._rows(measure)
-        return measure.norm.smooth_expression(self._held.named(measure.name), grid, rows, unit, self._e)
+        return measure.norm.smooth_expression(self._constraints.named(measure.name), grid, rows, unit, self._softness)
 
     def _limit(self, limit: Limit) -> None:
         measure = limit.measure
         if measure.is_mounting:
             self._limit_mounts(limit)
             return
-        tight = 1.0 - self._slack - self._margin
+        factor = 1.0 - self._slack - self._margin
         if measure.channel.simulation:
-            self._simulated.limit(limit, tight)
+            self._simulated.limit(limit, factor)
             return
         rows, grid = self._rows(measure)
-        unit = limit.maximum * tight or self.unit
-        held = self._held.named(limit.name)
+        unit = limit.maximum * factor or self.unit
+        collector = self._constraints.named(limit.name)
         value, maximum, slope = measure.norm.limited(
-            held, grid, rows / unit, limit.maximum * tight / unit, self._softest
+            collector, grid, rows / unit, limit.maximum * factor / unit, self._softest
         )
-        self._held.add(value, -np.inf, maximum, limit.name, maximum=((limit, "at most"), slope / unit))
+        self._constraints.add(value, -np.inf, maximum, limit.name, maximum=((limit, "at most"), slope / unit))
 
     def _hold_unbalances(self) -> None:
         # P4
         for domain in self.domains:
             if domain.width == 1:
                 continue
-            own = self._u[domain.columns]
-            self._held.add(ca.sumsqr(own) / domain.scale**2, -np.inf, 1.0, domain.decision.name)
+            unbalance = self._unbalance_columns[domain.columns]
+            self._constraints.add(ca.sumsqr(unbalance) / domain.scale**2, -np.inf, 1.0, domain.decision.name)
             for sign, (x, y) in zip((1.0, -1.0), domain.set.edges, strict=False):
-                self._held.add(sign * (x * own[1] - y * own[0]) / domain.scale, 0.0, np.inf, domain.decision.name)
+                self._constraints.add(
+                    sign * (x * unbalance[1] - y * unbalance[0]) / domain.scale, 0.0, np.inf, domain.decision.name
+                )
 
     # mounts and modes
 
-    def _mount_number(self, quantity: Measure) -> Any:
-        """A number of mounts and modes, where it is one expression."""
+    def _mounting_expression(self, quantity: Measure) -> Any:
+        """Return the expression of a measure of mounts or modes."""
         mounts = self._mounts
         if quantity.channel is channels.SAG:
             weight = weight_wrench(self._mounting.block)
             load = ca.DM(self._root @ weight)
-            settled, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
-            return ca.dot(load, settled) / -weight[2]
+            deflection, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
+            return ca.dot(load, deflection) / -weight[2]
         if quantity.channel.of_axis is not None:
             return self._residual(quantity.channel.of_axis(self._mounting.block, quantity.frequency))
         if quantity.channel.of_cases is not None:
@@ -259,28 +267,28 @@ class SmoothProgram:
         if quantity.channel is channels.DECOUPLING_SHORTFALL:
             return self._modes.shortfall(quantity)
         if quantity.channel is channels.TOTAL_STIFFNESS:
-            numbers = self.problem.numbers([self._d[k] for k in range(self._count)], self._decisions)
+            numbers = self.problem.numbers([self._mount_numbers[k] for k in range(self._count)], self._decisions)
             rows = numbers.mounts or [list(mount.stiffness) for mount in self._mounting.mounts]
             return sum((k for row in rows for k in row[:3]), ca.MX(0.0))
         pairs = transmitted(self._points, quantity)
         if not pairs:
-            felt = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
-            there = ", ".join(f"{order:g}" for order in felt[:MOST_NAMED]) or "none"
-            raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {there}")
-        ratios = [ca.sqrt(force / firm) for force, firm in pairs]
-        top = self._held.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))
-        for force, firm in pairs:
-            self._held.add(force / firm - top * top, -np.inf, 0.0, quantity.name)
-        return top
+            orders = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
+            names = ", ".join(f"{order:g}" for order in orders[:MOST_NAMED]) or "none"
+            raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {names}")
+        ratios = [ca.sqrt(force / rigid) for force, rigid in pairs]
+        largest = self._constraints.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))
+        for force, rigid in pairs:
+            self._constraints.add(force / rigid - largest * largest, -np.inf, 0.0, quantity.name)
+        return largest
 
     def _residual(self, axis: AxisResidual) -> Any:
-        # residual of the torque-roll axis, relative to that of the mounts as given
-        given = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
-        unit = float(np.linalg.norm(given)) or 1.0
+        # residual of the torque-roll axis, relative to that of the initial mounts
+        initial = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
+        unit = float(np.linalg.norm(initial)) or 1.0
         answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
         best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.minimum)
         rows = answer - (ca.fmin(best, axis.maximum) if axis.maximum < math.inf else best) * mass
-        return unit * softened_lengths(rows.T / unit, self._e)
+        return unit * softened_lengths(rows.T / unit, self._softness)
 
     def _limit_mounts(self, limit: Limit) -> None:
         quantity = limit.measure
@@ -288,34 +296,36 @@ class SmoothProgram:
             return
         if quantity.channel is channels.TRANSMISSIBILITY:
             maximum = limit.maximum
-            for force, firm in transmitted(self._points, quantity):
-                self._held.add(ca.sqrt(force / firm), -np.inf, maximum, limit.name, maximum=((limit, "at most"), 1.0))
+            for force, rigid in transmitted(self._points, quantity):
+                self._constraints.add(
+                    ca.sqrt(force / rigid), -np.inf, maximum, limit.name, maximum=((limit, "at most"), 1.0)
+                )
         else:
             unit = (limit.maximum if limit.maximum < math.inf else limit.minimum) or 1.0
             low, high = limit.minimum / unit, limit.maximum / unit
             slopes = (((limit, side), 1.0 / unit) for side in SIDES)
-            self._held.add(self._mount_number(quantity) / unit, low, high, limit.name, *slopes)
+            self._constraints.add(self._mounting_expression(quantity) / unit, low, high, limit.name, *slopes)
 
     # between variables and decisions
 
     def prices(self, optimum: LocalOptimum) -> dict[Side, Price]:
-        """Fall of the objective per unit by which each side of a limit is relaxed."""
-        found: dict[Side, float] = defaultdict(float)
-        for (minimum, maximum), m in zip(self._held.slopes, optimum.multipliers, strict=True):
-            for held, own in ((minimum, max(-m, 0.0)), (maximum, max(m, 0.0))):
-                if held is not None:
-                    found[held[0]] += float(held[1] * own)
-        first, symbols = self._turned.stop, self._modes.symbols.numel()
-        found |= self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
-        return {side: Price.both(price) for side, price in found.items()}
+        """Return shadow prices by side of a limit, from the multipliers of an optimum."""
+        prices_by_side: dict[Side, float] = defaultdict(float)
+        for (minimum, maximum), m in zip(self._constraints.slopes, optimum.multipliers, strict=True):
+            for slope, multiplier in ((minimum, max(-m, 0.0)), (maximum, max(m, 0.0))):
+                if slope is not None:
+                    prices_by_side[slope[0]] += float(slope[1] * multiplier)
+        first, symbols = self._throw_columns.stop, self._modes.symbols.numel()
+        prices_by_side |= self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
+        return {side: Price.both(price) for side, price in prices_by_side.items()}
 
-    def _inner(self, mounts: Sequence[float]) -> Array:
+    def _to_variables(self, mounts: Sequence[float]) -> Array:
         # logarithms for decisions with bounds far apart
         values = np.asarray(mounts, dtype=float)
         return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
 
     def split(self, x: Array) -> tuple[list[float], list[complex]]:
-        """Decisions about mounts and about unbalances."""
+        """Return decision values of mounts and of unbalances from the variables, shape (n,)."""
         inner = x[: self._count]
         outer = np.where(self._by_ratio, np.exp(np.where(self._by_ratio, inner, 0.0)), inner)
         mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(outer, self._decisions, strict=True)]
@@ -324,27 +334,29 @@ class SmoothProgram:
             columns[domain.columns] = domain.project(columns)
         return mounts, [domain.complex_value(columns) for domain in self.domains]
 
-    def turns(self, x: Array) -> Array:
-        """Deviations of the throws from their star [rad]."""
-        return np.asarray(x[self._turned])
+    def throw_deviations(self, x: Array) -> Array:
+        """Return the deviations of the throws from their star [rad]."""
+        return np.asarray(x[self._throw_columns])
 
-    def designed(self, x: Array) -> Problem:
-        """The problem with its throws where they were moved to."""
+    def problem_at(self, x: Array) -> Problem:
+        """Return the problem with the throws of an optimum."""
         if self.moves is None:
             return self.problem
-        given = self.problem
-        own = self.moves.phasing.realise(self.moves.candidate(self.turns(x)))
-        return replace(own, phasing=None, tolerance=given.tolerance, fidelity=given.fidelity, search=given.search)
+        problem = self.problem
+        moved = self.moves.phasing.realise(self.moves.candidate(self.throw_deviations(x)))
+        return replace(
+            moved, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=problem.search
+        )
 
-    def start(self, mounts: Sequence[float], columns: Array, turns: Array | None = None) -> Array:
-        """Variables at given decisions: modes and largest values follow from them."""
-        turns = np.zeros(self._t.numel()) if turns is None else turns
-        parts: list[Array] = [self._inner(mounts), columns, turns]
-        if self._modes.asked:
+    def start(self, mounts: Sequence[float], columns: Array, throw_deviations: Array | None = None) -> Array:
+        """Return variables at decision values, shape (n,); modes and epigraph variables follow from these."""
+        throw_deviations = np.zeros(self._throw_deviations.numel()) if throw_deviations is None else throw_deviations
+        parts: list[Array] = [self._to_variables(mounts), columns, throw_deviations]
+        if self._modes.has_modes:
             parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
-        if self._held.heads:
-            given = [self._v, self._u, self._t, self._simulated.symbols]
-            values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
-            external = values(self._inner(mounts), columns, turns, self._simulated.at(mounts, columns))
-            parts.append(1.05 * np.asarray(external, dtype=float).reshape(-1))
+        if self._constraints.heads:
+            inputs = [self._mount_variables, self._unbalance_columns, self._throw_deviations, self._simulated.symbols]
+            values = ca.Function("tops", inputs, [ca.vertcat(*(value for _, value in self._constraints.heads))])
+            outputs = values(self._to_variables(mounts), columns, throw_deviations, self._simulated.at(mounts, columns))
+            parts.append(1.05 * np.asarray(outputs, dtype=float).reshape(-1))
         return np.concatenate(parts)

@@ -1,4 +1,4 @@
-"""Simulated measures in a smooth program: peaks that the exact model gives from outside (E28b)."""
+"""Simulated measures in a smooth program: peaks computed by an external model (E28b)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.smooth.gathered import Gathered
+from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
 from laufruhe.solvers.smooth.nonlinear import ExternalNumbers
 
 
@@ -24,16 +24,18 @@ class SimulatedVariables:
 
     Parameters
     ----------
-    asked
+    arguments
         Open numbers of mounts and columns of unbalances, as expressions.
+    constraints
+        Constraints of the program, to which those of the peaks are added.
     coarser
-        Times as long as those of the last word steps are.
+        Time step relative to that of the final evaluation.
     """
 
-    def __init__(self, problem: Problem, asked: Any, held: Gathered, coarser: int) -> None:
-        self._asked, self._held = asked, held
+    def __init__(self, problem: Problem, arguments: Any, constraints: ConstraintCollector, coarser: int) -> None:
+        self._arguments, self._constraints = arguments, constraints
         measures, self._peaks = simulated_measures(problem), peaks_of(problem, coarser)
-        self.symbols, self._own, self._sizes = ca.MX(0, 1), dict[Measure, Any](), dict[Measure, float]()
+        self.symbols, self._symbols_of, self._sizes = ca.MX(0, 1), dict[Measure, Any](), dict[Measure, float]()
         if self._peaks is None:
             return
         if not self._peaks.is_known:
@@ -41,33 +43,33 @@ class SimulatedVariables:
         self.symbols = ca.MX.sym("simulated", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
         columns = vector_of(domains_of(problem.unbalances))
-        given = self.at([d.start_number for d in problem.mount_decisions], columns)
+        initial = self.at([d.start_number for d in problem.mount_decisions], columns)
         for measure, end, count in zip(measures, ends.tolist(), self._peaks.counts, strict=True):
-            self._own[measure] = self.symbols[end - count : end]
-            maximum = float(np.max(given[end - count : end]))
+            self._symbols_of[measure] = self.symbols[end - count : end]
+            maximum = float(np.max(initial[end - count : end]))
             self._sizes[measure] = maximum if 0.0 < maximum < math.inf else 1.0
 
     @property
     def external(self) -> ExternalNumbers | None:
-        """Outside source of the peaks; None without simulated measures."""
-        return None if self._peaks is None else ExternalNumbers(self.symbols, self._asked, self._peaks)
+        """External model of the peaks; None without simulated measures."""
+        return None if self._peaks is None else ExternalNumbers(self.symbols, self._arguments, self._peaks)
 
     def at(self, mounts: Sequence[float], columns: Array) -> Array:
-        """Peaks of a design."""
+        """Return the peaks of a design, shape (peaks,)."""
         return np.zeros(0) if self._peaks is None else self._peaks.values(np.concatenate([mounts, columns]))
 
     def minimum(self, measure: Measure) -> Any:
-        """The largest peak, as a variable that none exceeds (E22)."""
-        size, named = self._sizes[measure], self._held.named(measure.name)
-        peaks = self._own[measure] / size
-        top = named.head(ca.mmax(peaks))
-        named.hold(peaks - top)
-        return size * top
+        """Return a variable constrained to be at least every peak of a measure (E22)."""
+        size, collector = self._sizes[measure], self._constraints.named(measure.name)
+        peaks = self._symbols_of[measure] / size
+        largest = collector.head(ca.mmax(peaks))
+        collector.hold(peaks - largest)
+        return size * largest
 
     def limit(self, limit: Limit, tight: float) -> None:
-        """Constrain every peak to at most a share of its limit."""
+        """Constrain every peak to at most a share `tight` of the limit."""
         unit = limit.maximum or 1.0
         side = ((limit, "at most"), tight / unit)
-        self._held.add(
-            self._own[limit.measure] / unit, -math.inf, tight * limit.maximum / unit, limit.name, maximum=side
+        self._constraints.add(
+            self._symbols_of[limit.measure] / unit, -math.inf, tight * limit.maximum / unit, limit.name, maximum=side
         )

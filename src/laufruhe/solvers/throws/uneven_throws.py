@@ -213,7 +213,7 @@ def local_optimum(
         for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=try_all):
             if not optimum.usable:
                 continue
-            candidate = moves.candidate(smooth.turns(optimum.x))
+            candidate = moves.candidate(smooth.throw_deviations(optimum.x))
             design = _evaluate(phasing, candidate, optimum.kkt_residual, moved=True)
             if design is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
                 continue

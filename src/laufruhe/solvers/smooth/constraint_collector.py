@@ -1,0 +1,88 @@
+"""Collect constraints and epigraph variables of a smooth program."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import casadi as ca
+
+from laufruhe.problem.measure import Side
+
+Slope: TypeAlias = tuple[Side, float] | None
+"""Side of a limit, and the derivative of the constraint's bound by it."""
+
+
+@dataclass
+class ConstraintCollector:
+    """Collected constraints, each scaled to size one, and epigraph variables for largest values.
+
+    Attributes
+    ----------
+    slopes
+        Derivatives of each constraint's lower and upper bound by the side of the limit that it comes from.
+    heads
+        Epigraph variables, each with the expression of its start value (E22).
+    floors
+        Lower bounds of the epigraph variables.
+    """
+
+    expressions: list[Any] = field(default_factory=list)
+    lower: list[float] = field(default_factory=list)
+    upper: list[float] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)
+    slopes: list[tuple[Slope, Slope]] = field(default_factory=list)
+    heads: list[tuple[Any, Any]] = field(default_factory=list)
+    floors: list[float] = field(default_factory=list)
+
+    def add(
+        self, expression: Any, lower: float, upper: float, name: str, minimum: Slope = None, maximum: Slope = None
+    ) -> None:
+        """Add a scalar or column constraint.
+
+        Parameters
+        ----------
+        lower, upper
+            Bounds of every entry of the expression.
+        minimum, maximum
+            Sides of limits whose shadow prices follow from the multipliers of the lower and upper bound.
+        """
+        expression = ca.MX(expression)
+        count = expression.numel()
+        self.expressions.append(expression.reshape((count, 1)))
+        self.lower += [lower] * count
+        self.upper += [upper] * count
+        self.names += [name] * count
+        self.slopes += [(minimum, maximum)] * count
+
+    def named(self, name: str, symbol: Any = ca.MX) -> MeasureCollector:
+        """Return a collector to which a norm adds its variables and constraints, under the name of its measure."""
+        return MeasureCollector(self, name, symbol)
+
+
+@dataclass(frozen=True)
+class MeasureCollector:
+    """Collector for variables and constraints of one measure."""
+
+    into: ConstraintCollector
+    name: str
+    symbol: Any
+
+    def head(self, value: Any) -> Any:
+        """Add epigraph variables for largest values, and return their symbols; `value` is the start (E22)."""
+        return self._added(value, 0.0)
+
+    def free(self, value: Any) -> Any:
+        """Add a row of variables without bounds, and return their symbols; `value` is the start."""
+        return self._added(value.T, -math.inf).T
+
+    def _added(self, value: Any, lower: float) -> Any:
+        variable = self.symbol.sym(f"head{len(self.into.heads)}", value.numel())
+        self.into.heads.append((variable, value))
+        self.into.floors += [lower] * value.numel()
+        return variable
+
+    def hold(self, expression: Any) -> None:
+        """Constrain every entry of an expression to at most zero."""
+        self.into.add(expression, -math.inf, 0.0, self.name)
