@@ -156,8 +156,8 @@ def test_boxes_bound_what_is_in_them() -> None:
     boxes, rng = SizeBoxes(model), np.random.default_rng(2)
     for _ in range(25):
         low, high = np.sort(model.lower + rng.random((2, 4)) * (model.upper - model.lower), axis=0)
-        boxes.touch(low, high)
-        bound, dropped = boxes.objective(low, high), boxes.breaks(low, high)
+        boxes.add_tangents(low, high)
+        bound, dropped = boxes.objective(low, high), boxes.violates_limit(low, high)
         cut = boxes.cut(low, high, math.inf)
         for _ in range(6):
             x = low + rng.random(4) * (high - low)

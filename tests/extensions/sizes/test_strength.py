@@ -12,7 +12,7 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.sizes import strength
-from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs, moving_of, resized
+from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs, moving_gear, resized
 from laufruhe.machine import Bearing, Engine, OperatingPoint
 from laufruhe.physics.bearing_loads import pin_forces, piston_pin_forces
 from laufruhe.physics.fidelity import EXACT
@@ -245,9 +245,9 @@ def test_masses_follow_the_sizes() -> None:
 
 def test_sizes_there_and_back_leave_the_engine_as_it_is() -> None:
     engine = laufruhe.load(TEXT.replace("[running_gear]", '[running_gear]\ndensity = "7850 kg/m^3"')).engine
-    sizes = moving_of(engine).sizes
+    sizes = moving_gear(engine).sizes
     larger = resized(engine, {size: 1.1 * value for size, value in sizes.items()})
-    assert moving_of(larger).sizes == pytest.approx({size: 1.1 * value for size, value in sizes.items()})
+    assert moving_gear(larger).sizes == pytest.approx({size: 1.1 * value for size, value in sizes.items()})
     back = resized(larger, sizes)
     for a, b in zip(engine.slider_cranks, back.slider_cranks, strict=True):
         assert [b.reciprocating_mass, b.rotating_mass] == pytest.approx([a.reciprocating_mass, a.rotating_mass])

@@ -1,4 +1,4 @@
-"""Sizes of the running gear: what they bear, and proven optima of open ones, alone, beside stars or elastic mounts."""
+"""Sizes of the running gear: their stresses, and proven optima of open sizes, also with stars or elastic mounts."""
 
 from laufruhe.extension import Extension
 

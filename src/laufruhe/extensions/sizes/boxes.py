@@ -1,11 +1,11 @@
-"""Bounds of what sizes can reach, and unbalances with them, on boxes of sizes (Z12, Z14).
+"""Lower bounds over boxes of sizes, with open unbalances (Z12, Z14).
 
-In a box every factor of a load is least at one corner, for it goes one way with each size; the masses lie between those
-of two corners, for so do they. A norm of rows that are affine in masses and unbalances is nowhere under <Z, V>, Z its
-subgradient anywhere: its least value over that interval, and over the sets of the unbalances, bounds the norm. Over
-lengths of the rod <Z, V> is a short series (Z13). Where unbalances are open a cone program with the masses as decisions
-proposes dual rows of all that is asked together, which bound the box and every part of it (Z14). Sides of a box on
-which a limit is broken everywhere, or nothing is better than a design known, are cut off; what is left is halved.
+In a box each factor of a load is smallest at one vertex, because it is monotonic in each size; so are the masses. A
+norm of rows affine in masses and unbalances is at least <Z, V>, with Z any subgradient. The minimum of <Z, V> over the
+range of masses and the sets of unbalances bounds the norm. Over rod lengths <Z, V> is a short series (Z13). If
+unbalances are open, a cone program with the masses as decisions gives multipliers of the whole problem, which bound
+the box and each part of it (Z14). Ends of a box without better or without feasible designs are cut off; then the box
+is halved.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Bundle, SizeNumber, SizeReach, Ways, corner
+from laufruhe.extensions.sizes.bundles import Bundle, Monotonicity, SizeNumber, SizeReach, corner
 from laufruhe.extensions.sizes.model import SizeModel
-from laufruhe.extensions.sizes.programs import Ask, SizePrograms, Together
+from laufruhe.extensions.sizes.programs import CombinedMultipliers, ProposeMultipliers, SizePrograms
 from laufruhe.extensions.sizes.rod_series import RodSeries, rod_series
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
@@ -29,47 +29,51 @@ from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, Fathom
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
 MOST_BOXES = 3000
-# a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
-SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
-# of a load by itself, where dual rows of all together tell more
-FEW_TOUCHED = 4
-# dual rows of the last boxes that are kept, and the share of what is to be shown that halving a side has to gain
+# relative tolerance of limits; halvings to find the end of a cut, rounds of cuts, and most tangents of a load
+SLACK, HALVINGS, ROUNDS, MOST_TANGENTS = 1e-9, 10, 3, 200
+# most tangents of a load if multipliers of the whole problem give better bounds
+FEW_TANGENTS = 4
+# sets of multipliers that a box inherits; smallest gain of a side to halve, as a share of the missing bound
 MOST_KNOWN, WORTH = 2, 0.1
-# share of what is to be shown from which dual rows are asked for at all angles
+# relative gap below which programs have all samples
 NEAR = 2e-3
 
 
 class SizeCut(NamedTuple):
-    """Rest of a box, its bound, the side worth halving, and the dual rows that gave the bound."""
+    """Remainder of a box, its bound, the side to halve, and its multipliers."""
 
     lower: Array
     upper: Array
     bound: float
     side: int
-    known: tuple[Together, ...]
+    known: tuple[CombinedMultipliers, ...]
 
 
 class SizeBoxes:
-    """Bounds of the objective on boxes of sizes.
+    """Lower bounds of the objective over boxes of sizes.
 
-    Raises
-    ------
-    ValueError
-        If a measure does not go one way with a size, or a bend of a load moves with the length of the rod.
+    Attributes
+    ----------
+    is_whole
+        True if no row was set to zero for a kink that passes it.
 
     Parameters
     ----------
     ask
-        Function that proposes dual rows where unbalances are open.
+        Function that proposes multipliers if unbalances are open.
+
+    Raises
+    ------
+    ValueError
+        If a measure is not monotonic in a size, or a kink of a load moves with the rod length.
     """
 
-    def __init__(self, model: SizeModel, ask: Ask | None = None) -> None:
-        # means at a few angles may be more than over the cycle, and would prove too much
+    def __init__(self, model: SizeModel, ask: ProposeMultipliers | None = None) -> None:
+        # sampled means may exceed those over the cycle and would not be lower bounds
         self.model, problem = model.averaging(), model.problem
-        # no row is left out for a bend that passes it
         self.is_whole = True
-        # for each size whether masses grow with it or fall
-        self._light = self._mass_ways()
+        # monotonicity of the masses in each size
+        self._mass_signs = self._mass_monotonicity()
         self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
         self.limits: list[tuple[float, SizeNumber, Limit]] = []
         for limit in problem.limits:
@@ -77,10 +81,10 @@ class SizeBoxes:
                 if math.isfinite(edge):
                     maximum = sense * edge + SLACK * abs(edge)
                     self.limits.append((maximum, self._number(limit.measure, sense), limit))
-        self._ask, self._together = ask, self._programs(ask)
-        self.touch(model.lower, model.upper)
+        self._ask, self._combined = ask, self._programs(ask)
+        self.add_tangents(model.lower, model.upper)
 
-    def _programs(self, ask: Ask | None) -> SizePrograms | None:
+    def _programs(self, ask: ProposeMultipliers | None) -> SizePrograms | None:
         if ask is None or not self.model.domains:
             return None
         terms = [(weight, number) for weight, number in self.terms if number.pieces]
@@ -88,7 +92,9 @@ class SizeBoxes:
 
     def _number(self, measure: Measure, sense: float) -> SizeNumber:
         if measure.channel.of_engine is not None:
-            return SizeNumber(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
+            return SizeNumber(
+                measure, sense, self._monotonicity(lambda x: np.array([sense * self.model.value(measure, x)]))
+            )
         if not measure.norm.of_row_lengths or sense < 0.0:
             raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
         pieces = self.model.pieces(measure)
@@ -100,72 +106,72 @@ class SizeBoxes:
 
         if not self.model.moves_rod:
             bundles = tuple(Bundle(RodSeries.fixed(piece, self.model.rod_span[0])) for piece in pieces)
-            return SizeNumber(measure, sense, self._ways(factors), bundles)
+            return SizeNumber(measure, sense, self._monotonicity(factors), bundles)
         start = self.model.problem.engine.slider_cranks[0].rod_length
         masks = self.model.fixed_rows(measure)
         self.is_whole = self.is_whole and all(rows.all() for rows in masks)
         series = rod_series(self.model.pieces_over_length(measure), start, *self.model.rod_span, masks)
-        return SizeNumber(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
+        return SizeNumber(measure, sense, self._monotonicity(factors), tuple(map(Bundle, series)))
 
-    def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
-        """Return for each size if all numbers rise (1) or fall (-1) with it; zero if none changes."""
+    def _monotonicity(self, numbers: Callable[[Array], Array]) -> Monotonicity:
+        """Return 1 for each size if all numbers rise with it, -1 if all fall, 0 if none changes; shape (sizes,)."""
         lower, upper = self.model.lower, self.model.upper
-        ways = np.zeros(len(lower))
+        monotonicity = np.zeros(len(lower))
         for start in (lower, upper):
             for k in range(len(lower)):
                 ends = [np.where(np.arange(len(lower)) == k, edge, start) for edge in (lower, upper)]
                 change = numbers(ends[1]) - numbers(ends[0])
                 rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
-                way = float(rises) - float(falls)
-                if (rises and falls) or way * ways[k] < 0.0:
-                    raise ValueError(f"a measure does not go one way with {self.model.problem.decisions[k].name}")
-                ways[k] = way or ways[k]
-        return ways
+                sign = float(rises) - float(falls)
+                if (rises and falls) or sign * monotonicity[k] < 0.0:
+                    raise ValueError(f"a measure is not monotonic in {self.model.problem.decisions[k].name}")
+                monotonicity[k] = sign or monotonicity[k]
+        return monotonicity
 
-    def _mass_ways(self) -> Ways:
-        """Return for each size if all masses grow (1) or fall (-1) with it."""
+    def _mass_monotonicity(self) -> Monotonicity:
+        """Return 1 for each size if all masses rise with it, -1 if all fall; shape (sizes,)."""
         corners = self.model.mass_corners
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):
             raise ValueError("a mass of the running gear passes zero")
-        ways = np.zeros(corners.ndim - 1)
+        monotonicity = np.zeros(corners.ndim - 1)
         for k, decision in enumerate(self.model.sizes):
             change = np.diff(np.abs(corners), axis=k)
             rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
             if rises and falls:
-                raise ValueError(f"masses do not go one way with {decision.name}")
-            ways[k] = float(rises) - float(falls)
-        return ways
+                raise ValueError(f"masses are not monotonic in {decision.name}")
+            monotonicity[k] = float(rises) - float(falls)
+        return monotonicity
 
-    def keeping(self, limits: Sequence[Limit]) -> SizeBoxes:
-        """Return the same with some of the limits alone, and no objective."""
+    def with_limits(self, limits: Sequence[Limit]) -> SizeBoxes:
+        """Return the boxes with some of the limits alone, and no objective."""
         other = copy.copy(self)
         other.terms, other.limits = [], [limit for limit in self.limits if limit[2] in limits]
-        other._together = other._programs(self._ask)
+        other._combined = other._programs(self._ask)
         return other
 
     def reach(self, lower: Array, upper: Array) -> SizeReach:
         """Return the ranges of masses and rod length on a box."""
-        ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
+        ends = (self.model.masses(corner(sign * self._mass_signs, lower, upper)) for sign in (1.0, -1.0))
         light, heavy = ends
         rod = self.model.rod_length(lower), self.model.rod_length(upper)
         return SizeReach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
 
-    def touch(self, lower: Array, upper: Array) -> None:
-        """Add affine functions that loads meet at masses of a box."""
-        reach, maximum = self.reach(lower, upper), MOST_TOUCHED if self._together is None else FEW_TOUCHED
+    def add_tangents(self, lower: Array, upper: Array) -> None:
+        """Add tangents of loads at masses of a box."""
+        reach, maximum = self.reach(lower, upper), MOST_TANGENTS if self._combined is None else FEW_TANGENTS
         (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
                 for masses in (reach.low, middle) if bundle.count < maximum else ():
-                    bundle.touch(np.append(masses, unbalances), length)
+                    bundle.add_tangents(np.append(masses, unbalances), length)
 
     def minimum(self, number: SizeNumber, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return a lower bound of a measure on a box."""
-        at = corner(number.ways, lower, upper)
+        vertex = corner(number.monotonicity, lower, upper)
         if not number.pieces:
-            return number.sense * self.model.value(number.measure, at)
-        engine = self.model.engine(at) if np.any(number.ways) else self.model.problem.engine
+            return number.sense * self.model.value(number.measure, vertex)
+        engine = self.model.engine(vertex) if np.any(number.monotonicity) else self.model.problem.engine
         return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
     def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: SizeReach) -> float:
@@ -174,123 +180,129 @@ class SizeBoxes:
         if ratio is not None:
             return ratio * bundle.minimum(reach)
         scaled, (masses, length) = bundle.scaled(factors), reach.middle
-        scaled.touch(np.append(masses, self.model.start), length)
+        scaled.add_tangents(np.append(masses, self.model.start), length)
         return scaled.minimum(reach)
 
-    def objective(self, lower: Array, upper: Array, known: Sequence[Together] = ()) -> float:
-        """Return a lower bound of the objective on a box, infinite where known dual rows exclude it."""
+    def objective(self, lower: Array, upper: Array, known: Sequence[CombinedMultipliers] = ()) -> float:
+        """Return a lower bound of the objective on a box; infinite if multipliers exclude the box."""
         reach = self.reach(lower, upper)
-        # what is known of all loads together is no less than what each tells
+        # multipliers of the whole problem replace the bounds of single loads
         numbers = [(w, number) for w, number in self.terms if not (known and number.pieces)]
         bound = sum(weight * self.minimum(number, lower, upper, reach) for weight, number in numbers)
-        if self._together is None or not known:
+        if self._combined is None or not known:
             return bound
-        return bound + max(*(self._together.minimum(rows, lower, upper, reach) for rows in known), 0.0)
+        return bound + max(*(self._combined.minimum(rows, lower, upper, reach) for rows in known), 0.0)
 
-    def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
-        """Return whether a limit is broken all over a box; with k, of limits that go one `way` with size k."""
+    def violates_limit(self, lower: Array, upper: Array, k: int | None = None, sign: float = 0.0) -> bool:
+        """Return True if a limit is violated in the whole box; with k, of limits with monotonicity `sign` in size k."""
         reach = self.reach(lower, upper)
         return any(
             self.minimum(number, lower, upper, reach) > maximum
             for maximum, number, _ in self.limits
-            if k is None or number.ways[k] == way
+            if k is None or number.monotonicity[k] == sign
         )
 
-    def cut(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...] = ()) -> SizeCut | None:
-        """Return a box without sides that hold no better design; None where nothing is left."""
-        self.touch(lower, upper)
-        if self.breaks(lower, upper) or self.objective(lower, upper, known) >= target:
+    def cut(
+        self, lower: Array, upper: Array, target: float, known: tuple[CombinedMultipliers, ...] = ()
+    ) -> SizeCut | None:
+        """Return a box without ends that have no better design; None if nothing remains."""
+        self.add_tangents(lower, upper)
+        if self.violates_limit(lower, upper) or self.objective(lower, upper, known) >= target:
             return None
         for _ in range(ROUNDS):
-            before = (upper - lower).sum()
-            known = self.learned(lower, upper, target, known)
+            previous_width = (upper - lower).sum()
+            known = self.multipliers_of(lower, upper, target, known)
             if self.objective(lower, upper, known) >= target:
                 return None
             for k in range(len(lower)):
-                lower, upper = self._shaved(lower, upper, k, target, known)
-            if (upper - lower).sum() > 0.9 * before:
+                lower, upper = self._without_empty_ends(lower, upper, k, target, known)
+            if (upper - lower).sum() > 0.9 * previous_width:
                 break
         bound = self.objective(lower, upper, known)
         if bound >= target:
             return None
         return SizeCut(lower, upper, bound, self._side(lower, upper, known, bound, target), known)
 
-    def learned(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
-        """Return the dual rows of the box and those of the last one; exact ones where the bound is near."""
-        if self._together is None:
+    def multipliers_of(
+        self, lower: Array, upper: Array, target: float, known: tuple[CombinedMultipliers, ...]
+    ) -> tuple[CombinedMultipliers, ...]:
+        """Return multipliers of a box, then those of its parent; with all samples if the bound is near the target."""
+        if self._combined is None:
             return ()
-        near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * target
-        rows = self._together.learned(lower, upper, self.reach(lower, upper), near)
+        is_near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * target
+        rows = self._combined.multipliers_of(lower, upper, self.reach(lower, upper), is_near)
         return known if rows is None else (rows, *known[: MOST_KNOWN - 1])
 
-    def _side(self, lower: Array, upper: Array, known: Sequence[Together], bound: float, target: float) -> int:
-        middle, gained = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, here in enumerate(np.eye(len(lower), dtype=bool) if known and target < math.inf else ()):
-            first = self.objective(lower, np.where(here, middle, upper), known)
-            second = self.objective(np.where(here, middle, lower), upper, known)
-            gained[k] = min(first, target) + min(second, target) - 2.0 * bound
-        if gained.max() > WORTH * (target - bound):
-            return int(np.argmax(gained))
+    def _side(
+        self, lower: Array, upper: Array, known: Sequence[CombinedMultipliers], bound: float, target: float
+    ) -> int:
+        middle, gains = 0.5 * (lower + upper), np.zeros(len(lower))
+        for k, is_side in enumerate(np.eye(len(lower), dtype=bool) if known and target < math.inf else ()):
+            first = self.objective(lower, np.where(is_side, middle, upper), known)
+            second = self.objective(np.where(is_side, middle, lower), upper, known)
+            gains[k] = min(first, target) + min(second, target) - 2.0 * bound
+        if gains.max() > WORTH * (target - bound):
+            return int(np.argmax(gains))
         return widest(lower, upper, self.model.upper - self.model.lower)
 
-    def _shaved(
-        self, lower: Array, upper: Array, k: int, target: float, known: Sequence[Together]
+    def _without_empty_ends(
+        self, lower: Array, upper: Array, k: int, target: float, known: Sequence[CombinedMultipliers]
     ) -> tuple[Array, Array]:
-        """Return the box without as much of both ends of one side as is shown to hold nothing."""
-        here = np.arange(len(lower)) == k
+        """Return the box without the parts at both ends of side k that are proven to be empty."""
+        is_side = np.arange(len(lower)) == k
 
         def low_empty(edge: float) -> bool:
-            part = lower, np.where(here, edge, upper)
-            return self.breaks(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= target)
+            part = lower, np.where(is_side, edge, upper)
+            return self.violates_limit(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= target)
 
-        first = _last_empty(low_empty, lower[k], upper[k])
-        lower = np.where(here, first, lower)
+        first = _end_of_empty_range(low_empty, lower[k], upper[k])
+        lower = np.where(is_side, first, lower)
 
         def high_empty(edge: float) -> bool:
-            part = np.where(here, edge, lower), upper
-            return self.objective(*part, known) >= target or self.breaks(*part, k, 1.0)
+            part = np.where(is_side, edge, lower), upper
+            return self.objective(*part, known) >= target or self.violates_limit(*part, k, 1.0)
 
-        return lower, np.where(here, _last_empty(high_empty, upper[k], lower[k]), upper)
+        return lower, np.where(is_side, _end_of_empty_range(high_empty, upper[k], lower[k]), upper)
 
 
-def _last_empty(empty: Callable[[float], bool], start: float, end: float) -> float:
-    # end of the stretch from `start` that is shown to be empty, by halving
-    done, far = start, end
+def _end_of_empty_range(is_empty: Callable[[float], bool], start: float, end: float) -> float:
+    # end of the range from `start` that is proven to be empty, by halving
+    empty_end, open_end = start, end
     for _ in range(HALVINGS if start != end else 0):
-        middle = 0.5 * (done + far)
-        if empty(middle):
-            done = middle
-        elif done == start and abs(middle - start) < 0.02 * abs(end - start):
+        middle = 0.5 * (empty_end + open_end)
+        if is_empty(middle):
+            empty_end = middle
+        elif empty_end == start and abs(middle - start) < 0.02 * abs(end - start):
             break
         else:
-            far = middle
-    return done
+            open_end = middle
+    return empty_end
 
 
 class _SizeBox(Box):
-    """A box, and the dual rows that told of it."""
+    """Box with the multipliers of its bound."""
 
-    known: tuple[Together, ...] = ()
+    known: tuple[CombinedMultipliers, ...] = ()
 
 
 class _Sizes(BoxBisection):
-    """Halves of a side, each cut."""
+    """Bisection that cuts each half."""
 
     what = "boxes of sizes"
 
-    def __init__(self, boxes: SizeBoxes, value: float, room: float, known: Witness | None = None) -> None:
-        super().__init__(value, room, known)
+    def __init__(self, boxes: SizeBoxes, value: float, gap_tolerance: float, known: Witness | None = None) -> None:
+        super().__init__(value, gap_tolerance, known)
         self._boxes = boxes
 
     @property
     def level(self) -> float:
-        """Level to which boxes are cut: no design in what is cut off is better."""
+        """Objective up to which bounds of cut boxes hold."""
         return self.cutoff
 
     def bound_box(
-        self, lower: Array, upper: Array, known: tuple[Together, ...] = ()
+        self, lower: Array, upper: Array, known: tuple[CombinedMultipliers, ...] = ()
     ) -> tuple[float, Box] | FathomedPart:
-        """Return the bound of a box and its rest."""
+        """Return the bound of a box and its remainder after the cut."""
         cut = self._boxes.cut(lower, upper, self.cutoff, known)
         if cut is None:
             return FathomedPart(self.level)
@@ -299,13 +311,13 @@ class _Sizes(BoxBisection):
         return cut.bound, box
 
     def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
-        """Return the bounds of each half."""
+        """Return the bound and remainder of each half."""
         return [self.bound_box(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Around:
-    """Bounder of thin boxes."""
+    """Bounds of thin boxes around the best design, to check the proof."""
 
     boxes: SizeBoxes
     known: Witness
@@ -316,19 +328,19 @@ class _Around:
         return thin_box(place, self.boxes.model.lower, self.boxes.model.upper)
 
     def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the bound of a box by the dual rows that it suggests, infinite where it breaks a limit."""
-        self.boxes.touch(*box)
-        if self.boxes.breaks(*box):
+        """Return the bound of a box by its own multipliers; infinite if it violates a limit."""
+        self.boxes.add_tangents(*box)
+        if self.boxes.violates_limit(*box):
             return math.inf
-        return self.boxes.objective(*box, self.boxes.learned(*box, self.known.value, ()))
+        return self.boxes.objective(*box, self.boxes.multipliers_of(*box, self.known.value, ()))
 
 
 def divided_sizes(
-    boxes: SizeBoxes, value: float, room: float, maximum: int = MOST_BOXES, known: Witness | None = None
+    boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MOST_BOXES, known: Witness | None = None
 ) -> BoxResult:  # fmt: skip
-    """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
-    division = _Sizes(boxes, value, room, known)
-    bound = division.run(division.bound_box(boxes.model.lower, boxes.model.upper), maximum)
+    """Return the bound by bisection, until no design is better than `value` by more than `gap_tolerance` (Z12)."""
+    bisection = _Sizes(boxes, value, gap_tolerance, known)
+    result = bisection.run(bisection.bound_box(boxes.model.lower, boxes.model.upper), maximum)
     if known is not None:
         check_near_witness(_Around(boxes, known), known.place, known)
-    return bound
+    return result

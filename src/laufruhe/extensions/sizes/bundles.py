@@ -1,8 +1,8 @@
-"""Affine functions of masses and unbalances that lie under what is asked, over boxes of sizes (Z12, Z13, Z14).
+"""Affine lower bounds of measures over boxes of sizes (Z12, Z13, Z14).
 
-At any length of the rod <Z, V> is affine in the columns of a model of sizes: of one measure with Z its subgradient, or
-of all that is asked together with dual rows of a cone program. Factors of sizes stand before each group of rows that
-has its own, so that one set of dual rows says something of every box.
+At any rod length <Z, V> is affine in the columns of a size model: for one measure with Z its subgradient, or for all
+terms and limits with multipliers of a cone program. Each group of rows has its factors of sizes, so that one set of
+multipliers bounds any box.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from laufruhe.problem.measure import Measure
 
 
 class SizeReach(NamedTuple):
-    """Ranges of the masses and of the length of the rod on a box; unbalances lie anywhere in their sets."""
+    """Ranges of the masses and of the rod length on a box; unbalances lie anywhere in their sets."""
 
     low: Array
     high: Array
@@ -30,17 +30,17 @@ class SizeReach(NamedTuple):
 
     @property
     def middle(self) -> tuple[Array, float]:
-        """Middle masses and rod length."""
+        """Middle masses, shape (4,), and middle rod length [m]."""
         return 0.5 * (self.low + self.high), 0.5 * (self.rod[0] + self.rod[1])
 
     @property
     def maximum(self) -> Array:
-        """Largest size of one, then of every column."""
+        """Largest absolute value of 1 and of each column, shape (1 + columns,)."""
         scales = [np.full(domain.width, domain.scale) for domain in self.domains]
         return np.concatenate([[1.0], np.maximum(np.abs(self.low), np.abs(self.high)), *scales])
 
     def minimum(self, functions: Array) -> Array:
-        """Return the least of affine functions, shape (n, 1 + columns)."""
+        """Return the minimum of affine functions of shape (n, 1 + columns) over masses and unbalances, shape (n,)."""
         masses = functions[:, 1 : 1 + MASSES]
         total = functions[:, 0] + np.where(masses > 0.0, masses * self.low, masses * self.high).sum(axis=1)
         for domain in self.domains:
@@ -49,29 +49,29 @@ class SizeReach(NamedTuple):
         return np.asarray(total)
 
 
-Ways: TypeAlias = Array
+Monotonicity: TypeAlias = Array
 
 
-def minimum_of(nodes: Array, terms: Array, rest: Array, reach: SizeReach) -> Array:
-    """Return the least of functions on a box, shape (t,): their first two terms at its ends, less bounds of the others.
+def minimum_of(nodes: Array, terms: Array, remainder: Array, reach: SizeReach) -> Array:
+    """Return lower bounds of functions on a box, shape (t,): linear part at the rod length's ends, less other terms.
 
     Parameters
     ----------
     nodes
         Values of each function at the nodes, shape (t, n, 1 + columns).
     terms
-        Matrix from these to the terms between the lengths of the box, shape (n, n).
-    rest
-        Bound of the rest of the series, shape (1 + columns,).
+        Matrix from these to the series between the rod lengths of the box, shape (n, n).
+    remainder
+        Bound of the remainder of the series, shape (1 + columns,).
     """
     series = np.einsum("mn,tnj->mtj", terms, nodes)
-    linear, further, maximum = series[1:2].sum(axis=0), np.abs(series[2:]).sum(axis=0), reach.maximum
+    linear, higher_terms, maximum = series[1:2].sum(axis=0), np.abs(series[2:]).sum(axis=0), reach.maximum
     ends = np.minimum(*(reach.minimum(series[0] + end * linear) for end in (-1.0, 1.0)))
-    return np.asarray(ends - further @ maximum - rest @ maximum)
+    return np.asarray(ends - higher_terms @ maximum - remainder @ maximum)
 
 
 class Bundle:
-    """Affine functions of the columns that a norm is nowhere under, as many as were asked for (P4)."""
+    """Affine lower bounds of a norm over the columns: its tangents so far (P4)."""
 
     def __init__(self, lengths: RodSeries) -> None:
         self.piece, self.lengths = lengths.piece, lengths
@@ -79,16 +79,16 @@ class Bundle:
 
     @property
     def count(self) -> int:
-        """Number of functions."""
+        """Count of tangents."""
         return len(self.nodes)
 
-    def touch(self, columns: Array, length: float) -> None:
-        """Add the function that meets the norm at these columns and this length."""
+    def add_tangents(self, columns: Array, length: float) -> None:
+        """Add the tangent of the norm at columns and a rod length [m]."""
         z = self.lengths.at_length(length).subgradient(columns)
         self.nodes = np.concatenate([self.nodes, self.lengths.pulled(z)[None]])
 
     def scaled(self, factors: Sequence[Array]) -> Bundle:
-        """Return an empty bundle with other factors of its rows."""
+        """Return an empty bundle with other factors of the rows."""
         return Bundle(self.lengths.scaled(factors))
 
     def minimum(self, reach: SizeReach) -> float:
@@ -98,13 +98,13 @@ class Bundle:
 
 
 @dataclass(frozen=True, eq=False)
-class Grouped:
-    """<Z, V> of a piece by groups of rows that have a factor of sizes each.
+class GroupedRows:
+    """Products <Z, V> of a piece, summed over groups of rows with one factor of sizes each.
 
     Attributes
     ----------
     groups
-        Of every operating point in it, shape (n, places, d, 1 + columns); of one group alone where nothing has factors.
+        For each operating point, shape (n, places, d, 1 + columns); a single group if there are no factors.
     price
         Dual norm of Z.
     """
@@ -114,8 +114,8 @@ class Grouped:
     price: float
 
     @classmethod
-    def from_rows(cls, lengths: RodSeries, z: Array) -> Grouped:
-        """Return the groups of dual rows of a piece, with the factors of the start."""
+    def from_rows(cls, lengths: RodSeries, z: Array) -> GroupedRows:
+        """Return the groups for multipliers of a piece, with the initial factors."""
         price = lengths.piece.affine.dual_norm(z)
         rows_of_columns = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
         products = z[:, :, None] * rows_of_columns
@@ -129,36 +129,36 @@ class Grouped:
             start = end
         return cls(lengths, tuple(groups), price)
 
-    def weighed(self, factors: Sequence[Array]) -> tuple[Array, float]:
-        """Return the function with other factors, shape (n, 1 + columns), and their largest ratio to the start's."""
+    def with_factors(self, factors: Sequence[Array]) -> tuple[Array, float]:
+        """Return the function with other factors, shape (n, 1 + columns), and the largest ratio to initial factors."""
         if not factors:
             return np.asarray(self.groups[0][:, 0, 0]), 1.0
-        ratios = [new / old for new, old in zip(factors, self.lengths.piece.given, strict=True)]
+        ratios = [factor / initial for factor, initial in zip(factors, self.lengths.piece.given, strict=True)]
         parts = zip(self.groups, ratios, strict=True)
-        total = sum(np.einsum("npdj,pd->nj", group, np.broadcast_to(by, group.shape[1:3])) for group, by in parts)
-        return np.asarray(total), max(float(by.max(initial=0.0)) for by in ratios)
+        total = sum(np.einsum("npdj,pd->nj", group, np.broadcast_to(ratio, group.shape[1:3])) for group, ratio in parts)
+        return np.asarray(total), max(float(ratio.max(initial=0.0)) for ratio in ratios)
 
 
 @dataclass(frozen=True, eq=False)
 class SizeNumber:
-    """Measure, or its negative, as boxes see it.
+    """Measure, or its negative, with its lower bounds on boxes.
 
     Attributes
     ----------
     sense
-        1, or -1 where it is to be large.
-    ways
-        For each size whether its factors grow with it (1) or fall (-1).
+        1 for an upper limit or an objective, -1 for a lower limit.
+    monotonicity
+        For each size 1 if the factors rise with it, -1 if they fall, 0 if they are constant; shape (sizes,).
     pieces
-        Pieces of a load, each with its functions.
+        Tangents of each piece of a load.
     """
 
     measure: Measure
     sense: float
-    ways: Ways
+    monotonicity: Monotonicity
     pieces: tuple[Bundle, ...] = ()
 
 
-def corner(ways: Ways, lower: Array, upper: Array) -> Array:
-    """Return the corner at which numbers that go these ways are least."""
-    return np.where(ways >= 0.0, lower, upper)
+def corner(monotonicity: Monotonicity, lower: Array, upper: Array) -> Array:
+    """Return the vertex of a box at which numbers of this monotonicity are smallest."""
+    return np.where(monotonicity >= 0.0, lower, upper)

@@ -1,4 +1,4 @@
-"""What sizes of the running gear have to bear: stresses, pressures, deflections, and room along the shaft (Z1-Z11)."""
+"""Channels of the running gear: stresses, pressures, deflections, clearance along the shaft, and mass (Z1-Z11)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 
-_BETWEEN_BEARINGS: Where = (AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders)
+_AT_EACH_PIN: Where = (AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders)
 _AT_EACH_WEB: Where = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
 
 
@@ -36,7 +36,7 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spect
     return strength.journal_torques(engine, point, fidelity).mapped(lambda values: values[..., None])
 
 
-def _number(
+def _size_channel(
     name: str, unit: str, needs: Need, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
 ) -> SizeChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
@@ -49,7 +49,7 @@ def _number(
 
 
 CRANK_PIN_STRESS = inside(
-    "crank-pin bending stress", "Pa", _BETWEEN_BEARINGS, strength.pin_moments, strength.big_end_factors
+    "crank-pin bending stress", "Pa", _AT_EACH_PIN, strength.pin_moments, strength.big_end_factors
 )
 WEB_STRESS = inside("web stress", "Pa", _AT_EACH_WEB, strength.side_forces, strength.web_factors)
 JOURNAL_TORSION = inside("journal torsion stress", "Pa", AT_EACH_BEARING, _torques, strength.journal_factors)
@@ -66,5 +66,5 @@ PIN_STRESS = inside(
 )
 PIN_DEFLECTION = inside("piston-pin deflection", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.deflection_factors)
 PIN_OVALITY = inside("piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors)
-THROW_CLEARANCE = _number("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
-GEAR_MASS = _number("running-gear mass", "kg", Needs.NOTHING, ("max",), strength.gear_mass)
+THROW_CLEARANCE = _size_channel("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
+GEAR_MASS = _size_channel("running-gear mass", "kg", Needs.NOTHING, ("max",), strength.gear_mass)

@@ -85,17 +85,19 @@ class RunningGearTable(Table):
     bolts: BoltsTable | None = None
 
 
-def _weighed(
+def _with_gear_masses(
     table: RunningGearTable, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...], bearings: tuple[Bearing, ...]
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    # Z2: slider-cranks and throws with the masses of sizes, open ones at their start
-    others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
+    # Z2: slider-cranks and throws with the masses of the initial sizes
+    other_throws = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
     moving = MovingGear(gear, parts, (), bearings)
-    ways, size = dict(gear.throws).values(), moving.throw_unbalance
-    heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
-    return moving.weighed().parts, (*heavy, *others)
+    directions, size = dict(gear.throws).values(), moving.throw_unbalance
+    crank_throws = tuple(
+        replace(t, unbalance=t.unbalance + size * direction) for t, direction in zip(throws, directions, strict=True)
+    )
+    return moving.with_gear_masses().parts, (*crank_throws, *other_throws)
 
 
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
@@ -134,15 +136,18 @@ def _piston_pin(table: PistonPinTable) -> PistonPin:
     return PistonPin(diameter.start, bore.start, _start(table.length), table.in_bosses, table.span)
 
 
-def _opened(
-    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
+def _sizes_in_file(
+    table: RunningGearTable | None,
+    engine: EngineTable,
+    bearings: Sequence[MainBearingTable],
+    bearing_parts: Sequence[Bearing],
 ) -> Iterator[tuple[str, Size, Any]]:
-    """Yield every size that may be open: its decision, its number of the engine, and its value in the file."""
+    """Yield the name, the key and the file's value of each size that may be open."""
     yield "engine.rod_length", ROD_LENGTH, engine.rod_length
     for key in ("diameter", "width"):
         if engine.big_end is not None:
             yield f"engine.big_end.{key}", (BIG_END, key), getattr(engine.big_end, key)
-        for row, bearing in zip(bearings, built, strict=True):
+        for row, bearing in zip(bearings, bearing_parts, strict=True):
             yield f"{bearing.name}.{key}", (on(bearing), key), getattr(row, key)
     for name in ("webs", "rod", "piston_pin", "bolts") if table else ():
         part = getattr(table, name)
@@ -150,11 +155,13 @@ def _opened(
             yield f"running_gear.{name}.{key}", (name, key), getattr(part, key)
 
 
-def _read(table: RunningGearTable | None, problem: Problem, given: ExtensionContext) -> Problem:
-    engine, throws = problem.engine, [throw for throw in given.throws if throw.shaft == CRANKSHAFT]
-    decisions = _decisions(table, given.engine, one_by_one(given.file.main_bearings, given.throws), engine.bearings)
+def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionContext) -> Problem:
+    engine, throws = problem.engine, [throw for throw in context.throws if throw.shaft == CRANKSHAFT]
+    decisions = _decisions(
+        table, context.engine, one_by_one(context.file.main_bearings, context.throws), engine.bearings
+    )
     if decisions and table is not None and table.density is not None:
-        check_factors(given.file.counterweights, "counts masses that follow from sizes, which are open")
+        check_factors(context.file.counterweights, "counts masses that follow from sizes, which are open")
     gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)
     if decisions or table is not None:
         engine = engine.with_extra(gear)
@@ -162,10 +169,13 @@ def _read(table: RunningGearTable | None, problem: Problem, given: ExtensionCont
 
 
 def _decisions(
-    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
+    table: RunningGearTable | None,
+    engine: EngineTable,
+    bearings: Sequence[MainBearingTable],
+    bearing_parts: Sequence[Bearing],
 ) -> list[Decision]:
     decisions = list[Decision]()
-    for name, size, value in _opened(table, engine, bearings, built):
+    for name, size, value in _sizes_in_file(table, engine, bearings, bearing_parts):
         decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
@@ -179,4 +189,4 @@ def _decisions(
     return decisions
 
 
-KEY = Key("running_gear", RunningGearTable, _read, adds=_weighed, always=True)
+KEY = Key("running_gear", RunningGearTable, _read, adds=_with_gear_masses, always=True)

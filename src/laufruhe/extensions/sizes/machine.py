@@ -1,7 +1,7 @@
 """Sizes of the running gear and the masses that follow: webs, rod shank, piston pin and bolts.
 
-Crank pins are the big ends of the rods, journals the main bearings. What hangs on the sizes is written once here:
-moduli and areas of sections, and masses (Z1, Z2).
+Crank pins are the big ends of the rods, journals are the main bearings. This module alone defines section moduli, areas
+and masses from sizes (Z1, Z2).
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from laufruhe.machine.rotor import Bearing, Rotor
 from laufruhe.machine.slider_crank import SliderCrank
 
 Size: TypeAlias = tuple[str, str]
-"""Name of a part, and of its number."""
+"""Name of a part, and name of one of its sizes."""
 
 STEEL = 210e9
-"""Elastic modulus where none is given [Pa]."""
+"""Default elastic modulus [Pa]."""
 PARTS, MOVED = ("webs", "rod", "piston_pin", "bolts"), ("width", "thickness", "diameter", "bore", "length")
 BIG_END, ROD_LENGTH, _ACROSS = "big end", ("rod", "length"), ("diameter", "width")
 
 
 @dataclass(frozen=True)
 class Webs:
-    """Two webs of a rectangular section beside every pin.
+    """Two webs of a rectangular section beside each pin.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Webs:
 
     @property
     def modulus(self) -> float:
-        """Against bending out of the plane of the web, b h^2 / 6 [m3]."""
+        """Section modulus against bending out of the plane of the web, b h^2 / 6 [m3]."""
         return self.width * self.thickness**2 / 6.0
 
     @property
@@ -58,7 +58,7 @@ class Shank:
     Attributes
     ----------
     diameter, bore
-        [m].
+        Outer and inner diameter [m].
     """
 
     diameter: float
@@ -80,16 +80,16 @@ class Shank:
 
 @dataclass(frozen=True)
 class PistonPin:
-    """A floating pin: part of its length in the small end of the rod, the rest in the two bosses of the piston.
+    """Floating pin, partly in the small end of the rod and partly in the two bosses of the piston.
 
     Attributes
     ----------
     diameter, bore, length
-        [m].
+        Dimensions [m].
     in_bosses
-        Share of the length that the bosses hold.
-    span
-        Between the middles of the bosses [m]; by the share where it is not given.
+        Share of the length in the bosses.
+    given_span
+        Distance between the middles of the bosses [m]; None to derive it from `in_bosses`.
     """
 
     diameter: float
@@ -103,7 +103,7 @@ class PistonPin:
 
     @property
     def span(self) -> float:
-        """Between the middles of the bosses [m]."""
+        """Distance between the middles of the bosses [m]."""
         return self.length * (1.0 - 0.5 * self.in_bosses) if self.given_span is None else self.given_span
 
     @property
@@ -114,10 +114,12 @@ class PistonPin:
 
 @dataclass(frozen=True)
 class Bolts:
-    """Bolts that hold the cap of a big end.
+    """Bolts of the cap of a big end.
 
     Attributes
     ----------
+    count
+        Bolts of each big end.
     diameter
         Diameter at the root of the thread [m].
     """
@@ -133,14 +135,18 @@ class Bolts:
 
 @dataclass(frozen=True)
 class RunningGear(Extra):
-    """Sizes that all throws share; empty where only rods, crank pins or journals are sized.
+    """Sizes that all throws share; empty if only rod length, crank pins or journals are open.
 
     Attributes
     ----------
+    elastic_modulus
+        [Pa].
     density
-        Of the steel [kg/m3]; None where the sizes add nothing to the masses as given.
+        Density of the steel [kg/m3]; None if sizes add no masses.
+    webs, rod, piston_pin, bolts
+        Parts; None for a part without sizes.
     throws
-        Names of the rotors that pins and webs are, and which way each throw points (C4).
+        Names of the rotors of pins and webs, and direction of each throw (C4).
     """
 
     name: ClassVar[str] = "size"
@@ -153,30 +159,30 @@ class RunningGear(Extra):
     throws: tuple[tuple[str, complex], ...] = ()
 
     def part(self, name: str) -> Webs | Shank | PistonPin | Bolts:
-        """Return one of its parts, which it must have."""
-        one: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
-        if one is None:
+        """Return one of its parts; raise ModelError if it is missing."""
+        part: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
+        if part is None:
             raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")
-        return one
+        return part
 
     def move(self, engine: Engine, changes: Mapping[Any, float], _: Sequence[SliderCrank]) -> Engine:
-        """Return an engine with changes of its sizes, and of the masses of these."""
+        """Return the engine with changes of its sizes, and of the masses that follow."""
         if not changes:
             return engine
         return resized(
-            engine, {size: value + changes.get(size, 0.0) for size, value in moving_of(engine).sizes.items()}
+            engine, {size: value + changes.get(size, 0.0) for size, value in moving_gear(engine).sizes.items()}
         )
 
     def scaled(self, length: float, mass: float) -> Self:
-        """Return the gear of an engine whose lengths and masses are so many times as large."""
-        longer: dict[str, object] = {}
+        """Return the gear of a similar engine, with factors of its lengths and masses."""
+        scaled_parts: dict[str, object] = {}
         for name in PARTS:
-            one = getattr(self, name)
-            if one is not None:
-                sizes = {f.name: getattr(one, f.name) for f in fields(one) if f.name not in ("count", "in_bosses")}
-                longer[name] = replace(one, **{k: None if v is None else v * length for k, v in sizes.items()})
-        heavy = None if self.density is None else self.density * (mass / length**3)
-        return replace(self, density=heavy, **longer)  # type: ignore[arg-type]
+            part = getattr(self, name)
+            if part is not None:
+                sizes = {f.name: getattr(part, f.name) for f in fields(part) if f.name not in ("count", "in_bosses")}
+                scaled_parts[name] = replace(part, **{k: None if v is None else v * length for k, v in sizes.items()})
+        density = None if self.density is None else self.density * (mass / length**3)
+        return replace(self, density=density, **scaled_parts)  # type: ignore[arg-type]
 
     def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
         """Return the masses that shank and piston pin add to a slider-crank (Z2).
@@ -192,12 +198,16 @@ class RunningGear(Extra):
         return 0.5 * shank + ring, 0.5 * shank, -shank * length**2 / 6.0 if shank else 0.0
 
     def throw_unbalance(self, radius: float, big_end: tuple[float, float] | None, journal: float) -> float:
-        """Return the unbalance of crank pin and both webs [kg m] (Z2).
+        """Return the unbalance of a crank pin and both webs [kg m] (Z2).
 
         Parameters
         ----------
+        radius
+            Crank radius [m].
+        big_end
+            Diameter and width of the crank pin [m].
         journal
-            Diameter of the main bearings [m]: the web about it turns about its own middle.
+            Diameter of the main bearings [m]; the part of a web around the journal has no unbalance.
         """
         across, width = big_end or (0.0, 0.0)
         total = ring_area(across, 0.0) * width * radius
@@ -208,41 +218,46 @@ class RunningGear(Extra):
 
 @dataclass(frozen=True)
 class MovingGear:
-    """Parts of an engine that sizes change: all that turns, reciprocates or carries."""
+    """Parts of an engine that sizes change: gear, slider-cranks, rotors and bearings."""
 
     gear: RunningGear | None
     parts: tuple[SliderCrank, ...]
     rotors: tuple[Rotor, ...]
     bearings: tuple[Bearing, ...]
 
-    def weighed(self, sense: float = 1.0) -> MovingGear:
+    def with_gear_masses(self, sense: float = 1.0) -> MovingGear:
         """Return the parts with the masses of the running gear added (`sense` 1) or removed (-1) (Z2)."""
         gear = self.gear
         if gear is None or gear.density is None or not self.parts:
             return self
-        unbalance, ways = sense * self.throw_unbalance, dict(gear.throws)
+        unbalance, directions = sense * self.throw_unbalance, dict(gear.throws)
         rotors = (
-            replace(r, unbalance=r.unbalance + unbalance * ways[r.name]) if r.name in ways else r for r in self.rotors
+            replace(rotor, unbalance=rotor.unbalance + unbalance * directions[rotor.name])
+            if rotor.name in directions
+            else rotor
+            for rotor in self.rotors
         )
-        return replace(self, parts=tuple(_heavier(gear, part, sense) for part in self.parts), rotors=tuple(rotors))
+        return replace(
+            self, parts=tuple(_with_gear_masses(gear, part, sense) for part in self.parts), rotors=tuple(rotors)
+        )
 
     @cached_property
     def bare(self) -> MovingGear:
         """Parts without the masses of the running gear (Z2)."""
-        return self.weighed(-1.0)
+        return self.with_gear_masses(-1.0)
 
     @property
     def throw_unbalance(self) -> float:
         """Unbalance of pin and webs of one throw [kg m] (Z2)."""
         if self.gear is None or not self.parts:
             return 0.0
-        # about the journal a web turns about its own middle
+        # the part of a web around the journal has no unbalance
         journal = min((b.diameter for b in self.bearings if b.diameter is not None), default=0.0)
         return self.gear.throw_unbalance(self.parts[0].crank_radius, self.parts[0].big_end, journal)
 
     @property
     def sizes(self) -> dict[Size, float]:
-        """Sizes that decisions may move [m]."""
+        """Sizes that decisions may change [m]."""
         sizes: dict[Size, float] = {}
         if self.parts:
             sizes[ROD_LENGTH] = self.parts[0].rod_length
@@ -256,45 +271,48 @@ class MovingGear:
         return sizes
 
     def resized(self, sizes: Mapping[Size, float]) -> MovingGear:
-        """Return the parts with other sizes, and the masses that follow from them."""
-        unweighed = self.bare
-        parts, gear = unweighed.parts, unweighed.gear
-        length, end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
-        moved: dict[str, Any] = {}
+        """Return the parts with other sizes [m], and with the masses that follow."""
+        bare_gear = self.bare
+        parts, gear = bare_gear.parts, bare_gear.gear
+        length, big_end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
+        changes: dict[str, Any] = {}
         if parts and length is not None and length != parts[0].rod_length:
-            moved["rod_length"] = length
-        if end[0] is not None and end[1] is not None:
-            moved["big_end"] = end
-        if moved:
-            parts = tuple(replace(part, **moved) for part in parts)
+            changes["rod_length"] = length
+        if big_end[0] is not None and big_end[1] is not None:
+            changes["big_end"] = big_end
+        if changes:
+            parts = tuple(replace(part, **changes) for part in parts)
         bearings = tuple(
-            replace(b, **{key: sizes.get((on(b), key), getattr(b, key)) for key in _ACROSS}) for b in unweighed.bearings
+            replace(bearing, **{key: sizes.get((on(bearing), key), getattr(bearing, key)) for key in _ACROSS})
+            for bearing in bare_gear.bearings
         )
         for name in PARTS if gear else ():
-            one = getattr(gear, name)
-            changed = {f.name: sizes[name, f.name] for f in fields(one) if (name, f.name) in sizes} if one else {}
-            if changed and gear is not None:
-                gear = replace(gear, **{name: replace(one, **changed)})
-        return replace(unweighed, gear=gear, parts=parts, bearings=bearings).weighed()
+            part = getattr(gear, name)
+            new_sizes = {f.name: sizes[name, f.name] for f in fields(part) if (name, f.name) in sizes} if part else {}
+            if new_sizes and gear is not None:
+                gear = replace(gear, **{name: replace(part, **new_sizes)})
+        return replace(bare_gear, gear=gear, parts=parts, bearings=bearings).with_gear_masses()
 
 
-def moving_of(engine: Engine) -> MovingGear:
-    """Return what sizes move in an engine."""
+def moving_gear(engine: Engine) -> MovingGear:
+    """Return the parts of an engine that sizes change."""
     return MovingGear(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, engine.bearings)
 
 
 def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
-    """Return the engine with sizes in place of its own, and the masses of these."""
-    moved = moving_of(engine).resized(sizes)
-    changed = replace(engine, slider_cranks=moved.parts, rotors=moved.rotors, bearings=moved.bearings)
-    return changed if moved.gear is None else changed.with_extra(moved.gear)
+    """Return the engine with other sizes [m], and with the masses that follow."""
+    new_parts = moving_gear(engine).resized(sizes)
+    resized_engine = replace(
+        engine, slider_cranks=new_parts.parts, rotors=new_parts.rotors, bearings=new_parts.bearings
+    )
+    return resized_engine if new_parts.gear is None else resized_engine.with_extra(new_parts.gear)
 
 
-def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
+def _with_gear_masses(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
     reciprocating, rotating, deficit = (sense * mass for mass in gear.rod_masses(part))
     return replace(
         part,
-        # what was added and is taken off again may leave a rounding
+        # adding and removing a mass may leave a negative rounding error
         reciprocating_mass=max(part.reciprocating_mass + reciprocating, 0.0),
         rotating_mass=max(part.rotating_mass + rotating, 0.0),
         rod_inertia_deficit=part.rod_inertia_deficit + deficit,
@@ -302,7 +320,7 @@ def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
 
 
 def on(bearing: Bearing) -> str:
-    """Return the name of a main bearing among those of parts."""
+    """Return the key of a main bearing among the parts with sizes."""
     return f"bearing {bearing.name}"
 
 
@@ -312,7 +330,7 @@ def ring_area(diameter: float, bore: float) -> float:
 
 
 def round_modulus(diameter: float, bore: float = 0.0) -> float:
-    """Return the section modulus in bending, twice which is that in torsion [m3] (Z1)."""
+    """Return the section modulus in bending [m3]; that in torsion is twice as large (Z1)."""
     return math.pi / 32.0 * (diameter**4 - bore**4) / diameter
 
 

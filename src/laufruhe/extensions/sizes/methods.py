@@ -1,4 +1,4 @@
-"""Rows of the table of methods that decide sizes of the running gear."""
+"""Methods for open sizes of the running gear."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from laufruhe.solvers.result import Result
 _ALONE = {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}
 
 
-def _is_of_lengths(norm: Norm) -> bool:
+def _is_of_row_lengths(norm: Norm) -> bool:
     return is_pointwise(norm) and norm.of_row_lengths
 
 
@@ -40,18 +40,19 @@ def _solve_mounted_sizes(problem: Problem) -> Result:
 
 
 ALONE = Method(
-    "boxes of sizes", _ALONE, ProofStrength.EXACT, _solve_sizes, True, OF_SIZES_ALONE, _is_of_lengths,
+    "boxes of sizes", _ALONE, ProofStrength.EXACT, _solve_sizes, True, OF_SIZES_ALONE, _is_of_row_lengths,
     is_no_number, before="linear matrix inequalities",
     proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move with it (Z13)",
 )  # fmt: skip
 WITH_STARS = Method(
     "stars, each with boxes of sizes", {Kind.STAR: BUILT, **_ALONE}, ProofStrength.EXACT,
-    _solve_star_sizes, True, OF_SIZES_ALONE, _is_of_lengths, is_no_number,
+    _solve_star_sizes, True, OF_SIZES_ALONE, _is_of_row_lengths, is_no_number,
     before="linear matrix inequalities", proves="the optimum, of 60 even stars or firing orders at most",
 )  # fmt: skip
 WITH_MOUNTS = Method(
     "local programs of sizes and mounts", {**_ALONE, Kind.STIFFNESS: (), Kind.MOUNT: ()}, ProofStrength.RELAXED,
-    _solve_mounted_sizes, False, OF_SIZES_ALONE | OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
+    _solve_mounted_sizes, False, OF_SIZES_ALONE | OF_MOUNTS, _is_of_row_lengths,
+    also=_minimises_loads,
     before="stars, each with a smooth program",
     proves="a local optimum, with the bound of any masses that the sizes may have (Z15)",
 )  # fmt: skip

@@ -1,7 +1,7 @@
-"""Sizes of the running gear beside elastic mounts, and unbalances with both: local programs and their bound (Z15).
+"""Sizes of the running gear with elastic mounts, and unbalances with both: local programs and their bound (Z15).
 
-What sizes add to the masses that move lies between two ends each. With these masses as decisions of their own, and no
-stress limited, it is a problem of loads that are affine in what is open, and of mounts: its bounds hold here too.
+The masses that sizes add lie between two ends each. With these masses as decisions, and without limits on stresses, the
+problem has loads affine in its decisions, and mounts. Bounds of that relaxed problem also hold here.
 """
 
 from __future__ import annotations
@@ -29,20 +29,22 @@ from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, spread_starts
 
-STARTS, LOOKS = 2, 6
-"""Searches, and designs looked at before these."""
-ROUGHLY = 1e-2
+STARTS, RANKED_STARTS = 2, 6
+"""Local searches, and start designs that are ranked for them."""
+ROUGH_TOLERANCE = 1e-2
 MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
 
 
 def solve_mounted_sizes(problem: Problem) -> Result:
-    """The best local optimum of a few searches, with a bound."""
+    """Return the best local optimum of a few searches, with a lower bound."""
     started = time.perf_counter()
-    initial, without_mounts = evaluate_start(problem), _on_given_mounts(problem)
+    initial, without_mounts = evaluate_start(problem), _without_mounts(problem)
     check_acts(SizeModel(without_mounts))
     program = LocalProgram.of(problem)
     best = best_local_optimum(
-        program, [*_first(program, without_mounts), *spread_starts(problem)[:LOOKS]], min(problem.search.starts, STARTS)
+        program,
+        [*_starts(program, without_mounts), *spread_starts(problem)[:RANKED_STARTS]],
+        min(problem.search.starts, STARTS),
     )
     design = evaluate_design(problem, program.values(best))
     bound = _bound(problem, design)
@@ -51,71 +53,79 @@ def solve_mounted_sizes(problem: Problem) -> Result:
     return build_result(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
-def _on_given_mounts(problem: Problem) -> Problem:
-    decisions = tuple(d for d in problem.decisions if d not in problem.mount_decisions)
+def _without_mounts(problem: Problem) -> Problem:
+    decisions = tuple(decision for decision in problem.decisions if decision not in problem.mount_decisions)
     terms = tuple(term for term in problem.objective if not term.measure.is_mounting)
     limits = tuple(limit for limit in problem.limits if not limit.measure.is_mounting)
     return replace(problem, decisions=decisions, objective=terms, limits=limits)
 
 
-def _first(program: LocalProgram, without_mounts: Problem) -> list[Array]:
+def _starts(program: LocalProgram, without_mounts: Problem) -> list[Array]:
     problem, start = program.problem, program.shares(program.problem.start)
-    alone = solve_sizes(replace(without_mounts, tolerance=ROUGHLY, search=replace(without_mounts.search, boxes=1)))
-    if not alone.status.has_design:
+    sizes_result = solve_sizes(
+        replace(without_mounts, tolerance=ROUGH_TOLERANCE, search=replace(without_mounts.search, boxes=1))
+    )
+    if not sizes_result.status.has_design:
         return [start]
-    values = dict(zip((d.name for d in without_mounts.decisions), _decided(without_mounts, alone), strict=True))
+    values = dict(
+        zip((d.name for d in without_mounts.decisions), _decision_values(without_mounts, sizes_result), strict=True)
+    )
     return [program.shares([values.get(d.name, d.start) for d in problem.decisions]), start]
 
 
-def _decided(without_mounts: Problem, result: Result) -> list[Value]:
-    """Values of decisions, read back from a result."""
+def _decision_values(without_mounts: Problem, result: Result) -> list[Value]:
+    """Return the values of decisions, read from a result."""
     values = {entry.name: entry.value for entry in result.decisions}
-    rotors = {r.name: r.unbalance for r in result.final.engine.rotors}
-    unbalances = {r.name: r.unbalance for r in result.initial.engine.rotors}
-    out: list[Value] = []
+    rotors = {rotor.name: rotor.unbalance for rotor in result.final.engine.rotors}
+    unbalances = {rotor.name: rotor.unbalance for rotor in result.initial.engine.rotors}
+    values_of_decisions: list[Value] = []
     for decision in without_mounts.decisions:
         if not decision.is_affine:
-            out.append(values[decision.name])
+            values_of_decisions.append(values[decision.name])
             continue
         drive = decision.rotor_drives[0]
-        moved = (rotors[drive.rotor] - unbalances[drive.rotor]) / drive.gain
-        out.append(decision.start + (moved.conjugate() if drive.mirrored else moved))
-    return out
+        change = (rotors[drive.rotor] - unbalances[drive.rotor]) / drive.gain
+        values_of_decisions.append(decision.start + (change.conjugate() if drive.mirrored else change))
+    return values_of_decisions
 
 
 def _bound(problem: Problem, design: Design) -> float:
-    model = SizeModel(_on_given_mounts(problem))
-    of_sizes = any(term.measure.channel.of_engine is not None or _sized(term.measure) for term in problem.objective)
-    if model.moves_rod or of_sizes or design.violation > KEPT:
+    model = SizeModel(_without_mounts(problem))
+    depends_on_sizes = any(
+        term.measure.channel.of_engine is not None or _has_size_factors(term.measure) for term in problem.objective
+    )
+    if model.moves_rod or depends_on_sizes or design.violation > KEPT:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
-    room = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
-    return max(proven(Question(relaxed, design.value, room, near)).bound, mounts_bound(relaxed, near))
+    gap_tolerance = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
+    return max(proven(Question(relaxed, design.value, gap_tolerance, near)).bound, mounts_bound(relaxed, near))
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:
-    """The problem with the masses of its sizes as decisions of their own; and what these are where sizes have values.
+    """Return the problem with the masses of its sizes as decisions, and the values of its decisions for `values`.
 
-    Limits on what sizes make of loads, and on these themselves, are left out.
+    Limits on stresses and on sizes are omitted.
     """
     low, high = model.mass_box
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    at = dict(zip((d.name for d in problem.decisions), values, strict=True))
-    masses = model.masses(np.array([at[d.name].real for d in model.sizes])) - middle
+    values_by_name = dict(zip((d.name for d in problem.decisions), values, strict=True))
+    masses = model.masses(np.array([values_by_name[d.name].real for d in model.sizes])) - middle
     engine = model.with_masses(middle)
     gear = engine.extra(RunningGear)
-    ways = gear.throws if gear is not None else ()
+    directions = gear.throws if gear is not None else ()
     drives: list[tuple[Drive, ...]] = [
         *(tuple(NumberDrive(Kind.PISTON, (part.name, mass)) for part in engine.slider_cranks) for mass in MASSES),
-        tuple(RotorDrive(name, way) for name, way in ways),
+        tuple(RotorDrive(name, direction) for name, direction in directions),
     ]
-    moving = [k for k in range(len(half)) if half[k] > 0.0]
-    of_masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in moving]
-    others = tuple(d for d in problem.decisions if d not in model.sizes)
-    limits = tuple(x for x in problem.limits if x.measure.channel.of_engine is None and not _sized(x.measure))
-    changed = replace(problem, engine=engine, decisions=(*of_masses, *others), limits=limits)
-    return changed, [*(float(masses[k]) for k in moving), *(at[d.name] for d in others)]
+    open_masses = [k for k in range(len(half)) if half[k] > 0.0]
+    mass_decisions = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in open_masses]
+    other_decisions = tuple(d for d in problem.decisions if d not in model.sizes)
+    limits = tuple(
+        x for x in problem.limits if x.measure.channel.of_engine is None and not _has_size_factors(x.measure)
+    )
+    relaxed = replace(problem, engine=engine, decisions=(*mass_decisions, *other_decisions), limits=limits)
+    return relaxed, [*(float(masses[k]) for k in open_masses), *(values_by_name[d.name] for d in other_decisions)]
 
 
-def _sized(measure: Measure) -> bool:
+def _has_size_factors(measure: Measure) -> bool:
     return measure.is_load and measure.load.of_sizes is not None

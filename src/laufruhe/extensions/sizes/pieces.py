@@ -1,4 +1,4 @@
-"""Rows of a measure of sizes that have their factors together (Z12)."""
+"""Pieces of a measure: rows that share their factors of sizes (Z12)."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from laufruhe.numerics.norms.norm import lengths
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Rows of a measure that have their factors together.
+    """Rows of a measure that share their factors.
 
     Attributes
     ----------
     affine
-        Norm that is affine in the columns; rows at the sizes that the problem starts from.
+        Norm affine in the columns; rows at the initial sizes.
     at
-        Index of every operating point in it, its places (all when None) and the rows of each.
+        For each operating point, its index, its place (None for all places) and the count of rows.
     given
-        Factors of these at the start, shape (places, 1 or d) each.
+        Initial factors of each operating point, shape (places, 1 or d).
     """
 
     affine: AffineNorm
@@ -32,37 +32,39 @@ class Piece:
     given: tuple[Array, ...]
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
-        """Return the ratio of all factors to the start's; None where ratios differ."""
-        arrays = [np.ones(1), *(new / old for new, old in zip(factors, self.given, strict=True))][bool(factors) :]
+        """Return the ratio of all factors to the initial ones, or None if the ratios differ."""
+        arrays = [np.ones(1), *(factor / initial for factor, initial in zip(factors, self.given, strict=True))][
+            bool(factors) :
+        ]
         ratios = np.concatenate([array.ravel() for array in arrays])
         return float(ratios[0]) if np.all(ratios == ratios[0]) else None
 
     def scaled(self, factors: Sequence[Array]) -> AffineNorm:
         """Return the norm with other factors."""
-        by = self.by(factors)
-        return replace(self.affine, constant=self.affine.constant * by, slope=self.affine.slope * by[..., None])
+        ratios = self.ratios(factors)
+        return replace(self.affine, constant=self.affine.constant * ratios, slope=self.affine.slope * ratios[..., None])
 
-    def by(self, factors: Sequence[Array]) -> Array:
-        """Return the multiplier of every row for other factors, shape (k, 1 or d)."""
+    def ratios(self, factors: Sequence[Array]) -> Array:
+        """Return the ratio of other factors to the initial ones for each row, shape (k, 1 or d)."""
         parts = zip(factors, self.given, self.at, strict=True)
-        return np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
+        return np.concatenate([np.repeat(factor / initial, rows, axis=0) for factor, initial, (_, _, rows) in parts])
 
     def value(self, factors: Sequence[Array], columns: Array) -> float:
-        """Return the norm with other factors."""
+        """Return the value of the norm with other factors at `columns`."""
         ratio = self.ratio(factors)
         return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
 
     def pruned(self, low: Array, high: Array) -> Piece:
-        """Return the piece of a largest length without rows that are longest for no columns between two."""
+        """Return the piece of a maximum without rows that are largest for no columns between `low` and `high`."""
         affine_rows, reach = self.affine, 0.5 * (high - low)
         size = lengths(affine_rows.rows(low + reach))
-        moved = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
-        longest = size + moved >= (size - moved).max()
+        change = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
+        may_be_largest = size + change >= (size - change).max()
         affine = replace(
             affine_rows,
-            constant=affine_rows.constant[longest],
-            slope=affine_rows.slope[longest],
-            grid=plain(int(longest.sum())),
+            constant=affine_rows.constant[may_be_largest],
+            slope=affine_rows.slope[may_be_largest],
+            grid=plain(int(may_be_largest.sum())),
         )
         return replace(self, affine=affine, at=tuple((k, place, affine.grid.steps) for k, place, _ in self.at))
 

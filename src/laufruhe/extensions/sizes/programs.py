@@ -1,8 +1,8 @@
-"""What dual rows of all that is asked together say of boxes of sizes, where unbalances are open beside these (Z14).
+"""Lower bounds of boxes of sizes by multipliers of the whole problem, if unbalances are open too (Z14).
 
-Rows are affine in masses and unbalances, so that with the masses as decisions of their own between their ends, and
-factors where they are least, a box has a cone program that no design in it goes under. Its dual rows bound the box, and
-with the factors and masses of any other box they bound that one.
+Rows are affine in masses and unbalances. With the masses as further decisions between their ends, and factors at their
+minimum, a box has a cone program whose optimum is a lower bound. Its multipliers bound the box, and with the factors
+and masses of any other box they bound that one.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Grouped, SizeNumber, SizeReach, corner, minimum_of
+from laufruhe.extensions.sizes.bundles import GroupedRows, SizeNumber, SizeReach, corner, minimum_of
 from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.machine import Engine
@@ -24,41 +24,43 @@ from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
 from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, interpolate_duals, minorant
 
-Ask: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | None, Multipliers]]
-"""A decision vector of a program, None where none is allowed, and dual rows, roughly unless told; none is trusted."""
+ProposeMultipliers: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | None, Multipliers]]
+"""Function (program, exactly) that proposes an optimum, or None if infeasible, and multipliers; neither is trusted."""
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """<Z, V> of all that is asked, less limits times their prices (P4).
+class CombinedMultipliers:
+    """<Z, V> of all terms and limits, less limits times their prices (P4).
 
     Attributes
     ----------
+    parts
+        Measures with the groups of their pieces.
     constant
-        Prices times limits, taken off.
+        Sum of prices times limits.
     size
-        Size of the terms of that difference, by which a rounding is judged.
+        Sum of the absolute terms, which scales rounding errors.
     excludes
-        Whether no terms are in it: where it is more than nothing no design is allowed.
+        True without terms: a positive value then proves that no design is feasible.
     """
 
-    parts: tuple[tuple[SizeNumber, tuple[Grouped, ...]], ...]
+    parts: tuple[tuple[SizeNumber, tuple[GroupedRows, ...]], ...]
     constant: float
     size: float
     excludes: bool
 
 
 class SizePrograms:
-    """Programs of boxes.
+    """Cone programs of boxes.
 
     Parameters
     ----------
     terms
         Weights, and measures of loads and masses.
     limits
-        The most that others may be.
+        Upper limits, and their measures.
     ask
-        Function that proposes dual rows.
+        Function that proposes multipliers.
     """
 
     def __init__(
@@ -66,28 +68,30 @@ class SizePrograms:
         model: SizeModel,
         terms: Sequence[tuple[float, SizeNumber]],
         limits: Sequence[tuple[float, SizeNumber]],
-        ask: Ask,
+        ask: ProposeMultipliers,
     ) -> None:
         self._model, self._terms, self._limits, self._ask = model, tuple(terms), tuple(limits), ask
 
-    def learned(self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False) -> Together | None:
-        """Return the dual rows of a box's program; None where they bound nothing."""
+    def multipliers_of(
+        self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False
+    ) -> CombinedMultipliers | None:
+        """Return multipliers from a box's program, or None if they bound nothing."""
         program = self.program(lower, upper, reach)
         x, multipliers = self._ask(program, exactly)
         if x is None and not exactly:
-            # that a few rows of a mean cannot be met says nothing of all of them
+            # coarse samples of a mean may be infeasible although the mean itself is not
             x, multipliers = self._ask(program, True)
         if x is not None:
-            return self._together(program, best_bound(program, x, multipliers).multipliers) if program.terms else None
+            return self._combined(program, best_bound(program, x, multipliers).multipliers) if program.terms else None
         stripped = replace(program, terms=())
-        return self._together(stripped, minorant(stripped, interpolate_duals(stripped, multipliers)).multipliers)
+        return self._combined(stripped, minorant(stripped, interpolate_duals(stripped, multipliers)).multipliers)
 
     def program(self, lower: Array, upper: Array, reach: SizeReach) -> AffineProblem:
-        """Return the program of a box: its masses as decisions beside the unbalances, factors where they are least."""
+        """Return the program of a box: masses as decisions before the unbalances, factors at their minimum."""
         half = 0.5 * (reach.high - reach.low)
-        moving = [int(k) for k in np.flatnonzero(half > 0.0)]
-        masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, ()) for k in moving]
-        columns = [*moving, *range(MASSES, MASSES + len(self._model.start))]
+        open_masses = [int(k) for k in np.flatnonzero(half > 0.0)]
+        masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, ()) for k in open_masses]
+        columns = [*open_masses, *range(MASSES, MASSES + len(self._model.start))]
 
         def norm(number: SizeNumber) -> AffineNorm:
             rows = self._rows(number, self._engine(number, lower, upper), reach)
@@ -110,11 +114,13 @@ class SizePrograms:
         return rows
 
     def _engine(self, number: SizeNumber, lower: Array, upper: Array) -> Engine:
-        moves = np.any(number.ways)
-        return self._model.engine(corner(number.ways, lower, upper)) if moves else self._model.problem.engine
+        has_factors = np.any(number.monotonicity)
+        return (
+            self._model.engine(corner(number.monotonicity, lower, upper)) if has_factors else self._model.problem.engine
+        )
 
-    def _together(self, program: AffineProblem, rows: Multipliers) -> Together:
-        """Return the dual rows of a box's program, at the factors of the start."""
+    def _combined(self, program: AffineProblem, rows: Multipliers) -> CombinedMultipliers:
+        """Return the combined multipliers of a box's program, at the initial factors."""
         weighted = [(number, weight * z) for (weight, number), z in zip(self._terms, rows.terms, strict=False)]
         prices, constant, size = replace(rows, terms=()).shadow_prices(program), 0.0, 0.0
         limits = zip(self._limits, program.limits, rows.limits, prices, strict=True)
@@ -127,23 +133,23 @@ class SizePrograms:
         for number, z in weighted:
             cuts = np.cumsum([bundle.lengths.constant.shape[1] for bundle in number.pieces])[:-1]
             bundles = zip(number.pieces, np.split(z, cuts), strict=True)
-            parts.append((number, tuple(Grouped.from_rows(bundle.lengths, rows) for bundle, rows in bundles)))
-        return Together(tuple(parts), constant, size, not rows.terms)
+            parts.append((number, tuple(GroupedRows.from_rows(bundle.lengths, rows) for bundle, rows in bundles)))
+        return CombinedMultipliers(tuple(parts), constant, size, not rows.terms)
 
-    def minimum(self, known: Together, lower: Array, upper: Array, reach: SizeReach) -> float:
-        """Return the bound of a box from dual rows; infinite where they exclude it."""
-        if not known.parts:
+    def minimum(self, multipliers: CombinedMultipliers, lower: Array, upper: Array, reach: SizeReach) -> float:
+        """Return the lower bound of a box from multipliers; infinite if they exclude it."""
+        if not multipliers.parts:
             return 0.0
-        total, rest, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))
-        for number, groups in known.parts:
+        total, remainder, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))
+        for number, groups in multipliers.parts:
             engine = self._engine(number, lower, upper)
             for group in groups:
-                function, maximum = group.weighed(self._model.factors(group.lengths.piece, number.measure, engine))
+                function, maximum = group.with_factors(self._model.factors(group.lengths.piece, number.measure, engine))
                 total = total + function
-                rest = rest + group.price * maximum * group.lengths.rest
+                remainder = remainder + group.price * maximum * group.lengths.rest
                 terms = group.lengths.terms(*reach.rod)
-        total[:, 0] -= known.constant
-        value = float(minimum_of(total[None], terms, rest, reach)[0])
-        if known.excludes:
-            return math.inf if value > ROUNDING * known.size else 0.0
+        total[:, 0] -= multipliers.constant
+        value = float(minimum_of(total[None], terms, remainder, reach)[0])
+        if multipliers.excludes:
+            return math.inf if value > ROUNDING * multipliers.size else 0.0
         return value

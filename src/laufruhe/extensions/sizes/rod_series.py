@@ -1,8 +1,8 @@
-"""Rows of a load over the length l of the rod, as Chebyshev series of 1 / l (Z13).
+"""Rows of a load over the rod length l, as Chebyshev series of 1 / l (Z13).
 
-Where no bend of a load moves with the length of the rod, the load is an analytic function of r / l as far as that is
-under one: its series between two lengths falls off by the same share with every term. The exact model tells its terms
-at as many lengths; the last of them, and two lengths between, tell what is left.
+If no kink of a load moves with the rod length, the load is an analytic function of r / l for r / l < 1. Its series
+between two lengths then converges geometrically. The exact model at as many lengths gives the terms; the last terms,
+and two lengths between the nodes, give a bound of the remainder.
 """
 
 from __future__ import annotations
@@ -17,28 +17,28 @@ from laufruhe.extensions.sizes.pieces import Piece
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.arrays import Array, Mask
 
-TERMS, BETWEEN = 20, (0.13, 0.71)
-"""Terms of a series, and where between its ends it is held against the exact model."""
-LAST, TIMES = 2, 10.0
-"""Terms by which the rest is judged, and how many times as large it is taken."""
+TERMS, CHECKED = 20, (0.13, 0.71)
+"""Terms of a series, and relative positions at which it is compared with the exact model."""
+LAST_TERMS, SAFETY = 2, 10.0
+"""Last terms that estimate the remainder, and safety factor."""
 CONVERGED = 1e-6
-"""Share of a load that the rest may be."""
+"""Largest remainder, as a share of the load."""
 
 
 @dataclass(frozen=True, eq=False)
 class RodSeries:
-    """Piece of a measure at any length of the rod.
+    """Rows of a piece of a measure as functions of the rod length.
 
     Attributes
     ----------
     piece
-        Piece at the length that the problem starts from, whose factors its rows have at every length.
+        Piece at the initial length; its rows have the initial factors at all lengths.
     low, high
-        Lengths between which it is known [m].
+        Range of lengths [m].
     constant, slope
         Rows at the nodes, shapes (n, k, d) and (n, k, d, columns).
     rest
-        Bound of the norm of the rest of the series: for the constant, then for each unit of a column.
+        Bound of the norm of the remainder: for the constant, then for one unit of each column, shape (1 + columns,).
     """
 
     piece: Piece
@@ -50,23 +50,23 @@ class RodSeries:
 
     @classmethod
     def fixed(cls, piece: Piece, length: float) -> RodSeries:
-        """Return the series for a fixed rod length: one term, and no rest."""
+        """Return the series for a fixed rod length: one term, no remainder."""
         affine = piece.affine
         return cls(
             piece, length, length, affine.constant[None], affine.slope[None], np.zeros(1 + affine.slope.shape[-1])
         )
 
     def at_length(self, length: float) -> AffineNorm:
-        """Return the rows at one length."""
+        """Return the norm at one rod length [m]."""
         (shares,) = _shares(np.array([self._place(length)]), len(self.constant))
         constant = np.tensordot(shares, self.constant, axes=1)
         return replace(self.piece.affine, constant=constant, slope=np.tensordot(shares, self.slope, axes=1))
 
     def scaled(self, factors: Sequence[Array]) -> RodSeries:
         """Return the series with other factors of its rows."""
-        by = self.piece.by(factors)
-        rest = self.rest * float(np.abs(by).max(initial=0.0))
-        return replace(self, constant=self.constant * by, slope=self.slope * by[..., None], rest=rest)
+        ratios = self.piece.ratios(factors)
+        remainder = self.rest * float(np.abs(ratios).max(initial=0.0))
+        return replace(self, constant=self.constant * ratios, slope=self.slope * ratios[..., None], rest=remainder)
 
     def pulled(self, z: Array) -> Array:
         """Return <Z, V> at the nodes: for the constant, then for each column, shape (n, 1 + columns)."""
@@ -75,7 +75,7 @@ class RodSeries:
         return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], columns], axis=1)
 
     def terms(self, low: float, high: float) -> Array:
-        """Return the matrix from values at the nodes to the terms between two lengths, shape (n, n)."""
+        """Return the matrix from values at the nodes to the series between two lengths, shape (n, n)."""
         count = len(self.constant)
         return _terms(count) @ _shares(np.array([self._place(at) for at in _lengths(low, high, count)]), count)
 
@@ -89,61 +89,69 @@ class RodSeries:
 def rod_series(
     pieces: Callable[[float], Sequence[Piece]], start: float, low: float, high: float, masks: Sequence[Mask]
 ) -> list[RodSeries]:
-    """Return the series of every piece of a measure between two lengths of the rod.
+    """Return the series of each piece of a measure between two rod lengths.
 
     Parameters
     ----------
     pieces
         Function from a length to the pieces with all their rows.
     start
-        The length whose factors all rows get.
-    kept
-        Rows of each that no bend passes between the lengths; the others count as nothing, which is never too much.
+        Initial length, whose factors all rows get.
+    low, high
+        Range of lengths [m].
+    masks
+        Rows of each piece that no kink passes; the other rows are set to zero, which keeps the bounds valid.
 
     Raises
     ------
     ValueError
-        If the series of a load does not end: a bend of it moves with the length.
+        If a series does not converge, because a kink of a load moves with the length.
     """
     start_pieces = pieces(start)
-    at_nodes = [_like(start_pieces, pieces(length), masks) for length in _lengths(low, high, TERMS)]
+    at_nodes = [_with_initial_factors(start_pieces, pieces(length), masks) for length in _lengths(low, high, TERMS)]
     series = []
     for k, piece in enumerate(start_pieces):
-        constant, slope = (np.stack([getattr(at[k], part) for at in at_nodes]) for part in ("constant", "slope"))
+        constant, slope = (np.stack([getattr(node[k], part) for node in at_nodes]) for part in ("constant", "slope"))
         series.append(RodSeries(piece, low, high, constant, slope, np.zeros(0)))
-    between = [low + share * (high - low) for share in BETWEEN]
-    exact = [_like(start_pieces, pieces(length), masks) for length in between]
-    return [_with_rest(one, between, [at[k] for at in exact]) for k, one in enumerate(series)]
+    between = [low + share * (high - low) for share in CHECKED]
+    exact = [_with_initial_factors(start_pieces, pieces(length), masks) for length in between]
+    return [_with_remainder(term, between, [pieces_at[k] for pieces_at in exact]) for k, term in enumerate(series)]
 
 
-def _like(start_pieces: Sequence[Piece], pieces: Sequence[Piece], masks: Sequence[Mask]) -> list[AffineNorm]:
-    alike = [
+def _with_initial_factors(
+    start_pieces: Sequence[Piece], pieces: Sequence[Piece], masks: Sequence[Mask]
+) -> list[AffineNorm]:
+    norms = [
         norm.scaled(piece.given) if piece.given else norm.affine
         for piece, norm in zip(start_pieces, pieces, strict=True)
     ]
     return [
         replace(norm, constant=norm.constant * rows[:, None], slope=norm.slope * rows[:, None, None])
-        for norm, rows in zip(alike, masks, strict=True)
+        for norm, rows in zip(norms, masks, strict=True)
     ]
 
 
-def _with_rest(series_at: RodSeries, lengths: Sequence[float], exact: Sequence[AffineNorm]) -> RodSeries:
+def _with_remainder(series_at: RodSeries, lengths: Sequence[float], exact: Sequence[AffineNorm]) -> RodSeries:
     def size(rows: Array) -> float:
         return series_at.piece.affine.norm.value(series_at.piece.affine.grid, rows)
 
-    rest = []
+    remainders = []
     parts = [series_at.constant, *np.moveaxis(series_at.slope, -1, 0)]
     for part, j in zip(parts, range(-1, series_at.slope.shape[-1]), strict=True):
         series = np.tensordot(_terms(TERMS), part, axes=1)
-        left = max(size(term) for term in series[-LAST:])
-        for length, known in zip(lengths, exact, strict=True):
-            at, true = series_at.at_length(length), known
-            pairs = (at.constant, true.constant) if j < 0 else (at.slope[..., j], true.slope[..., j])
-            left = max(left, size(pairs[0] - pairs[1]))
-        if TIMES * left > CONVERGED * max(map(size, series)):
+        remainder = max(size(term) for term in series[-LAST_TERMS:])
+        for length, length_norm in zip(lengths, exact, strict=True):
+            computed, exact_norm = series_at.at_length(length), length_norm
+            pairs = (
+                (computed.constant, exact_norm.constant)
+                if j < 0
+                else (computed.slope[..., j], exact_norm.slope[..., j])
+            )
+            remainder = max(remainder, size(pairs[0] - pairs[1]))
+        if SAFETY * remainder > CONVERGED * max(map(size, series)):
             raise ValueError("a bend of a load moves with the length of the rod")
-        rest.append(TIMES * left)
-    return replace(series_at, rest=np.array(rest))
+        remainders.append(SAFETY * remainder)
+    return replace(series_at, rest=np.array(remainders))
 
 
 def _lengths(low: float, high: float, count: int) -> list[float]:

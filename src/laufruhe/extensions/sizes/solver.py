@@ -1,4 +1,4 @@
-"""Deciding sizes of the running gear, and unbalances with them: local programs propose, boxes prove (Z12, Z14)."""
+"""Optimum of sizes of the running gear, and of unbalances with them: local programs propose, boxes prove (Z12, Z14)."""
 
 from __future__ import annotations
 
@@ -29,91 +29,95 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
 
 MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
-"""Boxes where the length of the rod is open, which take ten times as long, and where each has cone programs."""
+"""Most boxes if the rod length is open, which takes ten times as long, and if each box has cone programs."""
 STARTS = 3
-# angles at the least at which programs of boxes stand, roughly and where little is to be shown
+# fewest samples of the programs of boxes: rough, and for a small gap
 FEW_STEPS, MANY_STEPS = 180, 720
-# relative room that local programs leave inside limits, a part of what counts as kept
-INSIDE = 1e-7
+# relative margin of local programs inside limits, below the feasibility tolerance
+MARGIN = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
 class SizeProgram(LocalProgram):
-    """Objective and rooms by the model of sizes, which is the exact one at the angles of the results."""
+    """Local program of the size model, which is exact at the samples of the results."""
 
     model: SizeModel
 
     @classmethod
     def from_model(cls, model: SizeModel) -> SizeProgram:
-        """Over the bounds of all that is open."""
+        """Return the program over the bounds of all open numbers."""
         program = LocalProgram.of(model.problem)
         return cls(program.problem, program.lower, program.upper, model)
 
     @cached_property
     def sized(self) -> Mask:
-        """Which columns are sizes."""
+        """Mask of the columns that are sizes, shape (columns,)."""
         return np.concatenate([np.full(d.width, d.decision in self.model.sizes, dtype=bool) for d in self.domains])
 
     def numbers(self, shares: Array) -> Array:
-        """The objective, then the relative room inside each limit, and inside each sector."""
+        """Return the objective, then the relative margin of each limit and of each sector."""
         columns, problem = self.columns(shares), self.problem
-        x, u = columns[self.sized], columns[~self.sized]
-        value = sum(term.weight * self.model.value(term.measure, x, u) for term in problem.objective)
-        rooms = [limit.room(self.model.value(limit.measure, x, u))[0] - INSIDE for limit in problem.limits]
-        return np.array([value, *rooms, *self.edges(shares)])
+        sizes, unbalances = columns[self.sized], columns[~self.sized]
+        value = sum(term.weight * self.model.value(term.measure, sizes, unbalances) for term in problem.objective)
+        margins = [
+            limit.room(self.model.value(limit.measure, sizes, unbalances))[0] - MARGIN for limit in problem.limits
+        ]
+        return np.array([value, *margins, *self.edges(shares)])
 
     def place(self, values: Array) -> Array:
-        """The best unbalances with sizes given."""
+        """Return the point with the best unbalances for sizes."""
         return self.balanced(values)
 
     def balanced(self, sizes: Array) -> Array:
-        """Shares with these sizes and the best unbalances there."""
-        problem, named = self.problem, self.model.sizes
+        """Return the point with these sizes [m] and the best unbalances for them."""
+        problem, size_decisions = self.problem, self.model.sizes
         if not self.model.domains:
             return self.shares(sizes)
         start_sizes = [float(x) for x in sizes]
-        fixed = replace(problem, engine=problem.design(start_sizes, named), decisions=problem.unbalances)
-        where: dict[str, Value] = dict(zip((d.name for d in named), start_sizes, strict=True))
-        return self.shares(rebalance(problem, fixed, where).design.values)
+        fixed = replace(problem, engine=problem.design(start_sizes, size_decisions), decisions=problem.unbalances)
+        values_by_name: dict[str, Value] = dict(zip((d.name for d in size_decisions), start_sizes, strict=True))
+        return self.shares(rebalance(problem, fixed, values_by_name).design.values)
 
 
 def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
-    """The best sizes and unbalances, proven where bounds of boxes close; or the limits that no sizes keep.
+    """Return the optimal sizes and unbalances with their proof, or the limits that no sizes satisfy.
 
     Parameters
     ----------
     known
-        Value of another design: where one is allowed here, that none of them is better is enough.
+        Value of another design: if this problem has a feasible design, a bound above `known` is enough.
 
     Raises
     ------
     ModelError
-        If nothing that is asked hangs on a size that is open.
+        If no measure depends on an open size.
     """
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
     check_acts(model)
     program = SizeProgram.from_model(model)
-    best = _proposed(program)
+    optimum = _proposed(program)
     boxes: SizeBoxes | None = None
     with suppress(ValueError):
         boxes = SizeBoxes(model, solve_cone_program)
 
-    def bounded(value: float, room: float, design: Design) -> BoxResult:
-        usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
-        maximum = problem.search.boxes_or(usual)
+    def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
+        default_budget = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
+        maximum = problem.search.boxes_or(default_budget)
         if boxes is None:
             return BoxResult(0.0, 0)
         if known < value < math.inf:
-            # a room is a share of the value
-            value, room = known, room * known / value
+            # the gap tolerance is a share of the value
+            value, gap_tolerance = known, gap_tolerance * known / value
         place = program.columns(program.shares(design.values))[program.sized]
-        return divided_sizes(boxes, value, room, maximum, known_of(design, place) if value < math.inf else None)
+        return divided_sizes(
+            boxes, value, gap_tolerance, maximum, known_of(design, place) if value < math.inf else None
+        )
 
-    outcome = proven(program, best, bounded)
+    outcome = proven(program, optimum, bounded)
     if boxes is not None and outcome.excludes_all:
         conflict = smallest_conflict(
-            problem.limits, lambda limits: divided_sizes(boxes.keeping(limits), math.inf, 0.0, 64).bound == math.inf
+            problem.limits, lambda limits: divided_sizes(boxes.with_limits(limits), math.inf, 0.0, 64).bound == math.inf
         )
         return infeasible_result(problem, initial, conflict, {"solve": time.perf_counter() - started})
     if boxes is not None:
@@ -130,40 +134,40 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
 
 def _proposed(program: SizeProgram) -> Array:
     problem = program.problem
-    first = program.shares(problem.start)
-    starts = [first, np.ones(len(first)), *spread_starts(problem)]
+    initial = program.shares(problem.start)
+    starts = [initial, np.ones(len(initial)), *spread_starts(problem)]
     if program.model.domains:
         sizes = [program.columns(start)[program.sized] for start in starts[:2]]
-        starts = [*(program.balanced(one) for one in sizes), *starts]
+        starts = [*(program.balanced(start_sizes) for start_sizes in sizes), *starts]
     best = best_local_optimum(program, starts, min(problem.search.starts, STARTS))
     return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
 
 
 def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
-    """A program's decision vector and dual rows, at few angles, or at as many as tell all but all."""
+    """Return the optimum of a program or None, and multipliers, at few samples or `exactly` at many."""
     steps = MANY_STEPS if exactly else FEW_STEPS
-    fewer = replace(
+    coarse = replace(
         program,
-        terms=tuple((weight, _thinned(norm, steps)) for weight, norm in program.terms),
-        limits=tuple((maximum, _thinned(norm, steps)) for maximum, norm in program.limits),
+        terms=tuple((weight, _coarser(norm, steps)) for weight, norm in program.terms),
+        limits=tuple((maximum, _coarser(norm, steps)) for maximum, norm in program.limits),
     )
-    solution = solve_cones(fewer)
+    solution = solve_cones(coarse)
     return solution.x, solution.multipliers
 
 
-def _thinned(norm: AffineNorm, steps: int) -> AffineNorm:
+def _coarser(norm: AffineNorm, steps: int) -> AffineNorm:
     grid = norm.grid
-    thin = max((n for n in range(1, grid.steps // steps + 1) if grid.steps % n == 0), default=1)
-    if not norm.norm.averages or grid.bends or thin == 1:
+    stride = max((n for n in range(1, grid.steps // steps + 1) if grid.steps % n == 0), default=1)
+    if not norm.norm.averages or grid.bends or stride == 1:
         return norm
-    weights = thin * grid.weights[::thin]
+    weights = stride * grid.weights[::stride]
     return replace(
-        norm, constant=norm.constant[::thin], slope=norm.slope[::thin], grid=Grid(weights, grid.steps // thin)
+        norm, constant=norm.constant[::stride], slope=norm.slope[::stride], grid=Grid(weights, grid.steps // stride)
     )
 
 
 def check_acts(model: SizeModel) -> None:
-    """Refuse a size that nothing asked hangs on."""
+    """Raise ModelError for a size that no measure depends on."""
     measures = dict.fromkeys(model.problem.measures)
     for k, decision in enumerate(model.sizes):
         middle = 0.5 * (model.lower + model.upper)

@@ -1,6 +1,6 @@
-"""Stars, firing orders and shafts beside sizes of the running gear: each star a problem of its own (Z12, Z14).
+"""Crank stars, firing orders and shafts with open sizes of the running gear: a problem for each star (Z12, Z14).
 
-What is known of one star bounds the others: none of their designs has to be found that is no better.
+The best value so far bounds the search of the next star.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MOST_STARS = 60
-"""That are decided one by one."""
+"""Most stars that are solved one by one."""
 
 
 def solve_star_sizes(problem: Problem) -> Result:
-    """The best star with its best sizes and unbalances.
+    """Return the best star with its optimal sizes and unbalances.
 
     Raises
     ------

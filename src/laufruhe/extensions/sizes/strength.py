@@ -1,8 +1,8 @@
-"""Loads on the sections of the running gear, and stresses by their sizes (Z1-Z9).
+"""Loads on the sections of the running gear, and their stresses (Z1-Z9).
 
-Every stress is a load inside the crankcase, linear in the masses, times a factor of the sizes alone. The crankshaft is
-cut in the middle of its journals, as the simple calculation of the sources has it (textbook 10.3; worked diesel G, H):
-pieces between neighbouring bearings carry what stands on them, each simply supported.
+A stress is a load inside the crankcase, linear in the masses, times a factor of the sizes alone. The crankshaft is cut
+in the middle of its journals, as in the simple calculation of the sources (textbook 10.3; worked diesel G, H): the
+pieces between neighbouring bearings carry the loads on them, each simply supported.
 """
 
 from __future__ import annotations
@@ -36,22 +36,22 @@ from laufruhe.physics.torque import crank_torque
 
 T = TypeVar("T")
 
-# shear strain energy: a shear stress counts as so much of a normal one (textbook 10.3)
+# shear strain energy: equivalent normal stress over shear stress (textbook 10.3)
 SHEAR = math.sqrt(3.0)
-# how far loads lie apart in bosses and small end lessens the bending of a piston pin (textbook, example to eq. 93)
+# the width of bosses and small end reduces the bending of a piston pin (textbook, example to eq. 93)
 SPREAD = 2.0 / 3.0
 
 
-# loads, that sizes do not move but by their masses
+# loads: sizes change them through their masses alone
 
 
 def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the bending moment in the middle of every crank pin, shape (n, cylinders, 3), along its force (Z3).
+    """Return the bending moment in the middle of each crank pin [N m], along its force, shape (n, cylinders, 3) (Z3).
 
     Raises
     ------
     ModelError
-        If a pin has no main bearing on either side.
+        If a pin lacks a main bearing on one side.
     """
     spans = [_span(engine, part) for part in engine.slider_cranks]
     return _shared(engine, point, fidelity, [partial(_moment, part.x, *span) for part, span in zip(
@@ -59,48 +59,55 @@ def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 
 def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the bearing forces before and behind every throw by its own piece of shaft, (n, 2 cylinders, 3) (Z4).
+    """Return the bearing forces beside each throw [N], by its own piece of shaft, shape (n, 2 cylinders, 3) (Z4).
 
     Raises
     ------
     ModelError
-        As `pin_moments`, and if two throws stand on one piece.
+        If a pin lacks a main bearing on one side, or two throws share one piece of shaft.
     """
     shares: list[Callable[[float], float]] = []
     for part in engine.slider_cranks:
         front, rear = _span(engine, part)
-        for other in engine.slider_cranks:
-            if other.shaft == part.shaft and _within(other.x, front, rear) and not _on_one_throw(part, other):
+        for neighbour in engine.slider_cranks:
+            if (
+                neighbour.shaft == part.shaft
+                and _within(neighbour.x, front, rear)
+                and not _on_one_throw(part, neighbour)
+            ):
                 raise ModelError(
-                    f"{part.name} and {other.name} have no main bearing between them; webs are sized between two each"
+                    f"{part.name} and {neighbour.name} have no main bearing between them; "
+                    "webs are sized between two each"
                 )
         shares += [partial(_lever, front.x, rear.x), partial(_lever, rear.x, front.x)]
     return _shared(engine, point, fidelity, shares)
 
 
 def journal_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the torque through every main bearing by the throws before it, (n, bearings), output at the rear (Z5)."""
+    """Return the torque through each main bearing [N m], output at the rear, shape (n, bearings) (Z5)."""
     return _torques(engine, point, fidelity, [bearing.x for bearing in engine.bearings])
 
 
 def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return bending force and torque of the journals beside every throw, shape (n, 2 cylinders, 4) (Z6)."""
+    """Return bending force [N] and torque [N m] of the journals beside each throw, shape (n, 2 cylinders, 4) (Z6)."""
     forces = side_forces(engine, point, fidelity)
     places = [bearing.x for part in engine.slider_cranks for bearing in _span(engine, part)]
     torques = _torques(engine, point, fidelity, places)
-    onto, last = np.eye(3, 4), np.eye(4)[3]
-    return forces.mapped(lambda own: own @ onto) + torques.mapped(lambda own: own[..., None] * last)
+    force_columns, torque_column = np.eye(3, 4), np.eye(4)[3]
+    return forces.mapped(lambda values: values @ force_columns) + torques.mapped(
+        lambda values: values[..., None] * torque_column
+    )
 
 
 def cap_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the pull of masses alone on the big-end caps, as during gas exchange, (n, cylinders, 3) (Z8)."""
+    """Return the pull of inertia alone on the big-end caps [N], as in gas exchange, shape (n, cylinders, 3) (Z8)."""
     return pin_forces(engine, replace(point, gas=None), fidelity)
 
 
 def _shared(
     engine: Engine, point: OperatingPoint, fidelity: Fidelity, shares: Sequence[Callable[[float], float]]
 ) -> Spectrum:
-    """Return sums of loads of rods, webs and weights, each times a share by its place along the crankshaft."""
+    """Return sums of loads of rods, webs and weights, each times a function of its position along the crankshaft."""
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
         raise ModelError("sections are sized of engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
@@ -157,11 +164,11 @@ def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
     return (front.x - section) * _lever(front.x, rear.x, x)
 
 
-# factors, of the sizes alone
+# factors: functions of the sizes alone
 
 
 def gear_of(engine: Engine) -> RunningGear:
-    """Return the running gear of an engine, which must have one."""
+    """Return the running gear of an engine; raise ModelError if it has none."""
     gear = engine.extra(RunningGear)
     if gear is None:
         raise ModelError("sizes of the running gear are asked for, and none are given; add [running_gear]")
@@ -169,12 +176,12 @@ def gear_of(engine: Engine) -> RunningGear:
 
 
 def big_end_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal section modulus of every crank pin [1/m3] (Z3)."""
+    """Return the reciprocal section modulus of each crank pin [1/m3], shape (cylinders,) (Z3)."""
     return np.array([1.0 / round_modulus(_pin_size(part)[0]) for part in engine.slider_cranks])
 
 
 def web_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the web stress per newton on its side, bending plus pressure at its edge, (2 cylinders,) (Z4)."""
+    """Return the web stress per force on its side [1/m2]: bending plus pressure, shape (2 cylinders,) (Z4)."""
     webs = _part(engine, "webs", Webs)
     factors = []
     for part in engine.slider_cranks:
@@ -186,12 +193,12 @@ def web_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal torsion modulus of every journal [1/m3] (Z5)."""
+    """Return the reciprocal torsion modulus of each journal [1/m3], shape (bearings,) (Z5)."""
     return np.array([0.5 / round_modulus(_journal(bearing)[0]) for bearing in engine.bearings])
 
 
 def side_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return edge stresses per force and torque of the journals beside a throw, shape (2 cylinders, 4) (Z6)."""
+    """Return edge stresses per force and torque of the journals beside each throw, shape (2 cylinders, 4) (Z6)."""
     rows = []
     for part in engine.slider_cranks:
         for diameter, width in map(_journal, _span(engine, part)):
@@ -201,39 +208,39 @@ def side_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def rod_stress_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal section of every rod [1/m2] (Z7)."""
+    """Return the reciprocal section of each rod [1/m2], shape (cylinders,) (Z7)."""
     return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "rod", Shank).area)
 
 
 def buckling_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal buckling load of every rod, both ends hinged [1/N] (Z7; worked diesel H.a)."""
+    """Return the reciprocal buckling load of each rod, hinged at both ends [1/N] (Z7; worked diesel H.a)."""
     stiffness = math.pi**2 * gear_of(engine).elastic_modulus * _part(engine, "rod", Shank).inertia
     return np.array([part.rod_length**2 / stiffness for part in engine.slider_cranks])
 
 
 def bolt_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal bolt section of every big end [1/m2] (Z8)."""
+    """Return the reciprocal bolt section of each big end [1/m2], shape (cylinders,) (Z8)."""
     return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "bolts", Bolts).area)
 
 
 def boss_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the reciprocal boss area of every piston pin [1/m2] (Z9; eq. 92)."""
+    """Return the reciprocal boss area of each piston pin [1/m2], shape (cylinders,) (Z9; eq. 92)."""
     return _of_pins(engine, lambda pin: 1.0 / pin.boss_area)
 
 
 def pin_bending_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the bending stress of every piston pin per newton [1/m2] (Z9)."""
+    """Return the bending stress of each piston pin per force [1/m2], shape (cylinders,) (Z9)."""
     return _of_pins(engine, lambda pin: SPREAD * 0.25 * pin.span / round_modulus(pin.diameter, pin.bore))
 
 
 def deflection_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the deflection of every piston pin per newton [m/N] (Z9; eq. 93)."""
+    """Return the deflection of each piston pin per force [m/N], shape (cylinders,) (Z9; eq. 93)."""
     modulus = gear_of(engine).elastic_modulus
     return _of_pins(engine, lambda pin: SPREAD * pin.span**3 / (48.0 * modulus * round_inertia(pin.diameter, pin.bore)))
 
 
 def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return the ovalisation of every piston pin per newton [m/N] (Z9; eq. 94)."""
+    """Return the ovalisation of each piston pin per force [m/N], shape (cylinders,) (Z9; eq. 94)."""
     modulus = gear_of(engine).elastic_modulus
 
     def factor(pin: PistonPin) -> float:
@@ -244,21 +251,21 @@ def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def journal_speeds(engine: Engine, point: OperatingPoint) -> Array:
-    """Return the speed of every journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
+    """Return the surface speed of each journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
     sizes = [(_journal(bearing), abs(bearing.shaft.ratio)) for bearing in engine.bearings]
     return np.array([0.5 * ratio * point.speed * d / (d * width) for (d, width), ratio in sizes])
 
 
 def throw_clearance(engine: Engine) -> float:
-    """Return the least space that pin, webs and half journals leave between two main bearings [m] (Z11)."""
+    """Return the smallest axial clearance of pin, webs and half journals between main bearings [m] (Z11)."""
     thickness = _part(engine, "webs", Webs).thickness
-    rooms = []
+    clearances = []
     for part in engine.slider_cranks:
         bearings = _span(engine, part)
         for bearing in bearings:
-            room = abs(bearing.x - part.x) - 0.5 * (_pin_size(part)[1] + _journal(bearing)[1])
-            rooms.append(room - thickness)
-    return min(rooms)
+            space = abs(bearing.x - part.x) - 0.5 * (_pin_size(part)[1] + _journal(bearing)[1])
+            clearances.append(space - thickness)
+    return min(clearances)
 
 
 def gear_mass(engine: Engine) -> float:
@@ -287,10 +294,10 @@ def _of_pins(engine: Engine, factor: Callable[[PistonPin], float]) -> Array:
 
 
 def _part(engine: Engine, name: str, kind: type[T]) -> T:
-    one = gear_of(engine).part(name)
-    if not isinstance(one, kind):
+    part = gear_of(engine).part(name)
+    if not isinstance(part, kind):
         raise TypeError(f"{name} is no {kind.__name__}")
-    return one
+    return part
 
 
 def _pin_size(part: SliderCrank) -> tuple[float, float]:
