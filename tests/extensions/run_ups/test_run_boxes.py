@@ -13,7 +13,7 @@ import pytest
 
 import laufruhe
 from lanes import first_fast
-from laufruhe.extensions.run_ups.boxes import RunBoxes, _Look, bounds_runs
+from laufruhe.extensions.run_ups.boxes import RunBoxes, _RunBounds, bounds_runs
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
 from laufruhe.extensions.run_ups.dampers import pairs_of, roots
 from laufruhe.extensions.run_ups.linear_run import LinearRun
@@ -170,8 +170,8 @@ def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
     slopes = rng.normal(size=(boxes, sides, places, times)) * rng.uniform(0.1, 2.0, (boxes, 1, places, times))
     bent = rng.random((boxes, len(pairs), places, times))
     rest = rng.random((boxes, places, times))
-    look = _Look.__new__(_Look)
-    look._of = SimpleNamespace(first=rng.normal(size=(boxes, sides, 2, 2)))
+    look = _RunBounds.__new__(_RunBounds)
+    look._equations = SimpleNamespace(first=rng.normal(size=(boxes, sides, 2, 2)))
     look._steps = SimpleNamespace(pairs=pairs)
     found = look._best(size, slopes, bent, rest)
     for box in range(boxes):

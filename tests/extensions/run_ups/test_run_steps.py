@@ -12,7 +12,7 @@ from laufruhe.errors import ModelError
 from laufruhe.extensions.run_ups.linear_run import NODES, LinearRun, Sweep
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import missed_share, run_through, sweep_of
-from laufruhe.extensions.run_ups.stopped_run import _side_by_side
+from laufruhe.extensions.run_ups.stopped_run import _batch_of
 from laufruhe.machine import Mount
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.time_model import time_model
@@ -78,7 +78,7 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
                     stop_gap=1e-3, stop_stiffness=2e6)  # fmt: skip
     model, step = time_model(elastic_mounting(mounting.block, [stopped, *rest])), 0.004
     run = LinearRun(model, Sweep(0.0, 1.0, step, 4))
-    side = _side_by_side([run], step)
+    side = _batch_of([run], step)
     rates, _, inverse = run.modes
     met = np.flatnonzero(model.stops)
     into = inverse @ model.travels[met].T

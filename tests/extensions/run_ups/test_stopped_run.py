@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from laufruhe.extensions.run_ups.linear_run import BLOCK
-from laufruhe.extensions.run_ups.stopped_run import _followed, _Side
+from laufruhe.extensions.run_ups.stopped_run import _DesignBatch, _followed
 
 
 def test_what_touches_no_stop_goes_on_from_where_it_was() -> None:
@@ -16,7 +16,7 @@ def test_what_touches_no_stop_goes_on_from_where_it_was() -> None:
     driven = rng.normal(size=(designs, modes, steps)) + 1j * rng.normal(size=(designs, modes, steps))
     seen = rng.normal(size=(designs, 1, 2 * modes))
     none = np.zeros((designs, 2 * modes, 1))
-    side = _Side(decays, seen, none, none, np.full((designs, 1, 1), np.inf), np.ones((designs, 1, 1)))
+    side = _DesignBatch(decays, seen, none, none, np.full((designs, 1, 1), np.inf), np.ones((designs, 1, 1)))
     z, expected = driven[..., 0], [driven[..., 0]]
     for k in range(1, steps):
         z = decays * z + driven[..., k]

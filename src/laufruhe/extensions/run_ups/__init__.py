@@ -1,4 +1,4 @@
-"""Engines run up and shut down through resonance: [run_up] of a file, how it is decided, its tables and picture."""
+"""Run-up and shut-down through resonance: [run_up] of a file, solvers and bounds, tables and picture."""
 
 from laufruhe.extension import Extension
 

@@ -1,4 +1,4 @@
-"""Largest force, travel and twist of run-up and shut-down over boxes of stiffness, bounded from below (E65)."""
+"""Lower bounds of the largest force, travel and twist of runs over boxes of stiffness (E65)."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 
-# long steps that a run has at least
+# fewest long steps of a run
 LEAST_STEPS = 60
-# share of a limit of travel that a stop is beyond it
+# smallest distance of a stop beyond the limit of travel, as a share of the limit
 MARGIN = 1e-3
 
 
 class RunBoxes:
-    """Bounds of run-ups over boxes of stiffness, where nothing else is open (E65).
+    """Lower bounds of run-ups over boxes of stiffness, if nothing else is open (E65).
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class RunBoxes:
 
     @property
     def cost(self) -> int:
-        """Return the work of one box, in numbers."""
+        """Work of one box, as a count of numbers."""
         sides, n = len(self._model.lower), 2 * self._matrices.size
         columns = 1 + sides + len(pairs_of(sides))
         return len(self._rows) * sum(run.sweep.count // run.times for run in self._runs) * columns * n
@@ -67,55 +67,62 @@ class RunBoxes:
         return tuple(runs)
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> LinearBound:
-        """Return linear functions under a measure on boxes, shapes (boxes, open numbers), or on those of a mask.
+        """Return linear lower bounds of a measure on boxes of shape (boxes, open numbers), all or those of a mask.
 
-        The rest is infinite where no bound is known.
+        The remainder is infinite if no bound is known.
         """
-        of = self._equations(lower, upper)
+        box_equations = self._equations(lower, upper)
         step = max(run.step for run in self._runs)
-        known = of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST)
-        which = np.flatnonzero(known if mask is None else known & mask)
-        out = LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
-        if len(which):
-            of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])
-            bounds = self._under(measure, of)
+        is_known = box_equations.known & (np.linalg.norm(box_equations.matrix, 2, axis=(-2, -1)) * step <= FARTHEST)
+        indices = np.flatnonzero(is_known if mask is None else is_known & mask)
+        result = LinearBound(
+            np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower)
+        )
+        if len(indices):
+            box_equations = (
+                box_equations if len(indices) == len(lower) else self._equations(lower[indices], upper[indices])
+            )
+            bounds = self._under(measure, box_equations)
             for name in ("value", "slopes", "rest", "bends"):
-                getattr(out, name)[which] = getattr(bounds, name)
-        return out
+                getattr(result, name)[indices] = getattr(bounds, name)
+        return result
 
     def _equations(self, lower: Array, upper: Array) -> MotionEquations:
         return equations(self._model, self._matrices, self._scale, lower, upper)
 
-    def _under(self, measure: Measure, of: MotionEquations) -> LinearBound:
+    def _under(self, measure: Measure, box_equations: MotionEquations) -> LinearBound:
         maps_of, d = self._rows[measure]
-        maps = mapped(maps_of, of.above, of.halves, of.turn, of.roots)
-        looks = [_Look(of, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(one.minimum, nan=-np.inf) for one in looks]
-        best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
+        maps = mapped(maps_of, box_equations.above, box_equations.halves, box_equations.turn, box_equations.roots)
+        run_bounds = [_RunBounds(box_equations, run, maps, d).under() for run in self._runs]
+        bounds = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
+        best, boxes = np.argmax(bounds, axis=0), np.arange(box_equations.count)
         parts = ("value", "slopes", "rest", "bends")
-        return LinearBound(*(np.array([getattr(one, part) for one in looks])[best, pick] for part in parts))
+        return LinearBound(
+            *(np.array([getattr(run_bound, part) for run_bound in run_bounds])[best, boxes] for part in parts)
+        )
 
 
 def bounds_runs(problem: Problem) -> bool:
-    """Return whether boxes bound the run-ups of a problem: they go in steps, and no allowed design meets a stop."""
+    """Return True if boxes bound the run-ups: steps resolve them, and no feasible design meets a stop."""
     measures = simulated_measures(problem)
     peaks = RunPeaks(problem, measures)
-    return bool(measures) and peaks.is_known and (not peaks.is_stopped or _stays_off_stops(problem, peaks))
+    return bool(measures) and peaks.is_known and (not peaks.has_stops or _stays_off_stops(problem, peaks))
 
 
 def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
-    """Return whether no design that keeps the limits meets a stop, so that its run-up is that without stops.
+    """Return True if no design within the limits meets a stop, so that its run-up is that without stops.
 
-    Limits hold travel under every gap. In steps in which stops alone turn no motion by more than half a radian, they
-    take back a 24th of what goes beyond their gaps: a design that meets one is seen beyond it, and is not allowed.
+    Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
+    push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
+    steps.
     """
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
     maximum = min((limit.maximum for limit in limits), default=math.inf)
     model = time_model(mounting_in(problem.engine))
     gaps = model.gaps[model.stops > 0.0]
-    firm = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
-    return not firm and maximum * (1.0 + MARGIN) < float(gaps.min())
+    is_too_stiff = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
+    return not is_too_stiff and maximum * (1.0 + MARGIN) < float(gaps.min())
 
 
 def _tops(squares: Array) -> Array:
@@ -123,40 +130,42 @@ def _tops(squares: Array) -> Array:
     return np.concatenate([tops, squares[..., -1:]], axis=-1)
 
 
-class _Look:
-    """Bound what one run reaches on boxes.
+class _RunBounds:
+    """Lower bounds of one run on boxes.
 
     Parameters
     ----------
     maps, d
-        Maps from motion to the signal of a measure, d rows a place.
+        Maps from motion to the signal of a measure, and its rows for each place.
     """
 
     def __init__(self, of: MotionEquations, run: RunMoments, maps: Maps, d: int) -> None:
-        self._of, self._run, self._maps, self._d = of, run, maps, d
+        self._equations, self._run, self._maps, self._d = of, run, maps, d
         self._steps = Steps(of, run.step)
 
     def under(self) -> LinearBound:
-        """The best of all moments and places, of steps of which one ends where motion at the middle is largest."""
+        """Return the best bound over all times and places, with a step that ends at the peak of the middle."""
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
-        count = min(one.count for one in steps)
-        moments = np.stack([one.moments[..., :count].reshape(-1, count) for one in steps])
-        pushes, highest = (np.stack([getattr(one, k)[:count] for one in steps]) for k in ("pushes", "highest"))
+        count = min(long_steps.count for long_steps in steps)
+        moments = np.stack([long_steps.moments[..., :count].reshape(-1, count) for long_steps in steps])
+        pushes, highest = (
+            np.stack([getattr(long_steps, k)[:count] for long_steps in steps]) for k in ("pushes", "highest")
+        )
         return self._of_motion(motion_of(self._steps, moments, pushes, highest))
 
     def _peaks(self) -> Indices:
-        """Short steps at which motion at the middles is largest: among long ones, then about the largest of these."""
-        of, run = self._of, self._run
+        """Return the short step with the largest signal at the middle of each box, near the largest long step."""
+        box_equations, run = self._equations, self._run
         steps = run.ending_at(0)
         rows = steps.moments.reshape(-1, steps.count)
-        moments = np.broadcast_to(rows, (of.count, *rows.shape))
+        moments = np.broadcast_to(rows, (box_equations.count, *rows.shape))
         middle = self._steps.middle(moments)
-        top = 1 + _tops(self._lengths(middle) ** 2).max(axis=1).argmax(axis=1)
-        boxes, start = np.arange(of.count), run.times * (top - 1)
+        peak_step = 1 + _tops(self._lengths(middle) ** 2).max(axis=1).argmax(axis=1)
+        boxes, start = np.arange(box_equations.count), run.times * (peak_step - 1)
         places = start[:, None] + np.arange(2 * run.times)
-        short = Steps(of, run.sweep.step, orders=False)
-        short_moments = run.short(places).reshape(of.count, 2 * run.times, -1)
-        z = middle[boxes, :, top - 1][..., None]
+        short = Steps(box_equations, run.sweep.step, orders=False)
+        short_moments = run.short(places).reshape(box_equations.count, 2 * run.times, -1)
+        z = middle[boxes, :, peak_step - 1][..., None]
         sizes = [self._lengths(z)[..., 0].max(axis=1)]
         for k in range(2 * run.times):
             z = short.moves[0] @ z + short.loads[0] @ short_moments[:, k, :, None]
@@ -165,7 +174,7 @@ class _Look:
         return np.asarray(start + np.where(places <= run.sweep.count, sizes, 0.0).argmax(axis=0))
 
     def _rows(self, position: Array, rate: Array) -> Array:
-        return np.concatenate([position / self._of.scale, rate], axis=-1)
+        return np.concatenate([position / self._equations.scale, rate], axis=-1)
 
     def _places(self, rows: Array) -> Array:
         return rows.reshape(*rows.shape[:-2], -1, self._d, rows.shape[-1])
@@ -176,62 +185,64 @@ class _Look:
 
     def _of_motion(self, motion: RunMotion) -> LinearBound:
         maps, pairs = self._maps, self._steps.pairs
-        at_middle, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
+        at_middle, slopes_of_maps = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
         value = at_middle @ motion.middle
-        first = at_middle[:, None] @ motion.first + by @ motion.middle[:, None]
+        first = at_middle[:, None] @ motion.first + slopes_of_maps @ motion.middle[:, None]
         bends = self._rows(np.zeros_like(maps.bends), maps.bends)
         second = at_middle[:, None] @ motion.second + bends @ motion.middle[:, None]
         for number, (j, k) in enumerate(pairs):
-            second[:, number] += by[:, j] @ motion.first[:, k]
+            second[:, number] += slopes_of_maps[:, j] @ motion.first[:, k]
             if j != k:
-                second[:, number] += by[:, k] @ motion.first[:, j]
+                second[:, number] += slopes_of_maps[:, k] @ motion.first[:, j]
         rows = self._places(value)
         size = np.linalg.norm(rows, axis=-2)
-        along = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
-        rest = self._gains(along) * motion.left[:, None] + self._further(motion, by)
-        slopes, bent = (np.einsum("bpdt,bspdt->bspt", along, self._places(order)) for order in (first, second))
-        alike = np.array([j == k for j, k in pairs])[:, None, None]
-        # a square is not under zero
-        bent = np.where(alike, np.maximum(-bent, 0.0), np.abs(bent))
-        return self._best(size, slopes, bent, rest)
+        directions = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
+        rest = self._gains(directions) * motion.left[:, None] + self._further(motion, slopes_of_maps)
+        slopes, second_terms = (
+            np.einsum("bpdt,bspdt->bspt", directions, self._places(order)) for order in (first, second)
+        )
+        is_square = np.array([j == k for j, k in pairs])[:, None, None]
+        # squares are not negative
+        second_terms = np.where(is_square, np.maximum(-second_terms, 0.0), np.abs(second_terms))
+        return self._best(size, slopes, second_terms, rest)
 
-    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> LinearBound:
-        """Return the highest bound of all places and times."""
-        bound = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
+    def _best(self, size: Array, slopes: Array, second_order: Array, rest: Array) -> LinearBound:
+        """Return the largest bound over all places and times."""
+        bound = size - np.abs(slopes).sum(axis=1) - second_order.sum(axis=1) - rest
         known = np.nan_to_num(bound, nan=-np.inf)
         boxes = np.arange(len(size))
         place, time = np.unravel_index(known.reshape(len(size), -1).argmax(axis=1), bound.shape[1:])
         size, rest = (array[boxes, place, time] for array in (size, rest))
-        slopes, bent = (array[boxes, :, place, time] for array in (slopes, bent))
-        moved = np.linalg.norm(self._of.first, axis=(-2, -1))
-        share = moved / np.maximum(moved.sum(axis=1), 1e-300)[:, None]
-        pull = np.abs(slopes) + share * np.minimum(rest, size)[:, None]
+        slopes, second_order = (array[boxes, :, place, time] for array in (slopes, second_order))
+        changes = np.linalg.norm(self._equations.first, axis=(-2, -1))
+        share = changes / np.maximum(changes.sum(axis=1), 1e-300)[:, None]
+        scores = np.abs(slopes) + share * np.minimum(rest, size)[:, None]
         for number, (j, k) in enumerate(self._steps.pairs):
             for side in {j, k}:
-                pull[:, side] += bent[:, number]
-        return LinearBound(size, slopes, rest + bent.sum(axis=1), pull)
+                scores[:, side] += second_order[:, number]
+        return LinearBound(size, slopes, rest + second_order.sum(axis=1), scores)
 
-    def _gains(self, along: Array) -> Array:
-        # largest signal of a motion of energy one along directions (boxes, places, d, times), without d
-        maps, of = self._maps, self._of
-        softest = np.swapaxes(np.linalg.inv(np.linalg.cholesky(of.softest)), 1, 2)
+    def _gains(self, directions: Array) -> Array:
+        # largest signal of a motion with energy 1 along directions (boxes, places, d, times), as (boxes, places, times)
+        maps, box_equations = self._maps, self._equations
+        softest = np.swapaxes(np.linalg.inv(np.linalg.cholesky(box_equations.softest)), 1, 2)
 
         def sizes(matrices: Array) -> Array:
             return np.asarray(np.linalg.norm(self._places(matrices), axis=(-2, -1)))
 
-        middle = np.linalg.norm(np.einsum("bpdt,bpdn->bpnt", along, self._places(maps.position @ softest)), axis=2)
+        middle = np.linalg.norm(np.einsum("bpdt,bpdn->bpnt", directions, self._places(maps.position @ softest)), axis=2)
         position = middle + sizes(maps.positions @ softest[:, None]).sum(axis=1)[..., None]
-        moving = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
-        return np.asarray(np.hypot(position, moving[..., None]))
+        rate_part = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
+        return np.asarray(np.hypot(position, rate_part[..., None]))
 
-    def _further(self, motion: RunMotion, by: Array) -> Array:
-        # largest signal of both orders beyond the second, shape (boxes, places, times)
-        maps, n = self._maps, self._of.softest.shape[-1]
+    def _further(self, motion: RunMotion, slopes_of_maps: Array) -> Array:
+        # largest signal of third and fourth order, shape (boxes, places, times)
+        maps, n = self._maps, self._equations.softest.shape[-1]
         if maps.is_constant:
             return np.zeros(1)
-        signals = (self._places(by[:, j, None] @ motion.second) for j in range(by.shape[1]))
+        signals = (self._places(slopes_of_maps[:, j, None] @ motion.second) for j in range(slopes_of_maps.shape[1]))
         total = sum(np.linalg.norm(order, axis=-2).sum(axis=1) for order in signals)
         rates = [np.abs(order[..., n:, :]) for order in (motion.middle, motion.first, motion.second)]
         bends = np.abs(maps.bends).sum(axis=1) @ (rates[1].sum(axis=1) + rates[2].sum(axis=1))
-        rest = maps.rest @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
-        return np.asarray(total + np.linalg.norm(self._places(bends + rest), axis=-2))
+        remainder = maps.rest @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
+        return np.asarray(total + np.linalg.norm(self._places(bends + remainder), axis=-2))

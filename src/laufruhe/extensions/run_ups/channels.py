@@ -1,4 +1,4 @@
-"""Channels of the peaks of a run-up and a shut-down through resonance (E28)."""
+"""Channels of the largest force, travel and twist in run-up and shut-down (E28)."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def _missed(engine: Engine) -> float:
 
 @dataclass(frozen=True, eq=False)
 class RunChannel(NumberChannel):
-    """The most of a number in run-up and shut-down, integrated in time.
+    """Largest value of a signal in run-up and shut-down, integrated in time.
 
     Attributes
     ----------
     part
-        Signal whose largest length it is, shape (times, places, d).
+        Return the signal, shape (times, places, d), from the response; the channel is its largest length.
     """
 
     needs: Need = RUN
@@ -42,7 +42,7 @@ class RunChannel(NumberChannel):
     part: Callable[[RunResponse], Array] = field(kw_only=True)
 
 
-def _maximum(
+def _run_channel(
     name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[RunResponse], Array]
 ) -> RunChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
@@ -55,6 +55,6 @@ def _maximum(
     return RunChannel(name, unit, values=values, part=part)
 
 
-FORCE = _maximum("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
-TRAVEL = _maximum("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
-TWIST = _maximum("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)
+FORCE = _run_channel("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
+TRAVEL = _run_channel("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
+TWIST = _run_channel("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)

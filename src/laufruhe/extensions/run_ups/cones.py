@@ -1,7 +1,8 @@
-"""Run-up and shut-down over unbalances: loads add up on mounts without bump stops (E28a, P11).
+"""Optimum of unbalances for run-up and shut-down on mounts without bump stops, where loads add up (E28a, P11).
 
 Each step of a run is affine in the unbalances, so that its largest force, travel and twist are convex. The cone program
-has the steps that matter, more as designs pass them: fewer steps ask for less, so its bound holds for all of them.
+has only the steps near a limit or a maximum, and steps that a design violates join it. Fewer steps relax the program,
+so that its lower bound is valid.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ Decide = Callable[[Problem], Result]
 def solve_run_cones(
     problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows, decide: Decide
 ) -> Result:  # fmt: skip
-    """The best unbalances, proven."""
+    """Return the optimal unbalances with their proof."""
     steps = _Steps(problem, limits, terms, rows)
     if not steps.gather():
         names = [limit.name for limit in steps.problem.load_limits]
@@ -43,12 +44,12 @@ def solve_run_cones(
         x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
         fidelity = result.problem.fidelity
         if fidelity != problem.fidelity:
-            # steps are of the physics that the answer was found accurate by
-            again = problem.at(fidelity)
-            more = RunRows.from_problem(again, [*rows.constants])
-            return solve_run_cones(again, limits, terms, more or rows, decide)
+            # compute the rows again with the fidelity that the accuracy needs
+            refined = problem.at(fidelity)
+            refined_rows = RunRows.from_problem(refined, [*rows.constants])
+            return solve_run_cones(refined, limits, terms, refined_rows or rows, decide)
         if x is not None and result.status is Status.FEASIBLE:
-            # the design as given may stand in the place of one that breaks steps which are not known yet
+            # the result may be the initial design, because the optimum violates steps that the program lacks
             x = solve_cones(steps.affine(result.final.samples)).x
         if x is None or result.status is Status.INFEASIBLE or steps.has_all(x):
             break
@@ -57,7 +58,7 @@ def solve_run_cones(
 
 
 class _Steps:
-    """Steps of the runs that come near the limits of some design, or near its largest where that is minimised."""
+    """Steps of the runs near the limits, or near the maximum of an objective, in any design so far."""
 
     def __init__(self, problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows) -> None:
         self._problem, self._limits, self._terms, self._rows = problem, limits, terms, rows
@@ -65,18 +66,20 @@ class _Steps:
 
     @property
     def problem(self) -> Problem:
-        """Problem with rows of these steps; limits without a near step are left out."""
+        """Problem with rows of these steps; limits without such steps are omitted."""
         known = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
-        limits = (x for x in self._problem.limits if not x.measure.channel.simulation or x.measure in known)
+        limits = (
+            limit for limit in self._problem.limits if not limit.measure.channel.simulation or limit.measure in known
+        )
         return replace(self._problem, known_rows=known, limits=tuple(limits))
 
     def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:
-        """Return the program at up to so many angles; means averaged about them exclude no design (P7)."""
+        """Return the program at up to `samples` samples; averaged means exclude no feasible design (P7)."""
         model = AffineModel(self.problem)
         return model.at(min(samples, model.full_samples), averaged)
 
     def add(self, x: Array) -> None:
-        """Add the steps that a design brings near the limits, and its largest."""
+        """Add the steps near the limits, and near the maximum, at unbalances `x`."""
         heights = [(limit.measure, limit.maximum) for limit in self._limits]
         heights += [(term.measure, self._rows.worst(term.measure, x)) for term in self._terms]
         for measure, height in heights:
@@ -86,19 +89,19 @@ class _Steps:
                 self._places[measure] = np.union1d(known, near).astype(np.intp)
 
     def has_all(self, x: Array) -> bool:
-        """Return whether a design keeps the limits in all steps, and has no step above those that it is judged by."""
-        keeps = all(
+        """Return True if a design satisfies the limits in all steps, and no step exceeds those in the program."""
+        satisfies_limits = all(
             self._rows.worst(limit.measure, x) <= limit.maximum * (1.0 + 0.1 * FEASIBLE) for limit in self._limits
         )
-        for term in self._terms if keeps else ():
+        for term in self._terms if satisfies_limits else ():
             known = self._rows.known(term.measure, self._places[term.measure])
-            top = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
-            if self._rows.worst(term.measure, x) > float(top) * (1.0 + 0.1 * self._problem.tolerance):
+            maximum = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
+            if self._rows.worst(term.measure, x) > float(maximum) * (1.0 + 0.1 * self._problem.tolerance):
                 return False
-        return keeps
+        return satisfies_limits
 
     def gather(self) -> bool:
-        """Add steps until a design of few angles keeps all of them; return whether there is one."""
+        """Add steps until a design of coarse sampling satisfies all of them; return True if there is one."""
         x = vector_of(domains_of(self._problem.decisions))
         for _ in in_time(range(_ROUNDS)):
             self.add(x)

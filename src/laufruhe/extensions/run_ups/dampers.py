@@ -1,14 +1,14 @@
 """Maps of a block on its mounts in time over boxes of stiffness, with the viscous damping of E26 (E65).
 
-What moves is felt as P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the stiffness A
-of the block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero on. In the modes of the middle of a
-box, with E what A differs by there and w the natural frequencies,
+A signal is P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the stiffness A of the
+block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero to infinity. In the modes of the middle of a
+box, with E the difference of A from its value there and w the natural frequencies,
 
     S_ab = 1/w (a = b) + f[a,b] E_ab + sum_c f[a,c,b] E_ac E_cb - ...                              (E65)
 
-with divided differences f of k^{-1/2} at the squares of w. With R = (w^2 + s^2)^{-1}, what is left after the first
+with divided differences f of k^{-1/2} at the squares of w. With R = (w^2 + s^2)^{-1}, the remainder after the first
 order is 2/pi times the integral of R E (A + s^2)^{-1} E R, and after the second that of -R E R E (A + s^2)^{-1} E R.
-As A >= (1 - t) w^2, Cauchy and Schwarz bound their entries by products of two lengths.
+As A >= (1 - t) w^2, Cauchy-Schwarz bounds their entries by products of two lengths.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ from laufruhe.numerics.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """A matrix that is linear in the open numbers.
+    """Matrix that is linear in the open numbers.
 
     Attributes
     ----------
     lowest
-        Matrix with all of these at their lower bounds, shape (r, n).
+        Matrix at the lower bounds of all open numbers, shape (r, n).
     slopes
-        Derivatives by every open number, shape (open numbers, r, n).
+        Derivatives by each open number, shape (open numbers, r, n).
     """
 
     lowest: Array
     slopes: Array
 
     def at(self, above: Array) -> Array:
-        """Return the matrices so far above the lower bounds, shape (boxes, open numbers) to (boxes, r, n)."""
+        """Return the matrices at distances above the lower bounds: (boxes, open numbers) to (boxes, r, n)."""
         return np.asarray(self.lowest + np.tensordot(above, self.slopes, axes=1))
 
 
 @dataclass(frozen=True, eq=False)
 class LinearMaps:
-    """P, L and D."""
+    """Matrices P (`position`), L (`lossy`) and D (`drag`)."""
 
     position: Linear
     lossy: Linear
@@ -51,14 +51,14 @@ class LinearMaps:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """S over boxes, in the modes of their middles; half a box is one.
+    """S over boxes, in the modes of their middles, by open numbers from -1 to 1.
 
     Attributes
     ----------
     middle, first, second
-        Shapes (boxes, n, n), (boxes, open numbers, n, n), and (boxes, pairs, n, n) of j <= l.
+        Coefficients by order: shapes (boxes, n, n), (boxes, open numbers, n, n), and (boxes, pairs, n, n) for j <= l.
     after_first, after_second
-        Bounds of the rest of entries after these orders, shape (boxes, n, n); not numbers where none is known.
+        Bounds of the remainder of entries after these orders, shape (boxes, n, n); NaN if unknown.
     """
 
     middle: Array
@@ -70,16 +70,16 @@ class Roots:
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """P y + Q y' over boxes, in shares of half a box.
+    """Signal P y + Q y' over boxes, by open numbers from -1 to 1.
 
     Attributes
     ----------
     position, positions
-        P at the middle and by side, shapes (boxes, r, n) and (boxes, open numbers, r, n).
+        P at the middle and its slopes, shapes (boxes, r, n) and (boxes, open numbers, r, n).
     rate, rates, bends
-        Q at the middle, by side, and by pairs of sides j <= l, (boxes, pairs, r, n).
+        Q at the middle, its slopes, and its second-order terms by pairs j <= l, shape (boxes, pairs, r, n).
     rest
-        Bound of the rest of the entries of Q, shape (boxes, r, n).
+        Bound of the remainder of the entries of Q, shape (boxes, r, n).
     """
 
     position: Array
@@ -91,84 +91,94 @@ class Maps:
 
     @property
     def bent(self) -> Array:
-        """Largest entries of what is beyond the first order, shape (boxes, r, n)."""
+        """Largest entries of the terms beyond the first order, shape (boxes, r, n)."""
         return np.asarray(np.abs(self.bends).sum(axis=1) + self.rest)
 
     @property
     def is_constant(self) -> bool:
-        """Return whether they depend on no open number."""
+        """True if the maps depend on no open number."""
         return not (self.positions.any() or self.rates.any() or self.bent.any())
 
 
 def pairs_of(count: int) -> list[tuple[int, int]]:
-    """Return the pairs of sides j <= l."""
+    """Return the pairs (j, l) with j <= l of `count` open numbers."""
     return [(j, k) for j in range(count) for k in range(j, count)]
 
 
 def roots(squares: Array, slopes: Array, size: int) -> Roots:
-    """S of boxes from the squares at their middles and the stiffness over half a box there, all in their modes (E65).
+    """Return S over boxes from the stiffness at their middles and its change over half a box, in the modes (E65).
 
     Parameters
     ----------
-    squares, slopes
-        Shapes (boxes, 6), above zero, and (boxes, open numbers, 6, 6), none of them negative.
+    squares
+        Squared natural frequencies at the middles, shape (boxes, 6), positive.
+    slopes
+        Change of the stiffness by half of each side, shape (boxes, open numbers, 6, 6), positive semidefinite.
     size
-        Number of coordinates; those beside the block have no S.
+        Count of coordinates; those after the six of the block have no S.
     """
     w = np.sqrt(squares)
     a, b, c = w[:, :, None, None], w[:, None, None, :], w[:, None, :, None]
-    third = (a + b + c) / (a * b * c * (a + b) * (b + c) * (a + c))
-    diagonal = np.einsum("baca->bac", third)
-    pair = 1.0 / (w[:, :, None] * w[:, None] * (w[:, :, None] + w[:, None]))
+    second_difference = (a + b + c) / (a * b * c * (a + b) * (b + c) * (a + c))
+    diagonal = np.einsum("baca->bac", second_difference)
+    first_difference = 1.0 / (w[:, :, None] * w[:, None] * (w[:, :, None] + w[:, None]))
     products = [
-        np.einsum("bac,bcd,bacd->bad", slopes[:, j], slopes[:, k], third, optimize=True)
+        np.einsum("bac,bcd,bacd->bad", slopes[:, j], slopes[:, k], second_difference, optimize=True)
         for j, k in pairs_of(slopes.shape[1])
     ]
     second = [
-        one if j == k else one + np.swapaxes(one, 1, 2)
-        for one, (j, k) in zip(products, pairs_of(slopes.shape[1]), strict=True)
+        product if j == k else product + np.swapaxes(product, 1, 2)
+        for product, (j, k) in zip(products, pairs_of(slopes.shape[1]), strict=True)
     ]
     maximum = np.abs(slopes).sum(axis=1)
     share = np.linalg.eigvalsh(slopes.sum(axis=1) / (w[:, :, None] * w[:, None]))[:, -1]
-    left = 1.0 - share
-    twice = (maximum / squares[:, None]) @ maximum
-    near, far = (np.sqrt(np.einsum("bac,bac->ba", change**2, diagonal)) for change in (maximum, twice))
-    # half a box that reaches to nothing is not known
-    left = np.where(left > 0.0, left, np.nan)[:, None, None]
-    after_first, crossed = (change[:, :, None] * near[:, None] / left for change in (near, far))
-    after_second = np.minimum(crossed, np.swapaxes(crossed, 1, 2))
-    wider = [(0, size - 6), (0, size - 6)]
+    margin = 1.0 - share
+    second_change = (maximum / squares[:, None]) @ maximum
+    first_length, second_length = (
+        np.sqrt(np.einsum("bac,bac->ba", change**2, diagonal)) for change in (maximum, second_change)
+    )
+    # unknown if the stiffness may vanish in the box
+    margin = np.where(margin > 0.0, margin, np.nan)[:, None, None]
+    after_first, product_bound = (
+        change[:, :, None] * first_length[:, None] / margin for change in (first_length, second_length)
+    )
+    after_second = np.minimum(product_bound, np.swapaxes(product_bound, 1, 2))
+    padding = [(0, size - 6), (0, size - 6)]
     eye = np.eye(6) / w[:, None]
-    parts = (eye, -slopes * pair[:, None], np.stack(second, axis=1), after_first, after_second)
-    return Roots(*(np.pad(change, [(0, 0)] * (change.ndim - 2) + wider) for change in parts))
+    parts = (eye, -slopes * first_difference[:, None], np.stack(second, axis=1), after_first, after_second)
+    return Roots(*(np.pad(change, [(0, 0)] * (change.ndim - 2) + padding) for change in parts))
 
 
 def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
-    """Maps of boxes, in the modes of their middles.
+    """Return the maps of boxes, in the modes of their middles.
 
     Parameters
     ----------
+    parts
+        Matrices P, L and D.
     above, halves
         Middles above the lower bounds, and half widths, shape (boxes, open numbers).
     turn
         Matrix from the coordinates of the modes, shape (boxes, n, n).
+    s
+        Roots S of the boxes.
     of_motion
-        True if the rows are in coordinates of the motion too.
+        True if the rows are also coordinates of the motion.
     """
 
-    def seen(matrices: Array) -> Array:
+    def in_modes(matrices: Array) -> Array:
         modes = turn if matrices.ndim == 3 else turn[:, None]
         out = matrices @ modes
         return np.asarray(np.swapaxes(modes, -1, -2) @ out if of_motion else out)
 
     scale = halves[:, :, None, None]
-    (p, p_by), (lossy, lossy_by), (drag, drag_by) = (
-        (seen(part.at(above)), seen(scale * part.slopes)) for part in (parts.position, parts.lossy, parts.drag)
+    (position, position_slopes), (lossy, lossy_slopes), (drag, drag_slopes) = (
+        (in_modes(part.at(above)), in_modes(scale * part.slopes)) for part in (parts.position, parts.lossy, parts.drag)
     )
-    by_side = lossy_by @ s.middle[:, None] + lossy[:, None] @ s.first + drag_by
+    rate_slopes = lossy_slopes @ s.middle[:, None] + lossy[:, None] @ s.first + drag_slopes
     bends = []
     for number, (j, k) in enumerate(pairs_of(halves.shape[1])):
-        bend = lossy @ s.second[:, number] + lossy_by[:, j] @ s.first[:, k]
-        bends.append(bend if j == k else bend + lossy_by[:, k] @ s.first[:, j])
-    rest = np.abs(lossy) @ s.after_second + np.abs(lossy_by).sum(axis=1) @ s.after_first
-    return Maps(p, p_by, lossy @ s.middle + drag, by_side, np.stack(bends, axis=1), rest)
+        bend = lossy @ s.second[:, number] + lossy_slopes[:, j] @ s.first[:, k]
+        bends.append(bend if j == k else bend + lossy_slopes[:, k] @ s.first[:, j])
+    rest = np.abs(lossy) @ s.after_second + np.abs(lossy_slopes).sum(axis=1) @ s.after_first
+    return Maps(position, position_slopes, lossy @ s.middle + drag, rate_slopes, np.stack(bends, axis=1), rest)

@@ -1,4 +1,4 @@
-"""[run_up] of a problem file: how the engine is run up and shut down."""
+"""[run_up] of a problem file: run-up and shut-down of the engine."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class RunUpTable(Table):
 
 
 def _read(table: RunUpTable, problem: Problem, __: ExtensionContext) -> Problem:
-    """Return the problem of an engine that is run up and shut down."""
+    """Return the problem with a run of its engine."""
     engine, points = problem.engine, [point.name for point in problem.points]
     if engine.block is None:
         raise Refused(

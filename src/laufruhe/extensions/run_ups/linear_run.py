@@ -2,8 +2,8 @@
 
     z' = A z + b(t),   z_{k+1} = e^{A h} z_k + integral of e^{A (h - s)} b(t_k + s) ds
 
-in the modes of A, with b a polynomial through its values at the Gauss points of every step. The same steps for all
-loads make the answer linear in them to a rounding.
+in the modes of A, with b a polynomial through its values at the Gauss points of each step. All loads have the same
+steps, so that the response is linear in them to rounding.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
 Loads: TypeAlias = Sequence[tuple[Array, ComplexArray]]
-"""Orders, and the wrenches of each, shape (n, 6): those of the first grow with the square of speed (E28)."""
+"""Orders and their wrenches, shape (n, 6); the first set is in proportion to the squared speed (E28)."""
 
 NODES, FINE = 4, 64
 _STIFFEST, _DEFECTIVE = 200.0, 1e8
@@ -34,9 +34,9 @@ class Sweep:
     Attributes
     ----------
     first, gain
-        Crank speed at the start [rad/s], and by how much it grows [rad/s2].
+        Crank speed at the start [rad/s], and its acceleration [rad/s2].
     step, count
-        Length of a time step [s], and number of steps.
+        Length of a time step [s], and count of steps.
     """
 
     first: float
@@ -45,20 +45,19 @@ class Sweep:
     count: int
 
     def wrenches(self, loads: Loads) -> Array:
-        """Return the wrenches at the Gauss points of every step, shape (6 points, steps).
+        """Return the wrenches at the Gauss points of each step, shape (6 points, steps).
 
-        Six components of the first point come before those of the others.
-        They do not depend on the mounts.
+        The six components of the first point come before those of the second. They are independent of the mounts.
         """
-        out = np.zeros((NODES, 6, self.count))
+        wrenches = np.zeros((NODES, 6, self.count))
         for k in range(0, self.count, _AT_ONCE):
             starts = self.step * np.arange(k, min(k + _AT_ONCE, self.count))
-            for node, into in zip(_nodes(), out, strict=True):
-                into[:, k : k + len(starts)] = self._wrenches_at(starts + node * self.step, loads)
-        return out.reshape(6 * NODES, -1)
+            for node, point_wrenches in zip(_nodes(), wrenches, strict=True):
+                point_wrenches[:, k : k + len(starts)] = self._wrenches_at(starts + node * self.step, loads)
+        return wrenches.reshape(6 * NODES, -1)
 
     def _wrenches_at(self, times: Array, loads: Loads) -> Array:
-        """Shape (6, times)."""
+        """Return the wrenches at times, shape (6, times)."""
         speed, angle = self.first + self.gain * times, self.first * times + 0.5 * self.gain * times**2
         total = np.zeros((6, len(times)))
         for k, (orders, coefficients) in enumerate(loads):
@@ -74,12 +73,12 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False)
 class RunResponse:
-    """Motion of the mounts and the block at equal steps of time.
+    """Motion of the mounts and the block at equal time steps.
 
     Attributes
     ----------
     y, rate
-        Coordinates of the model, shape (n, steps + 1).
+        Coordinates of the time model and their derivatives, shape (n, steps + 1).
     """
 
     model: TimeModel = field(repr=False)
@@ -103,48 +102,48 @@ class RunResponse:
 
 
 class LinearRun:
-    """Steps of one run on some mounts, for any loads."""
+    """Steps of one run for a mounting, under any loads."""
 
     def __init__(self, model: TimeModel, sweep: Sweep) -> None:
         self.model, self.sweep = model, sweep
-        one = np.eye(model.size)
-        matrix = np.block([[np.zeros_like(one), one], [-model.stiffness, -model.damping]])
+        identity = np.eye(model.size)
+        matrix = np.block([[np.zeros_like(identity), identity], [-model.stiffness, -model.damping]])
         rates, shapes = np.linalg.eig(matrix)
         self._rates, self._shapes = rates.astype(complex), shapes.astype(complex)
 
     @property
     def is_resolved(self) -> bool:
-        """Return whether modes give the motion between stops: distinct, and not too stiff for the steps."""
+        """True if modes give the motion between stops: distinct, and not too stiff for the steps."""
         stiff = float(np.abs(self._rates).max()) * self.sweep.step > _STIFFEST
         return not (stiff or np.linalg.cond(self._shapes) > _DEFECTIVE)
 
     @property
     def is_known(self) -> bool:
-        """Return whether modes give the whole motion: resolved, without bump stops."""
+        """True if modes give the whole motion: resolved, and without bump stops."""
         return self.is_resolved and not self.model.has_stops
 
     @cached_property
     def modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Rates, shapes that real parts are taken of, and loads to modes, (m,), (2 n, m), (m, n): of a pair one."""
+        """Rates, shape (m,), shapes for real parts, (2 n, m), and map from loads, (m, n); of conjugate modes one."""
         upper = self._rates.imag >= 0.0
         rates = self._rates[upper]
         shapes = self._shapes[:, upper] * np.where(rates.imag > 0.0, 2.0, 1.0)
         return rates, shapes, np.linalg.inv(self._shapes)[upper, self.model.size :]
 
     def driven(self, wrenches: Array) -> ComplexArray:
-        """Return what wrenches of `Sweep.wrenches` add to the modes in every step, shape (m, steps + 1)."""
+        """Return the excitation of the modes in each step by wrenches of `Sweep.wrenches`, shape (m, steps + 1)."""
         rates, _, inverse = self.modes
         points, shares = _quadrature()
         # integrals of e^{r (1 - s)} L_i(s) over a step of one, shape (modes, Gauss points)
         weights = self.sweep.step * (np.exp(np.outer(rates * self.sweep.step, 1.0 - points)) @ shares)
-        into = inverse @ self.model.load
-        driving = np.concatenate([weight[:, None] * into for weight in weights.T], axis=1)
-        out = np.zeros((len(rates), self.sweep.count + 1), dtype=complex)
-        out.real[:, 1:], out.imag[:, 1:] = driving.real @ wrenches, driving.imag @ wrenches
-        return out
+        mode_loads = inverse @ self.model.load
+        driving = np.concatenate([weight[:, None] * mode_loads for weight in weights.T], axis=1)
+        excitation = np.zeros((len(rates), self.sweep.count + 1), dtype=complex)
+        excitation.real[:, 1:], excitation.imag[:, 1:] = driving.real @ wrenches, driving.imag @ wrenches
+        return excitation
 
     def response_of(self, states: ComplexArray) -> RunResponse:
-        """Return the motion from the modes after every step, shape (m, steps + 1)."""
+        """Return the motion from the modes after each step, shape (m, steps + 1)."""
         shapes = self.modes[1]
         y, rate = np.split(shapes.real @ states.real - shapes.imag @ states.imag, 2)
         return RunResponse(self.model, y, rate)
@@ -155,21 +154,21 @@ class LinearRun:
 
 
 def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
-    """z_k = decay z_{k-1} + what drives step k, of every mode; shapes (modes, steps) and (modes,)."""
+    """Return z_k = decay z_{k-1} + driven_k for each mode, shape (modes, steps), from decays of shape (modes,)."""
     modes, count = driven.shape
     blocks = -(-count // BLOCK)
-    out = np.zeros((modes, blocks, BLOCK), dtype=complex)
-    out.reshape(modes, -1)[:, :count] = driven
+    states = np.zeros((modes, blocks, BLOCK), dtype=complex)
+    states.reshape(modes, -1)[:, :count] = driven
     reach = 1
     while reach < BLOCK:
-        # each then has what drove it over twice as many steps of its block
-        out[..., reach:] += (decays**reach)[:, None, None] * out[..., :-reach]
+        # doubles the count of steps that each entry includes, within its block
+        states[..., reach:] += (decays**reach)[:, None, None] * states[..., :-reach]
         reach *= 2
     carried, block_decay = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
-    for k, last in enumerate(np.ascontiguousarray(out[:, :-1, -1].T), 1):
-        carried[k] = block_decay * carried[k - 1] + last
-    out += carried.T[..., None] * decays[:, None, None] ** np.arange(1, BLOCK + 1)
-    return out.reshape(modes, -1)[:, :count]
+    for k, block_end in enumerate(np.ascontiguousarray(states[:, :-1, -1].T), 1):
+        carried[k] = block_decay * carried[k - 1] + block_end
+    states += carried.T[..., None] * decays[:, None, None] ** np.arange(1, BLOCK + 1)
+    return states.reshape(modes, -1)[:, :count]
 
 
 @lru_cache
@@ -183,14 +182,15 @@ def _quadrature() -> tuple[Array, Array]:
     points, shares = np.polynomial.legendre.leggauss(FINE)
     points = 0.5 * (points + 1.0)
     bases = np.array([
-        np.prod([(points - other) / (node - other) for other in nodes if other != node], axis=0) for node in nodes
+        np.prod([(points - other_node) / (node - other_node) for other_node in nodes if other_node != node], axis=0)
+        for node in nodes
     ])  # fmt: skip
     return points, np.ascontiguousarray((0.5 * shares * bases).T)
 
 
 @lru_cache
 def step_moments(count: int) -> Array:
-    """Integrals of (1 - s)^k / k! L_i(s) over a step of one, k under a count, L_i of its Gauss points, (k, points)."""
+    """Return integrals of (1 - s)^k / k! L_i(s) over 0 <= s <= 1, for k < count and Gauss points i, (count, points)."""
     points, shares = _quadrature()
     powers = [(1.0 - points) ** k / math.factorial(k) for k in range(count)]
     return np.asarray(np.array(powers) @ shares)
@@ -198,10 +198,13 @@ def step_moments(count: int) -> Array:
 
 @lru_cache
 def largest_share() -> float:
-    """Return the largest value over a step of a polynomial, as a share of its largest at the Gauss points.
+    """Return the largest value over a step of a polynomial, over its largest value at the Gauss points.
 
     The sum of |L_i| is largest at the ends of the step.
     """
     nodes = _nodes()
-    ends = [np.prod([(1.0 - o) / (node - o) for o in nodes if o != node]) for node in nodes]
+    ends = [
+        np.prod([(1.0 - other_node) / (node - other_node) for other_node in nodes if other_node != node])
+        for node in nodes
+    ]
     return float(np.abs(ends).sum())

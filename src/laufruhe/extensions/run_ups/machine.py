@@ -1,4 +1,4 @@
-"""How an engine is run up from rest, and shut down again."""
+"""Definition of run-up and shut-down of an engine."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from laufruhe.machine.extra import Extra
 
 @dataclass(frozen=True)
 class Run(Extra):
-    """Run from rest to a speed and back, at a constant rate each way.
+    """Run from rest to a speed and back, at constant acceleration each way.
 
     Attributes
     ----------
@@ -19,7 +19,7 @@ class Run(Extra):
     up, down
         Time of run-up and of shut-down [s].
     point
-        Name of the operating point whose gas drives the engine meanwhile; the slowest where it is empty.
+        Name of the operating point whose gas drives the run; "" for the slowest.
     """
 
     name: ClassVar[str] = "run-up"
@@ -29,5 +29,5 @@ class Run(Extra):
     point: str = ""
 
     def scaled(self, _: float, __: float) -> Self:
-        """Return the same: speeds and times have no size."""
+        """Return the same run: speeds and times do not scale."""
         return self

@@ -1,4 +1,4 @@
-"""What run-ups of a problem with open stiffness are made of, linear in the stiffness (E65)."""
+"""Matrices of run-ups, linear in the open stiffnesses (E65)."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from laufruhe.problem.measure import Measure
 from laufruhe.prove.mounts.box_response import BoxModel
 
 Rows: TypeAlias = tuple[LinearMaps, int]
-"""What a measure is the largest length of, and how many rows a place has."""
+"""Maps from motion to the signal of a measure, and count of rows for each place."""
 
 
 class RunMatrices:
-    """Matrices of run-ups over open stiffnesses; the fluid of tracks stands after the block.
+    """Matrices of run-ups as functions of open stiffnesses; coordinates of fluid tracks follow those of the block.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class RunMatrices:
 
     @property
     def size(self) -> int:
-        """Number of coordinates, n."""
+        """Count n of coordinates."""
         return self.base.size
 
     @cached_property
@@ -52,7 +52,7 @@ class RunMatrices:
 
     @cached_property
     def loss_factor(self) -> float:
-        """Between those that the mounts give to motions: so much of the loss is surely none that drives."""
+        """Mean of the smallest and the largest loss factor of motions; this part of the loss drives no motion."""
         squares, modes = np.linalg.eigh(self._model.stiffness(self._model.upper[None])[0])
         if not squares[0] > 0.0:
             return 0.0
@@ -62,7 +62,7 @@ class RunMatrices:
 
     @cached_property
     def uneven_loss(self) -> LinearMaps:
-        """The loss beyond that of one factor for all."""
+        """Loss less that of the common loss factor."""
         loss, stiffness = self.motion.lossy, self._square("stiffness")
         beyond = (
             getattr(loss, k) - self.loss_factor * getattr(stiffness, k) for k in ("lowest", "slopes")
@@ -71,15 +71,15 @@ class RunMatrices:
         return LinearMaps(zero, Linear(*beyond), zero)
 
     def maps_of(self, measure: Measure) -> Rows:
-        """Return the maps of a measure, one place after the other, and the rows of a place."""
+        """Return the maps of a measure, place by place, and the count of rows for each place."""
         no_drag = np.zeros_like(self.base.drag)
         count = len(self._model.lower)
 
         def at_rest(forces: Array) -> Array:
-            return self._seen(measure, forces, no_drag, False)
+            return self._signal_rows(measure, forces, no_drag, False)
 
         def moving(drag: Array) -> Array:
-            return self._seen(measure, no_drag, self._padded(drag), True)
+            return self._signal_rows(measure, no_drag, self._padded(drag), True)
 
         def linear(name: str) -> Linear:
             zero = moving(np.zeros((len(no_drag), 6)))
@@ -90,10 +90,10 @@ class RunMatrices:
         maps = LinearMaps(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
         return maps, self._shape(measure)[-1]
 
-    def _seen(self, measure: Measure, forces: Array, drag: Array, moves: bool) -> Array:
-        one, zero = np.eye(self.size), np.zeros((self.size, self.size))
+    def _signal_rows(self, measure: Measure, forces: Array, drag: Array, is_rate: bool) -> Array:
+        identity, zero = np.eye(self.size), np.zeros((self.size, self.size))
         model = replace(self.base, forces=forces, drag=drag)
-        signal = signal_of(measure, RunResponse(model, *((zero, one) if moves else (one, zero))))
+        signal = signal_of(measure, RunResponse(model, *((zero, identity) if is_rate else (identity, zero))))
         return np.asarray(signal.reshape(self.size, -1).T)
 
     def _shape(self, measure: Measure) -> tuple[int, ...]:
@@ -107,5 +107,5 @@ class RunMatrices:
         return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, self.size - 6)])
 
     def _square(self, name: str) -> Linear:
-        wider = [(0, self.size - 6)] * 2
-        return Linear(np.pad(self._lowest(name), wider), np.pad(self._model.slopes[name], [(0, 0), *wider]))
+        padding = [(0, self.size - 6)] * 2
+        return Linear(np.pad(self._lowest(name), padding), np.pad(self._model.slopes[name], [(0, 0), *padding]))

@@ -1,8 +1,8 @@
-"""Loads of a run over long steps, as moments that hold for every mounting (E65).
+"""Moments of the loads of a run over long steps, valid for any mounting (E65).
 
-Under z' = A z + B p(t) a step of length H ends at e^{A H} z + sum_k A^k B m_k with m_k the integral of
-(H - s)^k / k! p(s) over it, p the polynomials that the exact model has for its short steps (E28a): where moments are
-enough, long steps end where the short ones do.
+Under z' = A z + B p(t) a step of length H ends at e^{A H} z + sum_k A^k B m_k, where m_k is the integral of
+(H - s)^k / k! p(s) over the step, and p are the polynomials of the exact model for its short steps (E28a). With enough
+moments, long steps end exactly where the short ones do.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ from laufruhe.extensions.run_ups.linear_run import NODES, Sweep, largest_share, 
 from laufruhe.numerics.arrays import Array
 
 MOMENTS = 14
-"""Of a long step."""
+"""Count of moments of a long step."""
 
 
 @dataclass(frozen=True, eq=False)
 class LongSteps:
-    """Steps of some short ones each.
+    """Long steps, each of several short ones.
 
     Attributes
     ----------
     moments
-        Shape (moments, 6, steps): of the wrench about the origin.
+        Moments of the wrench about the origin, shape (moments, 6, steps).
     pushes, highest
-        Bounds of the integral of the length of its share in the motion in a step, and of that length, (steps,).
+        Bounds of the integral and of the maximum of the load's length in a step, shape (steps,).
     """
 
     moments: Array
@@ -37,7 +37,7 @@ class LongSteps:
 
     @property
     def count(self) -> int:
-        """Number of steps."""
+        """Count of steps."""
         return len(self.pushes)
 
 
@@ -46,12 +46,14 @@ class RunMoments:
 
     Parameters
     ----------
+    sweep
+        Short steps of the run.
     wrenches
         Wrenches as `Sweep.wrenches` returns them.
     load
         Matrix from a wrench to the driven coordinates, shape (n, 6).
     times
-        Number of short steps in a long one.
+        Count of short steps in a long one.
     """
 
     def __init__(self, sweep: Sweep, wrenches: Array, load: Array, times: int) -> None:
@@ -67,25 +69,25 @@ class RunMoments:
         return self.times * self.sweep.step
 
     def ending_at(self, place: int) -> LongSteps:
-        """Long steps of which one ends at a short one; what is before the start is at rest and without load."""
+        """Return long steps, one of which ends at short step `place`; before the start there is no load."""
         first = place % self.times
         if first not in self._known:
             self._known[first] = self._long_steps(first)
         return self._known[first]
 
     def short(self, places: Array) -> Array:
-        """Moments of short steps that begin at these, zero beyond the run, shape (..., moments, 6)."""
+        """Return moments of the short steps at `places`, zero outside the run, shape (..., moments, 6)."""
         inside = (places >= 0) & (places < self.sweep.count)
         wrenches = self._wrenches[..., np.where(inside, places, 0)] * inside
         shares = step_moments(MOMENTS) * self.sweep.step ** np.arange(1, MOMENTS + 1)[:, None]
         return np.asarray(np.moveaxis(np.tensordot(shares, wrenches, axes=1), (0, 1), (-2, -1)))
 
     def _long_steps(self, first: int) -> LongSteps:
-        ahead = (self.times - first) % self.times
-        count = (ahead + self.sweep.count) // self.times
+        padding = (self.times - first) % self.times
+        count = (padding + self.sweep.count) // self.times
 
         def cut(rows: Array) -> Array:
-            padded = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(ahead, 0)])[..., : count * self.times]
+            padded = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(padding, 0)])[..., : count * self.times]
             return np.asarray(padded.reshape(*rows.shape[:-1], count, self.times))
 
         moments = np.einsum("kat,aint->kin", self._weights, cut(self._wrenches), optimize=True)

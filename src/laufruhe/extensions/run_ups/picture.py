@@ -1,4 +1,4 @@
-"""Run-up and shut-down through resonance."""
+"""Picture of run-up and shut-down through resonance."""
 
 from __future__ import annotations
 
@@ -23,30 +23,33 @@ applies = runs_up
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Envelope of force, travel and roll over speed."""
-    drawn = page(3, 1, (6.8, 1.5), gap=0.22)
+    """Draw the largest force, travel and roll over speed."""
+    layout = page(3, 1, (6.8, 1.5), gap=0.22)
     run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
     maximum, legend = [0.0] * len(_ROWS), []
-    for one in series_of(result):
-        runs = runs_of_design(result, one.design)
+    for series in series_of(result):
+        runs = runs_of_design(result, series.design)
         for envelope, (style, _) in zip(runs, _RUNS, strict=True):
             for k, values in enumerate((envelope.force, envelope.travel, envelope.twist)):
-                drawn.panels[k].plot(
-                    envelope.speeds * RPM, factors[k] * values, color=one.colour, linestyle=style, linewidth=1.4
+                layout.panels[k].plot(
+                    envelope.speeds * RPM, factors[k] * values, color=series.colour, linestyle=style, linewidth=1.4
                 )
                 maximum[k] = max(maximum[k], factors[k] * float(values.max(initial=0.0)))
-        force, travel = max(ways.worst_force for ways in runs), max(ways.worst_travel for ways in runs)
-        legend.append(one.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
-    for axes, (label, channel), factor, top in zip(drawn.panels, _ROWS, factors, maximum, strict=True):
+        force, travel = (
+            max(envelope_of_run.worst_force for envelope_of_run in runs),
+            max(envelope_of_run.worst_travel for envelope_of_run in runs),
+        )
+        legend.append(series.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
+    for axes, (label, channel), factor, panel_maximum in zip(layout.panels, _ROWS, factors, maximum, strict=True):
         limits = [factor * limit.maximum for limit in limits_on(result, channel)]
         for limit in limits:
             axes.axhline(limit, color=LIMIT, linewidth=1.0)
-        axes.set(xlim=(0.0, run.speed * RPM), ylim=(0.0, 1.1 * max([top, *limits]) or 1.0), ylabel=label)
-        axes.tick_params(labelbottom=axes is drawn.panels[-1])
-    drawn.panels[-1].set_xlabel("crank speed [rpm]")
+        axes.set(xlim=(0.0, run.speed * RPM), ylim=(0.0, 1.1 * max([panel_maximum, *limits]) or 1.0), ylabel=label)
+        axes.tick_params(labelbottom=axes is layout.panels[-1])
+    layout.panels[-1].set_xlabel("crank speed [rpm]")
     if any(limits_on(result, channel) for _, channel in _ROWS):
         legend.append(entry("limit", color=LIMIT))
     legend += [entry(name, color=INK, linestyle=style) for style, name in _RUNS]
     times = f"{run.up:g} s" if run.up == run.down else f"{run.up:g} s up and {run.down:g} s down"
     lines = f"On any mount, in {times} at constant acceleration; loads of {run_point(result).name}."
-    return finish_page(drawn, result, "Through resonance", lines, legend)
+    return finish_page(layout, result, "Through resonance", lines, legend)

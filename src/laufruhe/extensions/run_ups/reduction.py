@@ -1,4 +1,4 @@
-"""Reduction: what else is asked is decided first, and run-ups after it."""
+"""Reduction of run-ups: the problem without run-ups is solved first."""
 
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.problem.decision import Kind

@@ -1,4 +1,4 @@
-"""Run-up and shut-down of a design under its own loads (E28)."""
+"""Run-up and shut-down of a design under its loads (E28)."""
 
 from __future__ import annotations
 
@@ -26,26 +26,28 @@ from laufruhe.physics.steady_state import integrated, motion_rates, static_size
 from laufruhe.physics.time_model import TimeModel, time_model
 
 HIGHEST = 12.0
-"""Last order of the loads that is followed: those beyond shake the block by less than what the steps leave open."""
+"""Highest order of the loads in a run; higher ones move the block by less than the error between steps."""
 STRETCHES, FOLLOWED, RESOLVED = 60, 1e-4, 1e-6
+"""Intervals of an envelope, and relative tolerances of the integrator for stiff and for other mounts."""
 MOST_SWINGS = 2e3
+"""Most vibrations of a mode in a run that an explicit integrator resolves."""
 COARSEST = 4.0
-"""Times as long as usual that steps may be."""
+"""Largest factor by which steps may be longer than usual."""
 STEPS_PER_PERIOD = 24
 LEAST_STEPS, MOST_STEPS = 16, 4000
-"""Steps at which a stretch of a run is read."""
+"""Fewest and most steps in an interval of the envelope."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunUp:
-    """Run-up or shut-down through resonance.
+    """Envelope of run-up or shut-down through resonance.
 
     Attributes
     ----------
     speeds
-        Crank speed at the end of every stretch [rad/s], shape (n,).
+        Crank speed at the end of each interval [rad/s], shape (n,).
     force, travel, twist
-        Largest on any mount within the stretch, and largest roll of the block, shape (n,) [N], [m], [rad].
+        Maximum in the interval: force on any mount [N], travel of any mount [m], roll of the block [rad]; shape (n,).
     """
 
     speeds: Array
@@ -55,81 +57,83 @@ class RunUp:
 
     @property
     def worst_force(self) -> float:
-        """Largest force of the whole run [N]."""
+        """Largest force of the run [N]."""
         return float(self.force.max())
 
     @property
     def worst_travel(self) -> float:
-        """Largest travel of the whole run [m]."""
+        """Largest travel of the run [m]."""
         return float(self.travel.max())
 
     @property
     def worst_twist(self) -> float:
-        """Largest roll of the whole run [rad]."""
+        """Largest roll of the run [rad]."""
         return float(self.twist.max())
 
 
 def point_of(run: Run, points: Sequence[OperatingPoint]) -> OperatingPoint:
-    """Return the operating point whose gas drives the engine meanwhile."""
+    """Return the operating point whose gas drives the run; the slowest by default."""
     named = [point for point in points if point.name == run.point]
     return named[0] if named else min(points, key=lambda point: point.speed)
 
 
 def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    """Return run-up and shut-down under the inertia loads of every speed and the gas of one operating point.
+    """Return run-up and shut-down under the inertia loads of each speed and the gas loads of one operating point.
 
     Raises
     ------
     ModelError
-        If the engine stands on no elastic mounts.
+        If the engine has no elastic mounts.
     """
-    return _found_runs(replace(engine, bearings=(), flywheel=None, extras=()), point, fidelity, run)
+    return _cached_runs(replace(engine, bearings=(), flywheel=None, extras=()), point, fidelity, run)
 
 
 @lru_cache(maxsize=32)
-def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
+def _cached_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
     if engine.block is None:
         raise ModelError("a run-up through resonance needs elastic mounts")
-    mounting, driven = elastic_mounting(engine.block, engine.mounts), replace(engine, block=None, mounts=())
+    mounting, engine_alone = elastic_mounting(engine.block, engine.mounts), replace(engine, block=None, mounts=())
 
     def through(first: float, last: float, seconds: float) -> RunUp:
         sweep = sweep_of(first, last, seconds)
         if sweep is not None:
-            (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, driven, point, fidelity)])
+            (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, engine_alone, point, fidelity)])
             if response is not None:
                 return _envelope(response, first, last)
-        # a mode that swings a million times in a run is followed, not resolved
-        stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
-        followed: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if stiff else ("DOP853", RESOLVED)
-        return run_through(mounting, *_loads(driven, point, fidelity), first, last, seconds, STRETCHES, *followed)
+        # modes that vibrate too often for an explicit method need a stiff integrator
+        is_stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
+        integrator: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if is_stiff else ("DOP853", RESOLVED)
+        return run_through(
+            mounting, *_loads(engine_alone, point, fidelity), first, last, seconds, STRETCHES, *integrator
+        )
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
 
 
 def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Sweep | None:
-    """Return equal steps of a run, `coarser` times as long as for a final evaluation; None where there are too many."""
+    """Return equal steps of a run, `coarser` times as long as for a final evaluation; None if they are too many."""
     fastest = max(first, last) * HIGHEST
-    wanted = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
-    if wanted > COARSEST * MOST_STEPS:
+    needed_steps = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
+    if needed_steps > COARSEST * MOST_STEPS:
         return None
-    count = STRETCHES * max(int(min(max(wanted + 1.0, LEAST_STEPS), MOST_STEPS)) // coarser, LEAST_STEPS)
+    count = STRETCHES * max(int(min(max(needed_steps + 1.0, LEAST_STEPS), MOST_STEPS)) // coarser, LEAST_STEPS)
     return Sweep(first, (last - first) / seconds, seconds / count, count)
 
 
 def missed_share(run: Run) -> float:
-    """Return the share of a largest value that may stand between steps, for orders up to the highest (E28)."""
-    wanted = STEPS_PER_PERIOD * run.speed * HIGHEST * (max(run.up, run.down) / STRETCHES) / math.tau
-    steps = STEPS_PER_PERIOD * min(1.0, MOST_STEPS / wanted)
+    """Return the largest relative error of a maximum between steps, for orders up to the highest (E28)."""
+    needed_steps = STEPS_PER_PERIOD * run.speed * HIGHEST * (max(run.up, run.down) / STRETCHES) / math.tau
+    steps = STEPS_PER_PERIOD * min(1.0, MOST_STEPS / needed_steps)
     return 1.0 / math.cos(math.pi / steps) - 1.0 if steps > 2.0 else math.inf
 
 
 def run_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
-    """Return the wrench of inertia per square of crank speed, and that of the gas, of the orders of a run (E28)."""
+    """Return the wrench of inertia per squared crank speed, and of the gas or None, for the orders of a run (E28)."""
     inertia, gas = split_loads(engine, point, fidelity)
     return inertia.truncated(HIGHEST), None if gas is None else gas.truncated(HIGHEST)
 
 
-# what stands on other mounts is driven by the same loads
+# designs with other mounts share the loads
 _loads = lru_cache(maxsize=8)(run_loads)
 
 
@@ -159,16 +163,20 @@ def run_through(
     method: Literal["DOP853", "RK45", "Radau"] = "DOP853",
     tolerance: float = 1e-6,
 ) -> RunUp:
-    """Return a run-up (or shut-down) at constant acceleration, from rest at `first`, integrated by SciPy (E28).
+    """Return a run-up or shut-down at constant acceleration, from rest at speed `first`, integrated by SciPy (E28).
 
     Parameters
     ----------
     inertia
-        Wrench per square of crank speed [N s2, N m s2].
+        Wrench per squared crank speed [N s2, N m s2].
     gas
-        Wrench that does not depend on speed; none for a motored engine.
+        Wrench that is independent of speed [N, N m]; None for a motored engine.
+    first, last
+        Crank speeds [rad/s].
+    duration
+        Time of the run [s].
     stretches
-        Into which the run is cut for its envelope.
+        Intervals of the envelope.
 
     Raises
     ------
@@ -196,14 +204,14 @@ def run_through(
 def _maximum(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
     force, travel = model.mount_forces(y, rate), model.mount_travels(y)
     sizes = (np.linalg.norm(signal, axis=-1).max() for signal in (force, travel))
-    force_most, travel_most = (float(size) for size in sizes)
-    return force_most, travel_most, float(np.abs(model.roll @ y).max())
+    largest_force, largest_travel = (float(size) for size in sizes)
+    return largest_force, largest_travel, float(np.abs(model.roll @ y).max())
 
 
 def _sweeping(
     loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
 ) -> Callable[[float], Array]:
-    # E28: crank speed grows by `gain`; the first load is inertia, which grows with the square of the speed
+    # E28: crank speed rises by `gain`; the first load is inertia, in proportion to the square of the speed
     def load(t: float) -> Array:
         speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
         parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]

@@ -1,4 +1,4 @@
-"""Tell the largest forces and travels between rest and speed."""
+"""Report section of run-up and shut-down: largest force, travel and roll."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ HEAD = ("", "time", "largest force", "largest travel", "largest roll")
 
 
 def _tables(result: Result) -> list[Table]:
-    # run-up and shut-down, where the problem says how these go
+    # a table only if the problem sets the run
     if result.problem.engine.extra(Run) is None:
         return []
     run, (up, down) = run_of(result), runs_of_design(result, result.final)
@@ -37,25 +37,25 @@ def _tables(result: Result) -> list[Table]:
 
 def _record(result: Result) -> dict[str, Any]:
     run = run_of(result)
-    maximum = {
-        way: {
+    records = {
+        direction: {
             "time": time,
             "force": envelope.worst_force,
             "travel": envelope.worst_travel,
             "twist": envelope.worst_twist,
         }
-        for way, time, envelope in zip(
+        for direction, time, envelope in zip(
             ("up", "down"), (run.up, run.down), runs_of_design(result, result.final), strict=True
         )
     }
-    return {"up_to": run.speed, "point": run_point(result).name, **maximum}
+    return {"up_to": run.speed, "point": run_point(result).name, **records}
 
 
 def _over_speed(result: Result) -> Table:
     rows = [
-        [design, way, RPM * speed, force, travel, math.degrees(twist)]
+        [design, direction, RPM * speed, force, travel, math.degrees(twist)]
         for design, evaluation in designs_with_loads(result).items()
-        for way, run in zip(("run-up", "shut-down"), runs_of_design(result, evaluation), strict=True)
+        for direction, run in zip(("run-up", "shut-down"), runs_of_design(result, evaluation), strict=True)
         for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]
     return Table(

@@ -1,4 +1,4 @@
-"""Peaks of run-ups with slopes, and bounds over boxes of stiffness, for searches and bounds of mounts."""
+"""Peaks of run-ups with slopes, and bounds of run-ups over boxes of stiffness."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.prove.mounts.box_response import BoxModel
 
 
 def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, roughly: bool) -> RunPeaks:
-    """Return the peaks of measures of run-ups; roughly: without bump stops, which cost most."""
+    """Return the peaks of measures of run-ups; `roughly` omits bump stops, which cost most of the time."""
     if roughly:
         mounts = (
             mount.mapped(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
@@ -25,5 +25,5 @@ def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, roughly: 
 
 
 def boxes(model: BoxModel, measures: Sequence[Measure]) -> RunBoxes | None:
-    """Return the bounds over boxes of stiffness; None where nothing bounds run-ups."""
+    """Return the bounds over boxes of stiffness, or None if boxes cannot bound the run-ups."""
     return RunBoxes(model, measures) if bounds_runs(model.problem) else None

@@ -1,9 +1,8 @@
-"""Run-ups and shut-downs that are asked about: checked where that is enough, designed for where it is not.
+"""Optimum with run-ups and shut-downs in objective or limits.
 
-What else is asked is decided first, without them: a design that keeps their limits is the best with them too, and what
-bounds it bounds all that keep them. Where loads add up, on mounts that stand, without bump stops, cones have the steps
-of a run that matter (E28a); where mounts are open, or stops are met, a smooth program has the peaks that the exact
-model tells (E28b).
+The problem without run-ups is solved first: if its optimum satisfies the limits of run-ups, it is optimal, and its
+lower bound holds in any case. For fixed mounts without bump stops loads add up, and a cone program has the active steps
+of a run (E28a). With open mounts or bump stops, a smooth program has the peaks of the exact model (E28b).
 """
 
 from __future__ import annotations
@@ -30,19 +29,19 @@ Decide = Callable[[Problem], Result]
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
-    """Return the best design where run-ups are minimised or limited.
+    """Return the optimum of a problem with run-ups in objective or limits.
 
     Parameters
     ----------
     kinds
-        Kinds of what is open.
+        Kinds of the open numbers.
     decide
-        Function that decides a problem without run-ups.
+        Function that solves a problem without run-ups.
 
     Raises
     ------
     ModelError
-        If a run-up is minimised over what nothing decides it by.
+        If no method minimises a run-up over these kinds.
     """
     simulated = simulated_measures(problem)
     limits = tuple(limit for limit in problem.limits if limit.measure in simulated)
@@ -54,35 +53,35 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     relaxed = None
     if without_runs.objective:
         relaxed = decide(without_runs)
-        broken = broken_limits(limits, relaxed.final)
-        if not relaxed.status.has_design or not (broken or terms):
-            # without what is asked of run-ups nothing is missing
+        violated = broken_limits(limits, relaxed.final)
+        if not relaxed.status.has_design or not (violated or terms):
+            # the relaxed optimum satisfies the limits of run-ups
             return with_limits(relaxed, problem.limits)
         if relaxed.problem.fidelity != problem.fidelity:
-            # its bound is of the physics that it was found accurate by
+            # its bound holds for the fidelity that its accuracy needed
             problem = problem.at(relaxed.problem.fidelity)
-    designed = _designed(problem, kinds, limits, terms, relaxed, decide)
-    if designed is not None:
-        return designed
-    others = " and ".join(kind.name.lower() for kind in sorted(kinds - _SMOOTH)) or "this"
+    result = _run_result(problem, kinds, limits, terms, relaxed, decide)
+    if result is not None:
+        return result
+    other_kinds = " and ".join(kind.name.lower() for kind in sorted(kinds - _SMOOTH)) or "this"
     if terms or relaxed is None:
         name = terms[0].measure.name
-        raise ModelError(f"{name} is minimised over unbalances and mounts, not over {others}; fix it, or limit it")
+        raise ModelError(f"{name} is minimised over unbalances and mounts, not over {other_kinds}; fix it, or limit it")
     names = quoted(broken_limits(limits, relaxed.final))
-    why = (
-        f"the best design found breaks {names}: beside {others} a run-up is checked, not designed for; "
-        f"relax it, fix {others}, or limit travel"
+    message = (
+        f"the best design found breaks {names}: beside {other_kinds} a run-up is checked, not designed for; "
+        f"relax it, fix {other_kinds}, or limit travel"
     )
-    return replace(with_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=why)
+    return replace(with_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=message)
 
 
-def _designed(
+def _run_result(
     problem: Problem, kinds: frozenset[Kind], limits: Sequence[Limit], terms: Sequence[Term], relaxed: Result | None,
     decide: Decide,
 ) -> Result | None:  # fmt: skip
-    """Return a design by a method for run-ups; None where there is none."""
+    """Return the result of a method for run-ups; None if there is no such method."""
     if problem.phasing is not None:
-        return _of_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
+        return _solve_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
     rows = RunRows.from_problem(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)
@@ -93,7 +92,9 @@ def _designed(
     return solve_run_mounts(problem, relaxed)
 
 
-def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
+def _solve_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
     if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
         return None
-    return solve_every_order(problem, phasing, even_stars(phasing), lambda own, _: decide(replace(own, phasing=None)))
+    return solve_every_order(
+        problem, phasing, even_stars(phasing), lambda star_problem, _: decide(replace(star_problem, phasing=None))
+    )

@@ -1,9 +1,10 @@
-"""Run-up on mounts with bump stops, in equal steps: the modes of the mounts, and stops as further loads (E28b).
+"""Run-up on mounts with bump stops, in equal steps: modes of the mounts, and stops as further loads (E28b).
 
-    z_{k+1} = e^{A h} z_k + b_k + integral of e^{A (h - s)} f(s) ds,   f what the stops press on the block
+    z_{k+1} = e^{A h} z_k + b_k + integral of e^{A (h - s)} f(s) ds,   f the force of the stops on the block
 
-b_k is known before, as on mounts without stops (E28a). While no stop is touched it is all there is, many steps at once.
-Else f runs straight from its value at the start of the step to that at a first guess of its end (second order in h).
+b_k is the contribution of the loads, as on mounts without stops (E28a). While no stop is touched, it is the only one,
+and many steps are computed at once. Otherwise f is linear from its value at the start of the step to that at a first
+guess of its end (second order in h).
 """
 
 from __future__ import annotations
@@ -18,24 +19,24 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
 QUICKEST = 0.5
-"""Turn of the quickest swing on stops within a step [rad]."""
+"""Largest phase of the fastest vibration on stops within a step [rad]."""
 
 
 @dataclass(frozen=True, eq=False)
-class _Side:
-    """Several designs side by side: first axis the designs, of conjugate modes one, its parts two numbers.
+class _DesignBatch:
+    """Modes of several designs, computed together; of conjugate modes one, as two real numbers.
 
     Attributes
     ----------
     decays
         e^{rate h}, shape (designs, modes).
     seen
-        Matrix from modes to travel along the own axes of the springs with stops, shape (designs, springs, 2 modes).
+        Map from modes to travel along the axes of springs with stops, shape (designs, springs, 2 modes).
     first, second
-        What a load along those axes that stands, and one that grows to itself, add to modes in a step, shape
+        Change of the modes in a step by a constant load along these axes, and by one that rises linearly to 1, shape
         (designs, 2 modes, springs).
     gaps, stops
-        Shape (designs, springs, 1).
+        Gap [m] and stiffness [N/m] of the stops, shape (designs, springs, 1).
     """
 
     decays: ComplexArray
@@ -46,109 +47,109 @@ class _Side:
     stops: Array
 
     def pressed(self, z: ComplexArray) -> Array:
-        """Return the forces of the stops on the block along the own axes, shape (designs, springs, 1)."""
+        """Return the forces of the stops on the block along their axes, shape (designs, springs, 1)."""
         travel = np.matmul(self.seen, z.view(float)[..., None])
-        inside = np.minimum(np.maximum(travel, -self.gaps), self.gaps)
-        inside -= travel
-        inside *= self.stops
-        return inside
+        stop_force = np.minimum(np.maximum(travel, -self.gaps), self.gaps)
+        stop_force -= travel
+        stop_force *= self.stops
+        return stop_force
 
     def next(self, z: ComplexArray, driven: ComplexArray) -> ComplexArray:
-        """Return the modes after one step."""
+        """Return the modes after one step, shape (designs, modes)."""
         force = self.pressed(z)
-        guess = self.decays * z
-        guess += driven
-        # parts of modes as columns of real numbers
-        parts = guess.view(float)[..., None]
+        next_modes = self.decays * z
+        next_modes += driven
+        # real view of the modes as columns
+        parts = next_modes.view(float)[..., None]
         parts += np.matmul(self.first, force)
-        again = self.pressed(guess)
-        again -= force
-        parts += np.matmul(self.second, again)
-        return guess
+        force_change = self.pressed(next_modes)
+        force_change -= force
+        parts += np.matmul(self.second, force_change)
+        return next_modes
 
 
 def responses_to(
     models: Sequence[TimeModel | None], sweep: Sweep, wrenches: Sequence[Array]
 ) -> list[RunResponse | None]:  # fmt: skip
-    """Return the motion of each design under wrenches of `Sweep.wrenches`; None where steps fail.
+    """Return the motion of each design under wrenches of `Sweep.wrenches`; None if steps fail.
 
-    With bump stops they are followed side by side, so that one without an answer leaves all without.
+    With bump stops all designs are computed together, so that all are None if one fails.
     """
     runs = [None if model is None else LinearRun(model, sweep) for model in models]
-    known = [run for run in runs if run is not None]
-    if not any(run.model.has_stops for run in known):
+    valid_runs = [run for run in runs if run is not None]
+    if not any(run.model.has_stops for run in valid_runs):
         return [
             run.response(loads) if run and run.is_known else None for run, loads in zip(runs, wrenches, strict=True)
         ]
-    firm = any(quickest(run.model) * sweep.step > QUICKEST or not run.is_resolved for run in known)
-    if firm or len(known) < len(runs) or len({len(run.modes[0]) for run in known}) > 1:
+    is_too_stiff = any(quickest(run.model) * sweep.step > QUICKEST or not run.is_resolved for run in valid_runs)
+    if is_too_stiff or len(valid_runs) < len(runs) or len({len(run.modes[0]) for run in valid_runs}) > 1:
         return [None] * len(runs)
-    side = _side_by_side(known, sweep.step)
-    driven = np.stack([run.driven(loads) for run, loads in zip(known, wrenches, strict=True)])
-    return [run.response_of(loads) for run, loads in zip(known, _followed(side, driven), strict=True)]
+    batch = _batch_of(valid_runs, sweep.step)
+    driven = np.stack([run.driven(loads) for run, loads in zip(valid_runs, wrenches, strict=True)])
+    return [run.response_of(loads) for run, loads in zip(valid_runs, _followed(batch, driven), strict=True)]
 
 
 def quickest(model: TimeModel) -> float:
-    """Return a bound of the frequency that the stops alone give the block [rad/s]."""
+    """Return an upper bound of the angular frequency of the block on its stops alone [rad/s]."""
     return float(np.linalg.norm(np.sqrt(model.stops)[:, None] * model.travels, 2))
 
 
-def _side_by_side(runs: Sequence[LinearRun], step: float) -> _Side:
-    # any design may have its stops elsewhere
-    met = np.flatnonzero(np.any([_stiffness(run.model) > 0.0 for run in runs], axis=0))
+def _batch_of(runs: Sequence[LinearRun], step: float) -> _DesignBatch:
+    # springs with a stop in any design
+    with_stops = np.flatnonzero(np.any([_stiffness(run.model) > 0.0 for run in runs], axis=0))
     parts = []
     for run in runs:
         model, (rates, shapes, inverse) = run.model, run.modes
-        into = inverse @ model.travels[met].T
-        grown, x = np.exp(rates * step), rates * step
-        # series where a rate is next to zero
-        small = np.abs(x) < 1e-4
-        safe = np.where(small, 1.0, x)
-        stands = np.where(small, 1.0 + 0.5 * x, (grown - 1.0) / safe)
-        grows = np.where(small, 0.5 + x / 6.0, (grown - 1.0 - x) / safe**2)
-        seen = model.travels[met] @ shapes[: model.size]
-        first, second = (step * weight[:, None] * into for weight in (stands, grows))
-        stiffness = _stiffness(model)[met]
-        gaps = np.where(stiffness > 0.0, model.gaps[met], np.inf)
-        parts.append((grown, np.stack([seen.real, -seen.imag], axis=-1).reshape(len(met), -1),
-                      _as_rows(first), _as_rows(second), gaps[:, None], stiffness[:, None]))  # fmt: skip
-    return _Side(*(np.stack(part) for part in zip(*parts, strict=True)))
+        mode_loads = inverse @ model.travels[with_stops].T
+        growth, x = np.exp(rates * step), rates * step
+        # series for rates near zero
+        is_small = np.abs(x) < 1e-4
+        divisor = np.where(is_small, 1.0, x)
+        constant_weight = np.where(is_small, 1.0 + 0.5 * x, (growth - 1.0) / divisor)
+        linear_weight = np.where(is_small, 0.5 + x / 6.0, (growth - 1.0 - x) / divisor**2)
+        travel_of_modes = model.travels[with_stops] @ shapes[: model.size]
+        first, second = (step * weight[:, None] * mode_loads for weight in (constant_weight, linear_weight))
+        stiffness = _stiffness(model)[with_stops]
+        gaps = np.where(stiffness > 0.0, model.gaps[with_stops], np.inf)
+        real_travel = np.stack([travel_of_modes.real, -travel_of_modes.imag], axis=-1).reshape(len(with_stops), -1)
+        parts.append((growth, real_travel, _real_rows(first), _real_rows(second), gaps[:, None], stiffness[:, None]))
+    return _DesignBatch(*(np.stack(part) for part in zip(*parts, strict=True)))
 
 
 def _stiffness(model: TimeModel) -> Array:
     return np.where(np.isfinite(model.gaps), model.stops, 0.0)
 
 
-def _as_rows(into: ComplexArray) -> Array:
-    return np.ascontiguousarray(np.stack([into.real, into.imag], axis=1).reshape(2 * len(into), -1))
+def _real_rows(columns: ComplexArray) -> Array:
+    return np.ascontiguousarray(np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1))
 
 
-def _followed(side: _Side, driven: ComplexArray) -> ComplexArray:
-    """Return the modes after every step, shape (designs, modes, steps + 1), from what drives them in each."""
-    out = np.array(driven)
-    powers = side.decays[..., None] ** np.arange(1, BLOCK + 1)
+def _followed(batch: _DesignBatch, driven: ComplexArray) -> ComplexArray:
+    """Return the modes after each step, shape (designs, modes, steps + 1), from their excitation in each step."""
+    states = np.array(driven)
+    powers = batch.decays[..., None] ** np.arange(1, BLOCK + 1)
     count, z = driven.shape[-1], np.ascontiguousarray(driven[..., 0])
     for start in range(1, count, BLOCK):
         driving_block = driven[..., start : start + BLOCK]
-        free = _free(driving_block, z, side.decays, powers)
-        if _touches(side, free) or np.any(side.pressed(z)):
+        free = _free(driving_block, z, batch.decays, powers)
+        if _touches(batch, free) or np.any(batch.pressed(z)):
             steps = np.ascontiguousarray(np.moveaxis(driving_block, -1, 0))
             for k, driving in enumerate(steps):
-                z = side.next(z, driving)
+                z = batch.next(z, driving)
                 steps[k] = z
             free = np.moveaxis(steps, 0, -1)
-        out[..., start : start + BLOCK], z = free, np.ascontiguousarray(free[..., -1])
-    return out
+        states[..., start : start + BLOCK], z = free, np.ascontiguousarray(free[..., -1])
+    return states
 
 
-def _touches(side: _Side, free: ComplexArray) -> bool:
+def _touches(batch: _DesignBatch, free: ComplexArray) -> bool:
     parts = np.stack([free.real, free.imag], axis=2).reshape(len(free), -1, free.shape[-1])
-    return bool(np.any(np.abs(side.seen @ parts) > side.gaps))
+    return bool(np.any(np.abs(batch.seen @ parts) > batch.gaps))
 
 
 def _free(driven: ComplexArray, z: ComplexArray, decays: ComplexArray, powers: ComplexArray) -> ComplexArray:
-    out, reach = np.array(driven), 1
-    while reach < out.shape[-1]:
-        out[..., reach:] += (decays**reach)[..., None] * out[..., :-reach]
+    states, reach = np.array(driven), 1
+    while reach < states.shape[-1]:
+        states[..., reach:] += (decays**reach)[..., None] * states[..., :-reach]
         reach *= 2
-    return np.asarray(out + powers[..., : out.shape[-1]] * z[..., None])
+    return np.asarray(states + powers[..., : states.shape[-1]] * z[..., None])
