@@ -39,8 +39,8 @@ def test_each_size_takes_numbers_one_way_or_is_refused() -> None:
     boxes = SimpleNamespace(model=model)
     assert SizeBoxes._monotonicity(boxes, lambda x: np.array([x[0] + x[1], x[1]])).tolist() == [1.0, 1.0]
     assert SizeBoxes._monotonicity(boxes, lambda x: np.array([-2.0 * x[1], 3.0])).tolist() == [0.0, -1.0]
-    with pytest.raises(ValueError, match="one way with bore"):
+    with pytest.raises(ValueError, match="not monotonic in bore"):
         SizeBoxes._monotonicity(boxes, lambda x: np.array([x[0], -x[0]]))
     # it rises where the other is least, and falls where that is most
-    with pytest.raises(ValueError, match="one way with bore"):
+    with pytest.raises(ValueError, match="not monotonic in bore"):
         SizeBoxes._monotonicity(boxes, lambda x: np.array([x[0] * (0.5 - x[1])]))
