@@ -185,7 +185,7 @@ points alone, and boxes of sizes one of row lengths.
 """
 FACTS = {
     "is_convex": "convex",
-    "of_row_lengths": "of row lengths",
+    "is_monotone_in_lengths": "of row lengths",
     "is_pointwise": "points alone",
     "sums_lengths": "sum of lengths",
     "is_euclidean": "root of the sum of squares",

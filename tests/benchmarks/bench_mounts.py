@@ -54,7 +54,10 @@ def one_speed(problem: Problem) -> list[str]:
         return mounting.forces(shaking_loads(problem.engine, point, problem.fidelity), point.speed)
 
     # the motion of one wrench is kept for forces and travel: a copy is another one
-    response, whole = seconds(lambda: mounting.forces(wrench.holding(wrench.coefficients), point.speed)), seconds(anew)
+    response, whole = (
+        seconds(lambda: mounting.forces(wrench.with_coefficients(wrench.coefficients), point.speed)),
+        seconds(anew),
+    )
     runs = {}
     for steps in (720, 1440):
         started = time.process_time()
@@ -175,7 +178,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
         at = evaluate(problem, problem.design([*unbalances, *x[:count].tolist()]), SAMPLES)
-        rooms = [-at.standing(limit).violation for limit in problem.mount_limits]
+        rooms = [-at.check_limit(limit).violation for limit in problem.mount_limits]
         rooms += [1.0 - at.value(limit.measure) / limit.maximum for limit in problem.load_limits]
         rooms += [1.0 - abs(u) / d.upper for d, u in zip(rotors, unbalances, strict=True)]
         return objective_value(problem, at), np.array(rooms)

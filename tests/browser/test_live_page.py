@@ -31,7 +31,7 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
         told = {name for name, _ in model.unmoved}
         for limit in problem.limits:
             if limit.name not in told:
-                value = found.standing(limit).value
+                value = found.check_limit(limit).value
                 assert shown[limit.name] == pytest.approx(value, rel=1e-11, abs=1e-12)
     assert page.evaluate("laufruheLive.page.then(page => page.checked)") < 1e-11
 
@@ -90,7 +90,7 @@ def test_a_norm_that_the_page_does_not_know_leaves_the_rest_at_work(still: Page,
         found = evaluated(problem, model, values)
         assert shown["objective"] is None
         for limit in problem.limits[1:]:
-            assert shown[limit.name] == pytest.approx(found.standing(limit).value, rel=1e-11, abs=1e-12)
+            assert shown[limit.name] == pytest.approx(found.check_limit(limit).value, rel=1e-11, abs=1e-12)
     expect(still.locator("[data-role=regret]")).to_contain_text("The objective cannot be followed live.")
     row = still.locator('tr[data-measure="worst twentieth mount force"]')
     expect(row).to_contain_text("cannot be followed live")

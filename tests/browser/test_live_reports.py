@@ -46,7 +46,7 @@ SLIDE = """async values => {
 
 def printed(problem: Problem, found: Evaluation, names: Collection[str]) -> dict[str, list[str]]:
     """What a report shows of these limits of a design."""
-    stands = {limit: found.standing(limit) for limit in problem.limits if limit.name in names}
+    stands = {limit: found.check_limit(limit) for limit in problem.limits if limit.name in names}
     return {
         limit.name: [figure(stand.value, limit.measure.unit), str(stand.violation <= 1e-5).lower()]
         for limit, stand in stands.items()

@@ -11,7 +11,7 @@ import pytest
 
 import laufruhe
 from laufruhe.numerics.norms import NORMS, Grid, Norm
-from laufruhe.numerics.norms.norm import lengths, only
+from laufruhe.numerics.norms.norm import lengths, norm_instance
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem import dependence, measure
 from laufruhe.problem.channels import _KNOWN, CHANNELS, MOUNT_FORCE, ON_BLOCK, LoadChannel, Needs
@@ -46,8 +46,8 @@ class WorstTwentieth(Norm):
         size = np.sort(lengths(rows))
         return float(size[-max(len(size) // 20, 1) :].mean())
 
-    def above(self, signals: Sequence[Spectrum], shares: np.ndarray) -> float:
-        return NORMS["maximum"].above(signals, shares)
+    def upper_bound(self, signals: Sequence[Spectrum], shares: np.ndarray) -> float:
+        return NORMS["maximum"].upper_bound(signals, shares)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: np.ndarray, steps: int, finest: int) -> float:
         return NORMS["maximum"].sampling_bound(signals, shares, steps, finest)
@@ -63,7 +63,7 @@ def resultant(monkeypatch: pytest.MonkeyPatch) -> LoadChannel:
 
 @pytest.fixture
 def worst_twentieth(monkeypatch: pytest.MonkeyPatch) -> Norm:
-    norm = only(WorstTwentieth)
+    norm = norm_instance(WorstTwentieth)
     monkeypatch.setitem(measure.MEASURES, f"{norm.name} {MOUNT_FORCE}", (MOUNT_FORCE, norm))  # type: ignore[arg-type]
     return norm
 

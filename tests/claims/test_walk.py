@@ -200,7 +200,7 @@ class WorstTwentieth(Maximum):
         maximum = np.divide(0.05 * size, shares, out=np.zeros_like(size), where=shares > 0.0)
         return float(max(maximum.max(initial=0.0), size.sum()))
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         count = max(lengths.shape[-1] // 20, 1)
         return np.asarray(np.sort(lengths, axis=-1)[..., -count:].mean(axis=-1))
 

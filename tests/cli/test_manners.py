@@ -19,7 +19,7 @@ from cli import scenes
 from laufruhe.cli import app
 from laufruhe.cli.screen import Watched, spoken
 from laufruhe.files import reader
-from laufruhe.numerics.progress import Step, progress_listener, report_progress, within
+from laufruhe.numerics.progress import Step, progress_listener, report_progress, search_scope
 from laufruhe.solvers import solve
 from problem_files import PROBLEMS, loaded, written
 
@@ -243,7 +243,7 @@ def test_progress_shows_value_bound_and_gap_of_the_outermost_search() -> None:
 
 def test_searches_tell_who_listens_and_no_one_else() -> None:
     heard: list[Step] = []
-    with progress_listener(heard.append), within("outer"):
+    with progress_listener(heard.append), search_scope("outer"):
         report_progress("inner", 1, 2, 3.0, 2.0)
     report_progress("nobody listens")
     assert [(step.within, step.what, step.gap) for step in heard] == [(("outer",), "inner", pytest.approx(1 / 3))]

@@ -63,7 +63,7 @@ def test_gas_alone_is_cut(seed: int, last: int) -> None:
     problem = _scene(random_problem, seed)
     for point in problem.points:
         cut, none, whole = (
-            shaking_loads(problem.engine, point, fidelity).rebased(problem.engine.cycle.base_order)
+            shaking_loads(problem.engine, point, fidelity).with_finer_base(problem.engine.cycle.base_order)
             for fidelity in (Fidelity(gas_orders=last), Fidelity(gas=False), Fidelity())
         )
         length, scale = len(whole.coefficients), np.abs(whole.coefficients).max()

@@ -22,7 +22,7 @@ from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import evaluate, measured, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, place_measures
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.accuracy import error_of
@@ -66,7 +66,7 @@ def _signal(problem: Problem, measure: Measure, k: int, count: int) -> np.ndarra
     whole = engine.cycle.angle
     bends = [_bends(point.gas, part, whole) + part.firing_angle for part in engine.slider_cranks]
     angles = np.concatenate([np.arange(count) * whole / count, np.mod(np.concatenate(bends), whole)])
-    silent = shaking_loads(engine, replace(point, gas=None), problem.fidelity).rebased(engine.cycle.base_order)
+    silent = shaking_loads(engine, replace(point, gas=None), problem.fidelity).with_finer_base(engine.cycle.base_order)
     steady = np.concatenate([silent.sample(count), silent.values(angles[count:])])
     for part in engine.slider_cranks:
         steady[:, 3] += _torque(point.gas, part, np.mod(angles - part.firing_angle, whole), engine.cycle)
@@ -160,7 +160,7 @@ def test_a_peak_at_the_cut_off_is_found(samples: int, tmp_path: Path) -> None:
     assert result.certificate is not None
     assert abs(result.objective.value - truth) <= result.error_estimate * truth
     assert result.objective.value == pytest.approx(truth, rel=1e-6)
-    assert max(each.max for each in measured(result.final, 0)) == pytest.approx(truth, rel=1e-6)
+    assert max(each.max for each in place_measures(result.final, 0)) == pytest.approx(truth, rel=1e-6)
     assert result.certificate.lower_bound <= truth * (1.0 + (1e-6 if samples < 1440 else 1e-9))
     assert result.certificate.gap <= problem.tolerance
 
@@ -196,7 +196,7 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
         beside = [ends + turn * math.tau + side for turn in range(2) for side in (-1e-9, 1e-9)]
         bends = np.concatenate([_bends(point.gas, part, cycle.angle), *beside])
         angles = np.concatenate([np.arange(QUICK) * cycle.angle / QUICK, np.mod(bends, cycle.angle)])
-        silent = pin_forces(engine, replace(point, gas=None)).rebased(cycle.base_order)
+        silent = pin_forces(engine, replace(point, gas=None)).with_finer_base(cycle.base_order)
         whole = silent.values(angles + part.firing_angle)[:, k]
         assert point.gas is not None
         push = part.piston_area * (pressure_at(point.gas, part, cycle, angles) - point.gas.crankcase_pressure)

@@ -14,7 +14,7 @@ from laufruhe.live import LiveModel, live_model
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.numerics.norms.mean import Mean
-from laufruhe.numerics.norms.norm import only
+from laufruhe.numerics.norms.norm import norm_instance
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.report.result_report import result_document
@@ -72,7 +72,7 @@ class WorstTwentieth(Mean):
 
 def with_unknown_norm(problem: Problem) -> Problem:
     """The problem with its objective and its first limit of a load in that norm."""
-    norm = only(WorstTwentieth)
+    norm = norm_instance(WorstTwentieth)
     (term,) = problem.objective
     first, *others = problem.limits
     limit = replace(first, name=f"{norm.name} mount force", measure=replace(first.measure, norm=norm))

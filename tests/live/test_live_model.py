@@ -18,7 +18,7 @@ from laufruhe.live import live_model, page_assets
 from laufruhe.live.parts import Reference
 from laufruhe.live.saving import file_number
 from laufruhe.live.signals import NORMS_OF_PAGE
-from laufruhe.numerics.spectrum import BEHIND
+from laufruhe.numerics.spectrum import JUMP_OFFSET
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.result_report import result_document
@@ -199,7 +199,9 @@ def test_a_served_page_takes_its_reference_from_its_server(every):
     assert live_model(result.problem, result, is_served=True).reference is None
 
 
-@pytest.mark.parametrize(("script", "name", "value"), [("signals.js", "BEHIND", BEHIND), ("judge.js", "KEPT", KEPT)])
+@pytest.mark.parametrize(
+    ("script", "name", "value"), [("signals.js", "BEHIND", JUMP_OFFSET), ("judge.js", "KEPT", KEPT)]
+)
 def test_scripts_have_the_constants_of_the_package(script: str, name: str, value: float) -> None:
     """A page reads jumps on the same side, and keeps limits as near, as the package."""
     text = (files("laufruhe.live") / "page" / script).read_text()

@@ -26,11 +26,11 @@ from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them
 ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
-LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and c.of_wrench)
+LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and c.is_block_load)
 # twist needs discs and shafts, and is tested with them
 OF_CRANKCASE = (channels.Needs.NOTHING, channels.Needs.BEARINGS)
 INSIDE = tuple(
-    Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and not c.of_wrench for norm in c.norms
+    Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and not c.is_block_load for norm in c.norms
 )
 MASSES = tuple(c for c in channels.CHANNELS.values() if isinstance(c, MassChannel))
 HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))
@@ -112,7 +112,7 @@ COLUMNS = st.lists(st.floats(-1.0, 1.0), min_size=5, max_size=5).map(np.array)
 def steps_of(rows: np.ndarray, grid: Grid) -> np.ndarray:
     """Rows without those at bends, of which a cycle has more than a period."""
     blocks = rows.reshape(-1, grid.steps, rows.shape[-1])
-    return blocks[:, : grid.steps - grid.bends].reshape(-1, rows.shape[-1])
+    return blocks[:, : grid.steps - grid.kinks].reshape(-1, rows.shape[-1])
 
 
 @pytest.mark.parametrize(("cylinders", "samples"), [(4, 24), (4, 25), (4, 48), (2, 24), (2, 49)])
@@ -129,7 +129,7 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
         given = steps_of(expected.vectors, expected.grid)
         size = float(np.abs(given).max() + np.abs(norm.constant).max() + np.abs(norm.slope @ affine.scales).max())
         # a load has the rows of its own period alone
-        own = len(found) if quantity.is_mass else norm.grid.steps - norm.grid.bends
+        own = len(found) if quantity.is_mass else norm.grid.steps - norm.grid.kinks
         again = 1 if quantity.is_mass else samples * periods // own
         whole = given.reshape(-1, again, own, given.shape[1])
         for k in range(again):
@@ -159,7 +159,7 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
         used = expected.vectors.any(axis=0)
         size = float(np.abs(expected.vectors).max())
         # the torque of the crank repeats within the cycle, and has the rows of its own period alone
-        own = norm.grid.steps - norm.grid.bends
+        own = norm.grid.steps - norm.grid.kinks
         whole = steps_of(expected.vectors[:, used], expected.grid).reshape(-1, 96 // own, own, used.sum())
         for period in np.moveaxis(whole, 1, 0):
             np.testing.assert_allclose(found, period.reshape(found.shape), rtol=0.0, atol=1e-11 * size)

@@ -116,7 +116,7 @@ def _is_searched(problem: Problem) -> bool:
     return (
         bool(problem.mount_decisions)
         or uneven
-        or any(m.channel.is_number and m.channel.of_loads for m in problem.measures)
+        or any(m.channel.is_number and m.channel.depends_on_loads for m in problem.measures)
     )
 
 

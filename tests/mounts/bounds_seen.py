@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from prove.test_subdivision import boxes
@@ -14,7 +14,7 @@ def designs(problem: Problem, low, high, seed: int) -> list[float]:
     generator, given = np.random.default_rng(seed), evaluate(problem)
     shares = generator.random((6, len(low)))
     return [
-        objective_value(problem, remounted(given, problem.design((low + s * (high - low)).tolist()))) for s in shares
+        objective_value(problem, with_mounts(given, problem.design((low + s * (high - low)).tolist()))) for s in shares
     ]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
@@ -121,7 +121,7 @@ def test_a_cone_solver_that_gives_up_is_asked_how_near_the_limits_can_be_met(tmp
 
     def violation(share):
         x = low + np.clip(share, 0.0, 1.0) * (high - low)
-        return remounted(given, problem.design(x.tolist())).violation(problem.limits)
+        return with_mounts(given, problem.design(x.tolist())).violation(problem.limits)
 
     found = minimize(violation, np.full(len(low), 0.2), method="Nelder-Mead", options={"maxfev": 600})
     assert found.fun > 1e-4
@@ -191,7 +191,9 @@ def test_one_number_on_a_limit_is_proven_by_a_few_boxes(tmp_path: Path) -> None:
     assert boxes is not None
     assert int(boxes[1]) < 200
     given, (stiffness,) = evaluate(problem), problem.mount_decisions
-    designs = [remounted(given, problem.design([float(k)])) for k in np.linspace(stiffness.lower, stiffness.upper, 100)]
+    designs = [
+        with_mounts(given, problem.design([float(k)])) for k in np.linspace(stiffness.lower, stiffness.upper, 100)
+    ]
     allowed = [objective_value(problem, each) for each in designs if each.violation(problem.limits) <= 0.0]
     assert result.certificate.lower_bound <= result.objective.value <= min(allowed)
 

@@ -21,7 +21,7 @@ from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.channels import counted_cases, mounting_in
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_cases import static_loads
 from laufruhe.prove.mounts.box_numbers import UNDER
@@ -145,7 +145,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
         found = UNDER[measure.channel](model, measure, low[None], high[None])
         shares = generator.random((5, 2))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in shares]
-        values = np.array([remounted(still, engine).value(measure) for engine in drawn])
+        values = np.array([with_mounts(still, engine).value(measure) for engine in drawn])
         # the linear function itself is under every design, not its least alone
         lines = found.value + (2.0 * shares - 1.0) @ found.slopes[0] - found.rest
         assert np.all(lines <= values * (1.0 + 1e-9))
@@ -171,7 +171,7 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked
         low, high = (np.clip(centre * (1.0 + side * width), model.lower, model.upper) for side in (-1.0, 1.0))
         shares = generator.random((4, len(low)))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in (*shares, *np.round(shares))]
-        minimum = min(remounted(still, engine).value(measure) for engine in drawn)
+        minimum = min(with_mounts(still, engine).value(measure) for engine in drawn)
         ratios.append(float(static_loads(model, measure, low[None], high[None]).minimum[0]) / minimum)
     assert max(ratios) <= 1.0 + 1e-9
     assert np.median(ratios) > 0.95
@@ -240,8 +240,8 @@ def _by_evolution(problem) -> float:
     given, (limit,) = evaluate(replace(problem, points=())), problem.limits
 
     def worth(x):
-        design = remounted(given, problem.design(np.exp(x).tolist()))
-        return objective_value(problem, design) * (1.0 + 100.0 * max(design.standing(limit).violation, 0.0))
+        design = with_mounts(given, problem.design(np.exp(x).tolist()))
+        return objective_value(problem, design) * (1.0 + 100.0 * max(design.check_limit(limit).violation, 0.0))
 
     bounds = [(np.log(d.lower), np.log(d.upper)) for d in problem.decisions]
     return float(differential_evolution(worth, bounds, seed=1, maxiter=60, popsize=8, tol=1e-9).fun)

@@ -13,7 +13,7 @@ from scipy.optimize import check_grad
 from cli.scenes import SECOND_ORDER_SHAFTS
 from lanes import first_fast
 from laufruhe.files.reader import load
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -234,7 +234,7 @@ def test_joint_design_keeps_its_limits_and_beats_each_part_alone(solved):
     assert result.certificate.kind is Proof.LOCAL
     assert result.certificate.kkt_residual < 1e-7
     assert result.certificate.lower_bound <= result.objective.value
-    assert all(result.final.standing(limit).violation <= 1e-5 for limit in problem.mount_limits)
+    assert all(result.final.check_limit(limit).violation <= 1e-5 for limit in problem.mount_limits)
     assert result.final.value(problem.load_limits[0].measure) <= 0.5 * (1 + 1e-5)
     balance = solve_unbalances(problem.balance)
     assert result.objective.value < balance.objective.value < result.objective.initial
@@ -255,7 +255,7 @@ def test_no_neighbour_within_the_limits_is_better(solved):
         ]
         shaken = [u + size * 0.05 * complex(*generator.normal(size=2)) for u in sizes]
         near = evaluate(problem, problem.design([*shaken, *moved]))
-        kept = all(near.standing(limit).violation <= 1e-9 for limit in problem.mount_limits)
+        kept = all(near.check_limit(limit).violation <= 1e-9 for limit in problem.mount_limits)
         kept = kept and all(near.value(limit.measure) <= limit.maximum for limit in problem.load_limits)
         allowed += kept
         better += kept and objective_value(problem, near) < result.objective.value * (1 - 1e-5)
@@ -386,7 +386,7 @@ def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
     values = [objective_value(problem, evaluate(problem, problem.design(mounts))) for mounts, _ in points]
     assert 0.0 < size <= min(values) * (1.0 + 1e-9)
     search = MountSearch(problem, evaluate(problem))
-    with limited(0.0):
+    with limit_time(0.0):
         search.run()
     assert list(search.best.design.values) == given
     assert search.best.design.value == pytest.approx(values[0], rel=1e-12)

@@ -264,7 +264,7 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
         near = evaluate(own, own.design([fraction, *mounts]), 96)
         if not phasing.intervals.holds(near.engine.firing_intervals, 1e-9):
             continue
-        if max(near.standing(limit).violation for limit in own.mount_limits) > 0.0:
+        if max(near.check_limit(limit).violation for limit in own.mount_limits) > 0.0:
             continue
         tried += 1
         assert objective_value(own, near) > uneven.objective.value * (1 - 1e-5)
@@ -375,7 +375,7 @@ def test_transmissibility_tells_firing_orders_apart(tmp_path):
     """Gas is in what is transmitted, so that of twelve orders of one throw the even one is found."""
     asked = '[objective]\nminimise = "transmissibility"\n'
     problem = problem_of(tmp_path, RADIAL, BLOCK, ONE_OPEN, asked, UNBOUNDED)
-    assert problem.feels_gas
+    assert problem.depends_on_gas
     result = solve(problem)
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)
     assert len({entry.firing_orders[0].order for entry in result.phasing.ranking}) == 12

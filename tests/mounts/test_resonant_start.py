@@ -15,7 +15,7 @@ from laufruhe.cli import app
 from laufruhe.errors import ModelError
 from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.plots import draw
-from laufruhe.problem.evaluation import evaluate, measured, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, place_measures
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.report.json_result import as_json
@@ -47,7 +47,7 @@ def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
     assert np.isfinite(np.abs(forces.at(4))).all()
     assert np.abs(forces.at(4)).max() > 0.0
     assert math.isinf(objective_value(problem, start))
-    assert all(math.isinf(m.mean) for m in measured(start, 0))
+    assert all(math.isinf(m.mean) for m in place_measures(start, 0))
     fourth = resonant(tmp_path, FORCE.replace("[search]", "orders = [4]\n[search]"))
     assert math.isfinite(objective_value(fourth, evaluate_start(fourth)))
 

@@ -16,7 +16,7 @@ from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.solvers import solve
@@ -85,7 +85,7 @@ def test_the_best_stiffness_with_its_damping_is_that_of_a_grid(tmp_path: Path) -
     result = solve(problem)
     grid = np.geomspace(2e4, 4e6, 400)
     given = evaluate(problem)
-    values = [objective_value(problem, remounted(given, problem.design([float(k)]))) for k in grid]
+    values = [objective_value(problem, with_mounts(given, problem.design([float(k)]))) for k in grid]
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value <= min(values) * (1.0 + 1e-6)
     assert result.objective.value == pytest.approx(min(values), rel=1e-2)

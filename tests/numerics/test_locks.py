@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from laufruhe.numerics.locks import held
+from laufruhe.numerics.locks import folder_lock
 
 
 def test_a_folder_is_kept_by_one_at_a_time(tmp_path: Path) -> None:
-    with held(tmp_path) as first, held(tmp_path, wait=False) as second:
+    with folder_lock(tmp_path) as first, folder_lock(tmp_path, wait=False) as second:
         assert first is True
         assert second is False
-    with held(tmp_path, wait=False) as again:
+    with folder_lock(tmp_path, wait=False) as again:
         assert again is True
 
 
@@ -24,7 +24,7 @@ def test_a_folder_is_kept_by_one_at_a_time(tmp_path: Path) -> None:
 def test_a_copy_of_a_process_keeps_no_folder(tmp_path: Path) -> None:
     """A killed run whose copy lives on for a moment does not keep the next run from sweeping."""
     there, begun = os.pipe()
-    with held(tmp_path) as kept:
+    with folder_lock(tmp_path) as kept:
         assert kept is True
         copy = os.fork()
         if copy == 0:
@@ -33,7 +33,7 @@ def test_a_copy_of_a_process_keeps_no_folder(tmp_path: Path) -> None:
             os._exit(0)
         assert os.read(there, 1) == b"!"
     try:
-        with held(tmp_path, wait=False) as again:
+        with folder_lock(tmp_path, wait=False) as again:
             assert again is True
     finally:
         os.kill(copy, signal.SIGKILL)

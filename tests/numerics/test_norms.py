@@ -98,7 +98,7 @@ def centre_of(cones: Cones, v: np.ndarray) -> np.ndarray:
     """The free vector from which the rows of one signal are counted, where the norm is least."""
     c, heads = cp.Variable(v.shape[1]), cp.Variable(len(cones.value))
     scaled = [factor * (row - c) for factor, row in zip(cones.factors, v, strict=True)]
-    parts = [cp.hstack(scaled)] if cones.whole else scaled
+    parts = [cp.hstack(scaled)] if cones.is_single else scaled
     held = [cp.norm(part) <= heads[head] for head, part in zip(cones.head, parts, strict=True)]
     cp.Problem(cp.Minimize(cones.value @ heads), held).solve(solver=cp.CLARABEL)
     return np.asarray(c.value)
@@ -110,7 +110,7 @@ class TestEveryNorm:
     def test_dual_inequality(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """<Z, V> <= dual(Z) norm(V) for every Z and V (P3)."""
         weights, v, z = data
-        z = norm.balanced(one_signal(weights), z)
+        z = norm.balanced_dual(one_signal(weights), z)
         dual = norm.dual_norm(one_signal(weights), z)
         if math.isfinite(dual):
             slack = ROUNDING * (1.0 + float(np.abs(z * v).sum()))
@@ -124,7 +124,7 @@ class TestEveryNorm:
         whole = norm.value(one_signal(weights), v)
         assert float((z * v).sum()) == pytest.approx(whole, rel=ROUNDING, abs=1e-300)
         assert norm.dual_norm(one_signal(weights), z) <= 1.0 + ROUNDING
-        if norm.of_row_lengths:
+        if norm.is_monotone_in_lengths:
             assert not z[lengths(v) == 0.0].any()
 
     @given(rows())
@@ -133,11 +133,11 @@ class TestEveryNorm:
         weights, v, _ = data
         grid = one_signal(weights)
         whole, z = norm.value(grid, v), norm.subgradient(grid, v)
-        kinks = norm.kinks(grid, v, z)
+        kinks = norm.subdifferential(grid, v, z)
         for own in () if kinks is None or whole <= 1e-200 else (kinks.base, *kinks.others):
             # what counts as zero of a row, a length or a direction
             assert float((own * v).sum()) == pytest.approx(whole, rel=5e-3)
-            assert norm.dual_norm(grid, norm.balanced(grid, own)) <= 1.0 + 5e-3
+            assert norm.dual_norm(grid, norm.balanced_dual(grid, own)) <= 1.0 + 5e-3
 
     @given(rows())
     def test_subgradient_lies_below_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
@@ -160,14 +160,14 @@ class TestEveryNorm:
             norm.dual_norm(one_signal(weights), norm.dual_feasible(one_signal(weights), 1.5 * inside)) <= 1.0 + ROUNDING
         )
         again = norm.dual_feasible(one_signal(weights), 0.9 * inside)
-        if norm.of_row_lengths:
+        if norm.is_monotone_in_lengths:
             assert np.array_equal(again, 0.9 * inside)
         np.testing.assert_allclose(again, 0.9 * inside, rtol=0.0, atol=ROUNDING * (1.0 + np.abs(inside).max()))
 
     @given(rows())
     def test_dual_feasible_keeps_directions(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """Rows are shortened, never turned."""
-        if not norm.of_row_lengths:
+        if not norm.is_monotone_in_lengths:
             return
         weights, _, z = data
         inside = norm.dual_feasible(one_signal(weights), z)
@@ -245,7 +245,9 @@ class TestForms:
         grid = one_signal(weights)
         one, other = norm.value(grid, v), norm.value(grid, w)
         # a sum is rounded in its own size, of which a seminorm may see nothing
-        rounded = np.finfo(float).eps * (np.abs(v).max() + np.abs(w).max()) * (0.0 if norm.of_row_lengths else 2.0)
+        rounded = (
+            np.finfo(float).eps * (np.abs(v).max() + np.abs(w).max()) * (0.0 if norm.is_monotone_in_lengths else 2.0)
+        )
         assert norm.value(grid, v + w) <= (one + other) * (1.0 + ROUNDING) + rounded
         assert norm.value(grid, factor * v) == pytest.approx(abs(factor) * one, rel=ROUNDING, abs=1e-300)
 
@@ -257,7 +259,7 @@ class TestForms:
         if cones.centred:
             v = v - centre_of(cones, v)
         scaled = cones.factors[:, None] * v
-        sizes = [float(np.hypot.reduce(scaled, axis=None))] if cones.whole else lengths(scaled).tolist()
+        sizes = [float(np.hypot.reduce(scaled, axis=None))] if cones.is_single else lengths(scaled).tolist()
         heads = np.zeros(len(cones.value))
         for head, size in zip(cones.head, sizes, strict=True):
             heads[head] = max(heads[head], size)
@@ -266,9 +268,9 @@ class TestForms:
             heads[-1] = norm.value(one_signal(weights), v)
             for square, other, top in zip(*cones.squares, strict=True):
                 heads[other] = heads[square] * (heads[square] / (heads[top] or 1.0))
-        if cones.under is not None:
+        if cones.linear_rows is not None:
             # the heads over others are as large as what stands under them
-            row, head, factor = cones.under
+            row, head, factor = cones.linear_rows
             for top in set(head[factor < 0.0]):
                 sums = np.bincount(row, np.where(head == top, 0.0, factor * heads[head]))
                 heads[top] = float((sums / -np.bincount(row, np.where(head == top, factor, 0.0))).max())
@@ -279,12 +281,12 @@ class TestForms:
 
     @given(rows())
     def test_batches_have_its_value(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
-        if not norm.of_row_lengths:
+        if not norm.is_monotone_in_lengths:
             return
         weights, v, w = data
         many = np.stack([lengths(v), lengths(w)])
         expected = [norm.value(one_signal(weights), each) for each in (v, w)]
-        assert norm.of_lengths(many, weights).tolist() == pytest.approx(expected, rel=ROUNDING, abs=1e-100)
+        assert norm.norm_from_lengths(many, weights).tolist() == pytest.approx(expected, rel=ROUNDING, abs=1e-100)
 
     @given(rows())
     def test_what_it_says_of_itself(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
@@ -319,18 +321,18 @@ class TestForms:
         for factor in (0.999, 1.001):
             rows = ca.DM(size * v / whole)
             program = AtItsValues()
-            value, maximum, _ = norm.limited(program, grid, rows, factor * size, 1e-7)
+            value, maximum, _ = norm.smooth_limit(program, grid, rows, factor * size, 1e-7)
             if factor < 1.0 or not program.has_free:
                 assert (float(ca.mmax(value)) <= maximum) == (factor > 1.0)
-        sides = [norm.limited(AtItsValues(), grid, rows, size + step, 1e-7)[1] for step in (-1e-4, 1e-4)]
-        slope = norm.limited(AtItsValues(), grid, rows, size, 1e-7)[2]
+        sides = [norm.smooth_limit(AtItsValues(), grid, rows, size + step, 1e-7)[1] for step in (-1e-4, 1e-4)]
+        slope = norm.smooth_limit(AtItsValues(), grid, rows, size, 1e-7)[2]
         assert (sides[1] - sides[0]) / 2e-4 == pytest.approx(slope, rel=2e-6)
 
     @given(rows())
     def test_smooth_limit_has_a_slope_at_zero(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         weights, v, _ = data
         rows, program = ca.SX.sym("rows", *v.shape), WithVariables()
-        value, _, _ = norm.limited(program, one_signal(weights), rows, 1.0, 1e-7)
+        value, _, _ = norm.smooth_limit(program, one_signal(weights), rows, 1.0, 1e-7)
         expressions = ca.vertcat(ca.reshape(value, -1, 1), *program.held)
         given_so = [rows, *program.variables]
         slopes = ca.Function("slopes", given_so, [ca.jacobian(expressions, ca.veccat(*given_so))])
@@ -348,7 +350,7 @@ class TestDualRows:
         if rng.random() < 0.5:
             v[rng.integers(len(v))] = 0.0
         z = norm.dual_feasible(grid, rng.standard_normal(v.shape) * grid.weights[:, None] * 10.0 ** rng.uniform(-2, 2))
-        better = norm.aligned(grid, v, z)
+        better = norm.aligned_dual(grid, v, z)
         assert norm.dual_norm(grid, better) <= 1.0 + ROUNDING
         assert float((better * v).sum()) >= float((z * v).sum()) - 1e-5 * norm.value(grid, v)
 
@@ -357,7 +359,7 @@ class TestDualRows:
         grid, signals, rng = scene(seed)
         z = norm.dual_feasible(grid, rng.standard_normal((len(grid.weights), 2)) * 10.0 ** rng.uniform(-2, 2))
         fine = Grid(np.repeat(grid.weights / times, times), grid.steps * times, points=grid.points)
-        spread = norm.spread(z, grid.steps, times)
+        spread = norm.refined_dual(z, grid.steps, times)
         assert spread.shape == (len(fine.weights), 2)
         assert norm.dual_norm(fine, spread) <= norm.dual_norm(grid, z) * (1.0 + ROUNDING)
         # what is spread over equal rows is neither more nor less
@@ -371,7 +373,7 @@ class TestDualRows:
     def test_subgradient_spread_bounds_the_finer_norm(self, norm: Norm, seed: int) -> None:
         """<Z, V> on the finer grid is under the norm there, whatever the coarse grid said."""
         grid, signals, _ = scene(seed)
-        z = norm.spread(norm.subgradient(grid, sampled(signals, grid.steps)), grid.steps, 4)
+        z = norm.refined_dual(norm.subgradient(grid, sampled(signals, grid.steps)), grid.steps, 4)
         v = sampled(signals, 4 * grid.steps)
         whole = norm.value(Grid(np.repeat(grid.weights / 4, 4), 4 * grid.steps, points=grid.points), v)
         assert float((z * v).sum()) <= whole * (1.0 + 1e-10)
@@ -385,7 +387,7 @@ class TestSignals:
     def test_the_norm_is_not_above(self, norm: Norm, seed: int) -> None:
         _, signals, rng = scene(seed)
         points = shares(rng, len(signals))
-        assert fine_value(norm, signals, points) <= norm.above(signals, points) * (1.0 + 1e-9)
+        assert fine_value(norm, signals, points) <= norm.upper_bound(signals, points) * (1.0 + 1e-9)
 
     @given(SEEDS, st.sampled_from([5, 12, 24, 60]))
     def test_samples_are_off_by_no_more_than_said(self, norm: Norm, seed: int, steps: int) -> None:
@@ -431,7 +433,7 @@ class TestWorstMean:
         v = sampled(signals, grid.steps)
         cones = NORMS["worst mean"].cones(grid)
         heads = np.append(lengths(v), NORMS["worst mean"].value(grid, v))
-        row, head, factor = cones.under
+        row, head, factor = cones.linear_rows
         sums = np.bincount(row, factor * heads[head])
         assert sums.max() == pytest.approx(0.0, abs=1e-12 * heads.max())
         assert len(sums) == grid.points

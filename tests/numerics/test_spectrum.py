@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from laufruhe.numerics.spectrum import (
-    BEHIND,
+    JUMP_OFFSET,
     Mapped,
     Spectrum,
     common_base,
@@ -67,7 +67,7 @@ class TestOneSignal:
 
     @given(spectra(), st.integers(1, 4))
     def test_counting_in_a_finer_order(self, s: Spectrum, factor: int) -> None:
-        finer = s.rebased(s.base / factor)
+        finer = s.with_finer_base(s.base / factor)
         assert finer.base * factor == s.base
         np.testing.assert_allclose(finer.values(ANGLES), s.values(ANGLES), atol=1e-11)
         assert finer.coefficients[::factor].tolist() == s.coefficients.tolist()
@@ -75,13 +75,13 @@ class TestOneSignal:
     def test_a_coarser_order_is_refused(self) -> None:
         s = Spectrum(Fraction(1, 2), np.ones((3, 1), dtype=complex))
         with pytest.raises(ValueError, match="1 does not divide 1/2"):
-            s.rebased(Fraction(1))
+            s.with_finer_base(Fraction(1))
 
     @given(spectra(), st.integers(1, 4))
     def test_over_its_own_period_it_is_the_same_signal(self, s: Spectrum, factor: int) -> None:
         """A signal counted too finely comes back to its own period, to the last bit."""
-        fine = s.rebased(s.base / factor)
-        reduced = fine.over(fine.repeats())
+        fine = s.with_finer_base(s.base / factor)
+        reduced = fine.with_base(fine.repeat_order())
         np.testing.assert_allclose(reduced.values(ANGLES), s.values(ANGLES), atol=1e-11)
         used = [j for j, c in enumerate(reduced.coefficients) if j and c.any()]
         assert math.gcd(*used) == 1 if used else reduced.base == 1
@@ -91,9 +91,9 @@ class TestOneSignal:
         c = np.zeros((9, 1), dtype=complex)
         c[[0, 4, 8]] = [[1.0], [2.0], [3.0]]
         s = Spectrum(Fraction(1, 2), c)
-        assert s.repeats() == 2
-        assert s.repeats((Fraction(3, 2), Fraction(0))) == Fraction(1, 2)
-        assert s.over(s.repeats()).at(4) == 3.0
+        assert s.repeat_order() == 2
+        assert s.repeat_order((Fraction(3, 2), Fraction(0))) == Fraction(1, 2)
+        assert s.with_base(s.repeat_order()).at(4) == 3.0
 
     @given(spectra(), spectra())
     def test_addition(self, a: Spectrum, b: Spectrum) -> None:
@@ -187,19 +187,19 @@ def test_a_mapped_signal_is_that_of_its_coefficients(highest: int) -> None:
     mapped = Mapped(bent(highest), lambda values: values @ turned.T)
     for made in (mapped, pickle.loads(pickle.dumps(mapped))):
         plain = Spectrum(made.base, made.coefficients, made.kinks)
-        assert made.repeats() <= plain.repeats()
+        assert made.repeat_order() <= plain.repeat_order()
         for one, other in ((made, plain), (made.series, plain.series), (made + made, plain + plain)):
             np.testing.assert_allclose(one.sample(48), other.sample(48), atol=1e-12)
             np.testing.assert_allclose(one.values(ANGLES), other.values(ANGLES), atol=1e-12)
-            once = one.over(one.repeats())
-            np.testing.assert_allclose(once.sample(24), other.over(one.repeats()).sample(24), atol=1e-12)
+            once = one.with_base(one.repeat_order())
+            np.testing.assert_allclose(once.sample(24), other.with_base(one.repeat_order()).sample(24), atol=1e-12)
 
 
 def test_orders_are_told_apart_to_a_thousandth() -> None:
     orders = [0.0, 0.5, 1.0 / 3.0, 1.0, 1.001]
     assert orders_equal(orders, (0.3333, 1.0)).tolist() == [False, False, True, True, False]
     signal = Spectrum(Fraction(1, 2), np.arange(1.0, 6.0).astype(complex))
-    assert signal.only((0.5, 2.0004)).coefficients.real.tolist() == [0.0, 2.0, 0.0, 0.0, 5.0]
+    assert signal.with_orders((0.5, 2.0004)).coefficients.real.tolist() == [0.0, 2.0, 0.0, 0.0, 5.0]
     assert signal.at(1.5).real == 4.0
     assert signal.at(0.7) == 0.0
     assert len(signal.truncated(1.4999999).coefficients) == len(signal.truncated(1.5).coefficients) == 4
@@ -209,8 +209,10 @@ def test_orders_are_told_apart_to_a_thousandth() -> None:
 def test_a_step_on_a_jump_is_read_behind_it_wherever_the_signal_was_moved(steps: int) -> None:
     """Parts of a sum that jump at one angle have to agree on the side."""
     saw = spectrum_with_kinks(lambda angles: np.mod(angles, math.tau), 720, Fraction(1), np.array([0.0]))
-    assert saw.sample(steps, BEHIND)[0] == pytest.approx(0.0, abs=1e-6)
+    assert saw.sample(steps, JUMP_OFFSET)[0] == pytest.approx(0.0, abs=1e-6)
     for moved in range(1, steps, max(steps // 48, 1)):
         share = Fraction(moved, steps)
-        there = saw.later(share, math.tau * float(share))
-        assert there.sample(steps, BEHIND) == pytest.approx(np.roll(saw.sample(steps, BEHIND), moved), abs=1e-6)
+        there = saw.shift(share, math.tau * float(share))
+        assert there.sample(steps, JUMP_OFFSET) == pytest.approx(
+            np.roll(saw.sample(steps, JUMP_OFFSET), moved), abs=1e-6
+        )

@@ -14,7 +14,7 @@ from itertools import count
 
 import pytest
 
-from laufruhe.numerics.budget import left, limited
+from laufruhe.numerics.budget import limit_time, seconds_left
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.progress import progress_listener
 from laufruhe.numerics.workers import SERIAL, ordered_map, speculation, working_on
@@ -109,11 +109,11 @@ def test_in_turn_keeps_the_order_whoever_works() -> None:
 
 def until_of(_: int) -> float:
     """Seconds that are left where a step is worked out."""
-    return left()
+    return seconds_left()
 
 
 def test_steps_have_the_time_that_is_left() -> None:
-    with ThreadPoolExecutor(2) as pool, working_on(pool), limited(60.0), speculation(until_of) as ahead:
+    with ThreadPoolExecutor(2) as pool, working_on(pool), limit_time(60.0), speculation(until_of) as ahead:
         ahead.prefetch([("a", 1)])
         assert 0.0 < ahead.result("a", 1) <= 60.0
         assert ahead.hits == 1

@@ -17,7 +17,7 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import tables_of
-from laufruhe.numerics.budget import left, limited
+from laufruhe.numerics.budget import limit_time, seconds_left
 from laufruhe.numerics.cluster import cluster
 from laufruhe.numerics.cores import ONE_THREAD
 from laufruhe.numerics.processes import Processes, WorkerDied, fork_map
@@ -272,14 +272,14 @@ def test_a_call_that_a_worker_takes_while_all_end_is_not_waited_for(monkeypatch:
 
 
 def test_time_that_is_left_goes_with_a_piece() -> None:
-    with limited(100.0):
-        ((_, seconds),) = unordered_map(lambda _: left(), [0], SERIAL)
+    with limit_time(100.0):
+        ((_, seconds),) = unordered_map(lambda _: seconds_left(), [0], SERIAL)
     assert 90.0 < seconds <= 100.0
 
 
 def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
     pieces = [0.2] * 50
-    with ThreadPoolExecutor(2) as pool, limited(0.1):
+    with ThreadPoolExecutor(2) as pool, limit_time(0.1):
         with pytest.raises(TimeIsOver):
             list(unordered_map(time.sleep, pieces, pool))
         begun = list(unordered_map(time.sleep, pieces, pool, patient=True))

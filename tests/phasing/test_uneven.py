@@ -158,7 +158,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     design = exact.design([d.complex_value(columns) for d in model.domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
     rows, grid = model.rows(quantity, at)
-    value, maximum, _ = quantity.norm.limited(AtItsValues(), grid, rows, smooth, 1e-9)
+    value, maximum, _ = quantity.norm.smooth_limit(AtItsValues(), grid, rows, smooth, 1e-9)
     assert float(ca.mmax(value)) == pytest.approx(maximum, rel=1e-6)
 
 

@@ -233,7 +233,7 @@ def test_peaks_stand_where_heat_comes_at_once() -> None:
     found = []
     for steps in (360, 720, 1440):
         pins = pin_forces(engine, POINT, replace(EXACT, samples=steps))
-        values = np.concatenate([pins.sample(steps), pins.values(pins.bends)])
+        values = np.concatenate([pins.sample(steps), pins.values(pins.kink_angles)])
         found.append(np.linalg.norm(values, axis=2).max(axis=0))
     # by the formula itself, close to either side of the dead centre
     part = engine.slider_cranks[1]

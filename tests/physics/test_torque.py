@@ -40,7 +40,7 @@ def test_the_block_feels_the_torque_of_plain_cylinders(name: str) -> None:
     roll = wrench.mapped(lambda values: values[:, 3])
     size = np.abs(torque.sample(720)).max()
     assert size > 100.0
-    assert np.abs(torque.sample(720) - roll.rebased(torque.base).sample(720)).max() < 1e-12 * size
+    assert np.abs(torque.sample(720) - roll.with_finer_base(torque.base).sample(720)).max() < 1e-12 * size
 
 
 def test_its_mean_is_the_work_of_the_gas() -> None:

@@ -20,7 +20,7 @@ from laufruhe.plots import draw, figures, names
 from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fit_line
 from laufruhe.present.measures import mount_orders
-from laufruhe.problem.evaluation import measured, samples_of
+from laufruhe.problem.evaluation import channel_samples, place_measures
 from laufruhe.solvers import Result, state
 from picture_faults import drawn_texts, overlaps
 from problem_files import PROBLEMS, written
@@ -71,7 +71,7 @@ def test_polar_diagrams_are_the_samples() -> None:
     for m, axes in enumerate(figure.axes):
         lines = {line.get_label(): line.get_xydata() for line in axes.lines}
         for label, design in (("as given", result.initial), ("as decided", result.final)):
-            samples = samples_of(design, 0)[:, m, 1:]
+            samples = channel_samples(design, 0)[:, m, 1:]
             path = np.asarray(lines[label])[:-1]
             assert len(path) >= 720
             assert np.array_equal(path, samples[:: len(samples) // len(path)])
@@ -86,7 +86,7 @@ def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
     figure = polar.figure(result)
     for m, axes in enumerate(figure.axes):
         ring = next(line for line in axes.lines if line.get_markersize() == 7)
-        samples = samples_of(result.final, 0)[:, m, 1:]
+        samples = channel_samples(result.final, 0)[:, m, 1:]
         nearest = samples[round(first.firing_angle / cycle * len(samples))]
         assert np.linalg.norm(np.ravel(ring.get_xydata()) - nearest) < 0.02 * np.abs(samples).max()
     assert "cylinder 1 fires" in texts(figure)
@@ -138,7 +138,7 @@ def test_bars_are_mean_and_maximum() -> None:
     axes = bars.figure(result).axes[0]
     heights = [[bar.get_height() for bar in container] for container in axes.containers]
     for k, design in enumerate((result.initial, result.final)):
-        each = measured(design, 0)
+        each = place_measures(design, 0)
         assert heights[2 * k][:4] == [measures.mean for measures in each]
         assert heights[2 * k + 1][:4] == [measures.max for measures in each]
         assert heights[2 * k + 1][4] == max(measures.max for measures in each)

@@ -63,7 +63,7 @@ def _numbers(channel: Channel, evaluation: Evaluation) -> np.ndarray | None:
     try:
         if isinstance(channel, LoadChannel):
             base = evaluation.engine.cycle.base_order
-            signals = [signal.over(base) for signal in evaluation.signals(channel)]
+            signals = [signal.with_base(base) for signal in evaluation.signals(channel)]
             return np.concatenate([signal.series.sample(STEPS).ravel() for signal in signals])
         if isinstance(channel, NumberChannel):
             return np.array(channel.values(Measure(channel, frequency=(5.0, 15.0)), evaluation), dtype=float)
@@ -192,7 +192,7 @@ def test_leads_shift_what_each_shaft_carries() -> None:
                     continue
                 for signals in zip(*told, strict=True):
                     base = min(signal.base for signal in signals)
-                    first, second, third = (signal.over(base).series.coefficients for signal in signals)
+                    first, second, third = (signal.with_base(base).series.coefficients for signal in signals)
                     size = float(np.abs(first).max(initial=0.0))
                     np.testing.assert_allclose(np.abs(third - second), np.abs(second - first), rtol=0, atol=1e-8 * size)
                     seen += 1

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.numerics.progress import Step, progress_listener
 from laufruhe.prove.branch_and_bound import (
     INFEASIBLE_PART,
@@ -103,7 +103,7 @@ def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
     assert search.complete
     assert search.divide(FathomedPart(3.0), 10) == 3.0
     assert search.complete
-    with limited(0.0):
+    with limit_time(0.0):
         assert search.divide((-5.0, (0, 8)), 10) == -5.0
     assert not search.complete
 

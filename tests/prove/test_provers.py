@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts import provers
 from laufruhe.prove.mounts.provers import Prover, Question, proven
@@ -56,7 +56,7 @@ def test_each_has_its_turn_until_one_closes(
     # each knows the best bound before its own
     told = [0.0, *(answer[0] for answer in (first + second))]
     assert all(known in told for _, known in asked)
-    with limited(1e-9):
+    with limit_time(1e-9):
         asked.clear()
         proven(Question(problem, 1.0, 0.1))
         assert "".join(name for name, _ in asked) == order[:1]

@@ -13,7 +13,7 @@ from scipy.optimize import linprog
 from lanes import first_fast
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
@@ -105,7 +105,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
         found = []
         for share in (*generator.random((3, len(below))), *corners):
             engine = problem.design((below + share * (above - below)).tolist())
-            found.append(objective_value(problem, remounted(given, engine)))
+            found.append(objective_value(problem, with_mounts(given, engine)))
         assert bound <= min(found) * (1.0 + 1e-9)
         tight.append(bound / min(found))
     assert max(tight) > 0.99
@@ -179,8 +179,8 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
     allowed_ones = 0
     for below, above, bound in zip(low, high, bounds, strict=True):
         engine = problem.design(generator.uniform(below, above).tolist())
-        design = remounted(given, engine)
-        broken = any(design.standing(limit).violation > 0.0 for limit in problem.mount_limits)
+        design = with_mounts(given, engine)
+        broken = any(design.check_limit(limit).violation > 0.0 for limit in problem.mount_limits)
         broken |= any(design.value(limit.measure) > limit.maximum for limit in problem.load_limits)
         allowed_ones += not broken
         assert np.isfinite(bound) or broken
@@ -209,8 +209,8 @@ def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path)
     axes = [np.geomspace(d.lower, d.upper, 17) for d in problem.mount_decisions]
     values = []
     for x in itertools.product(*axes):
-        design = remounted(given, problem.design(list(x)))
-        if all(design.standing(each).violation <= 0.0 for each in problem.mount_limits):
+        design = with_mounts(given, problem.design(list(x)))
+        if all(design.check_limit(each).violation <= 0.0 for each in problem.mount_limits):
             values.append(objective_value(problem, design))
     assert len(values) > 100
     assert min(values) >= result.certificate.lower_bound

@@ -17,7 +17,7 @@ from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.physics.torque import torque_parts
 from laufruhe.present.tables import Table
-from laufruhe.problem.evaluation import measured
+from laufruhe.problem.evaluation import place_measures
 from laufruhe.report import tables
 from laufruhe.report.files import TABLES, result_files
 from laufruhe.report.sections import SECTIONS
@@ -78,7 +78,7 @@ def test_forces_over_the_crank_angle_have_the_measures_of_the_result(result: Res
         for k, point in enumerate(result.problem.points):
             rows = table[table["point"] == point.name]
             assert rows["angle [deg]"].tolist() == np.arange(720.0).tolist()
-            for name, own in zip(found.mount_names, measured(found, k), strict=True):
+            for name, own in zip(found.mount_names, place_measures(found, k), strict=True):
                 sizes = np.linalg.norm([rows[f"{design}: force on {name} {axis} [N]"] for axis in "xyz"], axis=0)
                 assert math.sqrt((sizes**2).mean()) == pytest.approx(own.rms, rel=1e-6)
                 assert sizes.max() == pytest.approx(own.max, rel=1e-3)

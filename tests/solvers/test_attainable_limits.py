@@ -15,7 +15,7 @@ import pytest
 
 import laufruhe
 from laufruhe.files.reader import load_tables
-from laufruhe.numerics.budget import at_least, left, limited
+from laufruhe.numerics.budget import limit_time, minimum_time, seconds_left
 from laufruhe.numerics.progress import Step, progress_listener
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -235,7 +235,7 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
 def told_of(problem: Problem, status: Status, seconds: float | None = None) -> Result:
     """What is told of a problem that a method says so of, whether that is so or not."""
     found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
-    with limited(seconds):
+    with limit_time(seconds):
         return with_attainable_limits(found, problem, {Kind.UNBALANCE}, 1.0, solve)
 
 
@@ -286,14 +286,14 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     monkeypatch.setattr("laufruhe.numerics.budget.time", clock)
 
     def slow(asked: Problem) -> Result:
-        shares.append(left())
-        clock.now += left()
-        with at_least(60.0):
+        shares.append(seconds_left())
+        clock.now += seconds_left()
+        with minimum_time(60.0):
             return replace(solve(asked), certificate=None)
 
     steps: list[Step] = []
     none = infeasible_result(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
-    with limited(0.4), progress_listener(steps.append):
+    with limit_time(0.4), progress_listener(steps.append):
         found = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("want of time" in text for text in sentences(found)[:2])

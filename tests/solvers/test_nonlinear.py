@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.numerics.norms import softened_lengths
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import SERIAL, working_on
@@ -69,7 +69,7 @@ def test_no_later_stage_is_begun_after_the_time():
     program = replace(rosenbrock(), parameters=e, stages=((1.0,), (0.1,)))
     whole = solve_nonlinear(program, [np.array([-1.0, 1.0])])[0]
     assert whole.usable
-    with limited(0.0):
+    with limit_time(0.0):
         cut = solve_nonlinear(program, [np.array([-1.0, 1.0])])[0]
     # the first stage has its least time
     assert cut.ending is Ending.UNFINISHED

@@ -141,7 +141,7 @@ def test_limits_are_kept_by_what_is_searched() -> None:
     for stroke in np.linspace(0.12, 0.15, 3):
         for offset in np.linspace(0.0, 0.02, 3):
             held = problem.fixed_at([stroke, offset], problem.decisions[-2:])
-            if max(evaluate(held).standing(limit).violation for limit in held.limits) <= 0.0:
+            if max(evaluate(held).check_limit(limit).violation for limit in held.limits) <= 0.0:
                 assert laufruhe.solve(held).objective.value >= result.objective.value * (1.0 - 1e-5)
 
 

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.files.reader import load
-from laufruhe.numerics.budget import in_time, left, limited, passed, rounds
+from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, timed_rounds, until_time_limit
 from laufruhe.solvers.methods import CUT_SHORT, Status, solve
 from problem_files import PROBLEMS, written
 
@@ -31,17 +31,17 @@ OPTIMA = {
 
 
 def test_a_limit_within_a_limit() -> None:
-    assert left() == math.inf
-    with limited(100.0):
-        with limited(1e-9):
+    assert seconds_left() == math.inf
+    with limit_time(100.0):
+        with limit_time(1e-9):
             time.sleep(1e-3)
-            assert passed()
-            assert list(in_time(range(5))) == [0]
-            assert list(rounds(5)) == []
-        with limited(None):
-            assert 99.0 < left() <= 100.0
-            assert list(in_time(range(5))) == list(rounds(5)) == list(range(5))
-    assert not passed()
+            assert is_time_over()
+            assert list(until_time_limit(range(5))) == [0]
+            assert list(timed_rounds(5)) == []
+        with limit_time(None):
+            assert 99.0 < seconds_left() <= 100.0
+            assert list(until_time_limit(range(5))) == list(timed_rounds(5)) == list(range(5))
+    assert not is_time_over()
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in OPTIMA])
@@ -106,7 +106,7 @@ def test_a_study_keeps_what_is_finished(tmp_path: Path, monkeypatch: pytest.Monk
     words = ["study", str(written(tmp_path, SWEEP)), "--out", str(tmp_path / "out"), "--jobs", "1"]
     asked = iter(range(100))
     with monkeypatch.context() as patched:
-        patched.setattr("laufruhe.studies.runner.passed", lambda: next(asked) >= 5)
+        patched.setattr("laufruhe.studies.runner.is_time_over", lambda: next(asked) >= 5)
         stopped = CliRunner().invoke(app, words)
     assert stopped.exit_code == 1
     assert "the same command goes on" in stopped.stderr
@@ -126,7 +126,7 @@ def test_a_trade_keeps_what_is_measured(tmp_path: Path, monkeypatch: pytest.Monk
     assert "time limit" in stopped.stderr
     assert not out.exists()
     asked = iter(range(100))
-    monkeypatch.setattr("laufruhe.studies.trade.passed", lambda: next(asked) >= 3)
+    monkeypatch.setattr("laufruhe.studies.trade.is_time_over", lambda: next(asked) >= 3)
     some = CliRunner().invoke(app, ["trade", str(path), "--out", str(out)])
     assert some.exit_code == 0
     assert "Stopped at the time limit" in (out / "scene.md").read_text(encoding="utf-8")

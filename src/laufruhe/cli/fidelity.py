@@ -16,11 +16,11 @@ from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.batch import prepare
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import current_executor, executor_for, unordered_map, worker_count
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import kinds_of
+from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
@@ -67,12 +67,12 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     Return the document to show, the name of its page, and a function that makes JSON.
     """
     read = [(path, _with_objective(path)) for path in paths]
-    of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in kinds_of(problem)]
+    of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in open_kinds(problem)]
     if len(of_wheels) == len(read):
         rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
         raise refused("flywheel", "", rule, "fix it", of_wheels[0][0])
     paths, problems = zip(
-        *((path, problem) for path, problem in read if Kind.FLYWHEEL not in kinds_of(problem)), strict=True
+        *((path, problem) for path, problem in read if Kind.FLYWHEEL not in open_kinds(problem)), strict=True
     )
     trades: dict[int, Trade] = {}
     for k, one, pages in _measured(paths, problems, say):
@@ -125,7 +125,7 @@ def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Page
     try:
         one = trade(load_tables(tables, path))
     except SolverError:
-        if passed():
+        if is_time_over():
             return None
         raise
     return replace(one, problem=replace(one.problem, phasing=None)), _pages(path, one)

@@ -119,10 +119,10 @@ def share_below_one(option: str, value: float) -> float:
 @contextmanager
 def resources(seconds: float | None, scheduler: str | None) -> Iterator[None]:
     """Apply --time-limit to searches, and --scheduler to parallel work."""
-    from laufruhe.numerics.budget import limited
+    from laufruhe.numerics.budget import limit_time
 
     with ExitStack() as stack:
-        stack.enter_context(limited(seconds if seconds is None else above_zero("--time-limit", seconds, "60")))
+        stack.enter_context(limit_time(seconds if seconds is None else above_zero("--time-limit", seconds, "60")))
         if scheduler is not None:
             from laufruhe.numerics.cluster import cluster
             from laufruhe.numerics.workers import working_on

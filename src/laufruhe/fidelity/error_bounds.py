@@ -21,7 +21,7 @@ from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation, evaluate, over, value_of_loads
+from laufruhe.problem.evaluation import Evaluation, evaluate, value_of_loads, with_common_base
 from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.problem import Problem
 
@@ -43,7 +43,7 @@ def reference(problem: Problem, engine: Engine | None = None, samples: int = REF
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
     """Return the counted spectra of a load per operating point, (n, places, d), on a common lowest order."""
     found = [measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
-    return over(evaluation.engine.cycle.base_order, found)
+    return with_common_base(evaluation.engine.cycle.base_order, found)
 
 
 def relative(bound: float, value: float) -> float:
@@ -55,7 +55,7 @@ def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAM
     """Return the most that the samples of an evaluation miss of a measure [its unit]; zero without samples (F7, F8)."""
     if measure.channel.simulation:
         return measure.channel.missed(evaluation.engine) * evaluation.value(measure)
-    if measure.channel.of_torque:
+    if measure.channel.depends_on_torque:
         return _missed_of_torque(measure, evaluation, finest)
     if not measure.is_load:
         return 0.0
@@ -103,7 +103,7 @@ class Scale:
             left_out = [x + y.mapped(np.negative) for x, y in pairs]
             # the weight of every operating point, zero where it does not count
             shares = term.measure.shares([loads.point for loads in self.best.loads])
-            total += term.weight * term.measure.norm.above(left_out, shares)
+            total += term.weight * term.measure.norm.upper_bound(left_out, shares)
         return total
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
@@ -157,7 +157,7 @@ class Scale:
             for rotor in self.problem.engine.rotors
             if rotor.unbalance != 0 or rotor.name in self.open_rotors
         )
-        bases = [signal.repeats(ratios) for signal in self.driving]
+        bases = [signal.repeat_order(ratios) for signal in self.driving]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
 
     @property
@@ -265,7 +265,7 @@ def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
     pairs = zip(ours.loads, theirs.loads, strict=True)
     found = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]
     engine, points = ours.engine, [loads.point for loads in ours.loads]
-    signals = over(engine.cycle.base_order, found)
+    signals = with_common_base(engine.cycle.base_order, found)
     return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value
 
 

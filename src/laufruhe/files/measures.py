@@ -26,8 +26,8 @@ from laufruhe.problem.measure import (
     Measure,
     PriorityLevel,
     Term,
-    counted_parts,
     counted_rotors,
+    counterweight_masses,
     radius_of,
 )
 
@@ -192,7 +192,7 @@ class MeasureContext:
         rotors = self.engine.rotors
         _check_known(of, [rotor.name for rotor in rotors], f"{where}.of", "counterweight or balancer")
         counted = counted_rotors(measure, rotors)
-        if not counted and not counted_parts(measure, self.engine.slider_cranks):
+        if not counted and not counterweight_masses(measure, self.engine.slider_cranks):
             raise Refused(where, measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
         for rotor in counted:
             try:

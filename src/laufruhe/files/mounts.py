@@ -30,7 +30,7 @@ from laufruhe.problem.decision import (
     TURNED,
     Decision,
     MountDrive,
-    mount_of,
+    mount_from_numbers,
 )
 
 _AXES, _AT = ("x", "y", "z"), "position"
@@ -204,7 +204,7 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
         for key in ("position", "turned"):
             values = _values(table, place, key, where, "add it, or mirror_of")
             numbers += [Open.from_value(value).start for value in values]
-        mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
+        mounts.append(mount_from_numbers(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
     all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
     return tuple(mounts)
 
@@ -241,7 +241,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
         for key in _FIELDS:
             if key not in followed and (key != _AT or joined == k):
                 read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    springs = [mount_of(spring, row) for spring, row in zip(springs, read.rows, strict=True)]
+    springs = [mount_from_numbers(spring, row) for spring, row in zip(springs, read.rows, strict=True)]
     mounts = tuple(
         replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
         for k in sorted(set(joins))

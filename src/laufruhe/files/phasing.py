@@ -136,7 +136,7 @@ def open_phasing(
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
         rule = "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one"
         raise Refused("fidelity.crank_inertia", inertia, rule, "leave it out, or fix the throws")
-    if engine.kind.fires_evenly and problem.feels_order:
+    if engine.kind.fires_evenly and problem.depends_on_firing_order:
         rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
         raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
     return problem

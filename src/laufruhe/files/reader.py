@@ -248,7 +248,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
-    rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
+    rotors, (wheel, wheel_decisions) = (
+        tuple(collected.rotors),
+        flywheel_of(file.flywheel, file.fidelity.own("crank_inertia")),
+    )
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     geared, of_geared = geared_of(file.geared_inertias)
@@ -262,7 +265,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         title=file.title,
         engine=engine,
         points=points,
-        decisions=(*loads, *on_mounts.decisions, *of_wheel),
+        decisions=(*loads, *on_mounts.decisions, *wheel_decisions),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
         tolerance=file.tolerance,

@@ -26,7 +26,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
-from laufruhe.problem.decision import Decision, Domain, Kind, vector_of
+from laufruhe.problem.decision import Decision, Domain, Kind, decision_vector
 from laufruhe.problem.dependence import depends, is_affine
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
@@ -102,10 +102,10 @@ def _filled(
     collected = _Collected(affine, kinds, result, aside)
     curves = _curves(collected, result)
     measures = collected.measures()
-    start = vector_of(affine.domains)
+    start = decision_vector(affine.domains)
     designs = [("given", start)]
     if result.decisions:
-        designs.append(("optimum", vector_of(affine.domains, [values[d.name] for d in moving.decisions])))
+        designs.append(("optimum", decision_vector(affine.domains, [values[d.name] for d in moving.decisions])))
     designs.append(("between", _between(affine.domains)))
     return replace(
         bare,
@@ -161,7 +161,7 @@ class _Collected:
         if stays and limit is None:
             return [replace(base, value=self.model.bare.value(measure))]
         if stays and limit is not None:
-            standing = self.model.bare.standing(limit)
+            standing = self.model.bare.check_limit(limit)
             return [replace(base, sides=((standing.side, standing.edge),), value=standing.value)]
         if follows:
             return [replace(base, signal=self.signal(measure))]
@@ -179,7 +179,7 @@ def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:
 
 
 def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
-    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.feels_unbalances]
+    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.depends_on_unbalances]
     block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
     return tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
 

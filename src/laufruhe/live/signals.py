@@ -14,8 +14,8 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import Measure, kinks_of, selected
+from laufruhe.problem.evaluation import with_common_base
+from laufruhe.problem.measure import Measure, kinks_of, narrow_signal
 
 PEAK = NORMS["maximum"]
 NORMS_OF_PAGE = frozenset({"mean", "maximum", "rms", "peak to peak", "worst mean"})
@@ -126,14 +126,14 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     every = [signal for own, by in pairs for signal in (own, *by)]
     # the period of one evaluation, in whose steps its means and peaks are sought
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
-    constant = over(base, [own for own, _ in pairs])
-    columns = [over(base, by) for _, by in pairs]
+    constant = with_common_base(base, [own for own, _ in pairs])
+    columns = [with_common_base(base, by) for _, by in pairs]
     # kinks of all signals, for every norm
     signals = [reduce(add, by, own) for own, by in zip(constant, columns, strict=True)]
     bends = kinks_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []
     for share, own, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
-        counted = [selected(measure, signal, problem.engine) for signal in (own, *by)]
+        counted = [narrow_signal(measure, signal, problem.engine) for signal in (own, *by)]
         points.append(_point(float(share), counted[0], counted[1:], at))
     names = channel.places(problem.engine)
     places = tuple(names[k] for k in measure.places(names)) or ("block",)

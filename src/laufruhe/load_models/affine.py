@@ -19,7 +19,7 @@ from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Domain, Kind, domains_of, scales_of, vector_of
+from laufruhe.problem.decision import Decision, Domain, Kind, column_scales, decision_vector, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, mass_rows
@@ -110,12 +110,12 @@ class AffineProblem:
     @property
     def start(self) -> Array:
         """The decision vector of the design as given."""
-        return vector_of(self.domains)
+        return decision_vector(self.domains)
 
     @property
     def scales(self) -> Array:
         """Largest size of every column."""
-        return scales_of(self.domains)
+        return column_scales(self.domains)
 
     @cached_property
     def units(self) -> Array:
@@ -204,7 +204,7 @@ class AffineModel:
         # a bearing feels each cylinder beside it alone, so loads inside the crankcase count too
         inside = {measure.load for measure in self.problem.measures if measure.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
-        return common_base([signal.repeats(tuple(orders)) for signal in signals] or [Fraction(1)])
+        return common_base([signal.repeat_order(tuple(orders)) for signal in signals] or [Fraction(1)])
 
     @property
     def full_samples(self) -> int:
@@ -271,7 +271,7 @@ class AffineModel:
         base = self._own_base([*own, *(signal for by in alone for signal in by)], samples)
         samples = int(samples * self.base / base)
         # what is open does not bend, but has to be known at the same angles
-        lead = [signal.over(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
+        lead = [signal.with_base(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
         bends = kinks_of(measure, lead, self.problem.engine)
         bare = self._rows(measure, own, base, samples, parts, bends)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
@@ -281,7 +281,7 @@ class AffineModel:
         return _stacked(bare, slopes, self._keep_all)
 
     def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
-        own = common_base([signal.repeats() for signal in signals]) if self._once else self.base
+        own = common_base([signal.repeat_order() for signal in signals]) if self._once else self.base
         whole = all((steps * self.base / own).denominator == 1 for steps in (samples, self.full_samples))
         return own if whole else self.base
 
@@ -289,7 +289,7 @@ class AffineModel:
         self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, parts: int,
         bends: Sequence[Array],
     ) -> Rows:  # fmt: skip
-        period = [signal.over(base) for signal in signals]
+        period = [signal.with_base(base) for signal in signals]
         if parts:
             period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
         return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)

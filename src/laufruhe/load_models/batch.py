@@ -92,7 +92,7 @@ def by_feature(norm: AffineNorm) -> Array:
 
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
     rows, grid = by_feature(norm), norm.grid
-    if prune and norm.norm.of_row_lengths:
+    if prune and norm.norm.is_monotone_in_lengths:
         rows, weights = _merged(rows, grid.weights)
         grid = Grid(weights, len(weights))
     return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)

@@ -77,7 +77,7 @@ class FiringModel(StarModel):
         """Rows of a measure: of its star, and what the slot of every cylinder adds."""
         if not measure.is_inside:
             return next(of_stars)
-        signals = [signal.over(self.base) for signal in self._fired.signals(measure.load)]
+        signals = [signal.with_base(self.base) for signal in self._fired.signals(measure.load)]
         steps = samples if averaged and measure.norm.averages else None
         whole = load_rows(measure, self.problem.points, _averaged(signals, steps), self.problem.engine, samples)
         bends, count = kinks_of(measure, signals, self.problem.engine), self.space.throws
@@ -85,12 +85,12 @@ class FiringModel(StarModel):
         for k in range(1, count):
             first = self._alone(measure.load, k)
             for slot in range(count):
-                later = [signal.later(Fraction(slot, count), slot * signal.period / count) for signal in first]
+                later = [signal.shift(Fraction(slot, count), slot * signal.period / count) for signal in first]
                 moves[k, slot] = load_rows(
                     measure, self.problem.points, _averaged(later, steps), self.problem.engine, samples, bends
                 ).vectors
             moves[k] -= moves[k, self._slots[k]].copy()
-        if measure.load.feels_unbalances:
+        if measure.load.depends_on_unbalances:
             star = next(of_stars)
             return replace(star, moves=star.moves + moves)
         slope = np.zeros((*whole.vectors.shape, sum(domain.width for domain in self.domains)))
@@ -106,11 +106,11 @@ class FiringModel(StarModel):
         found = []
         for at, point in zip(self._fired.loads, working(self.problem, part.name).points, strict=True):
             signal = load.signal(replace(at, point=point, moving=alone))
-            if load.feels_unbalances:
+            if load.depends_on_unbalances:
                 fidelity = replace(at.fidelity, gas=False, gas_orders=None)
                 still = load.signal(replace(at, point=point, moving=alone, fidelity=fidelity))
                 signal = signal + still.mapped(np.negative)
-            found.append(signal.over(self.base))
+            found.append(signal.with_base(self.base))
         return found
 
 
@@ -129,4 +129,4 @@ def _of_star(problem: Problem) -> Problem:
 
 
 def _adds_up(measure: Measure) -> bool:
-    return not measure.is_inside or measure.load.feels_unbalances
+    return not measure.is_inside or measure.load.depends_on_unbalances

@@ -59,7 +59,7 @@ def motored(problem: Problem) -> Problem:
 
 def gas_distinguishes_cylinders(problem: Problem) -> bool:
     """Return True if gas that is felt drives some cylinders differently from others."""
-    if not problem.feels_gas:
+    if not problem.depends_on_gas:
         return False
     gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
     return len({tuple(_driven(gas, part) for gas in gases) for part in problem.engine.cylinders}) > 1

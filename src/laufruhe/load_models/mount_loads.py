@@ -37,7 +37,7 @@ class FixedThrows:
 
     def _at(self, bare: Any, slopes: Sequence[Any], moved: Array) -> Lines:
         base = common_base([bare.base, *(slope.base for slope in slopes)])
-        spectra = [spectrum.rebased(base).coefficients for spectrum in (bare, *slopes)]
+        spectra = [spectrum.with_finer_base(base).coefficients for spectrum in (bare, *slopes)]
         longest = max(len(c) for c in spectra)
         loads = np.array([np.pad(c, ((0, longest - len(c)), (0, 0))) for c in spectra]) @ moved.T
         size = np.abs(loads[0]).max(axis=1, initial=0.0)

@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.measure import Measure, kinks_of, load_rows, selected
+from laufruhe.problem.measure import Measure, kinks_of, load_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
 FINE = 1440
@@ -74,7 +74,7 @@ class PhaseLeadModel:
         self.problem = problem
         self.leads = tuple(d for d in problem.decisions if d.kind is Kind.LEAD)
         self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
-        self.start = np.array([d.start_number for d in self.leads])
+        self.start = np.array([d.real_start for d in self.leads])
         self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
         self.whole = AffineModel(replace(problem, decisions=problem.unbalances), True, True)
         self.domains = self.whole.domains
@@ -89,8 +89,8 @@ class PhaseLeadModel:
             found = [_share(model.spectra(measure.load)) for model in (self._still, *self._shafts)]
             each = [signal for share in found for by in (share.own, *share.columns) for signal in by]
             base = common_base([engine.cycle.base_order, *(signal.base for signal in each)])
-            count = max(len(signal.rebased(base).coefficients) for signal in each)
-            still, *shafts = (_each(share, lambda own: own.rebased(base).extended(count)) for share in found)
+            count = max(len(signal.with_finer_base(base).coefficients) for signal in each)
+            still, *shafts = (_each(share, lambda own: own.with_finer_base(base).padded(count)) for share in found)
             self._known[measure] = still, shafts
         return self._known[measure]
 
@@ -147,7 +147,9 @@ class PhaseLeadModel:
         """Return the counted spectra of a shaft at its starting lead, one per operating point with a weight."""
         shares = measure.shares(self.problem.points)
         own = self.shares(measure)[1][shaft].own
-        return [selected(measure, each, self.problem.engine) for each, share in zip(own, shares, strict=True) if share]
+        return [
+            narrow_signal(measure, each, self.problem.engine) for each, share in zip(own, shares, strict=True) if share
+        ]
 
 
 def carried(problem: Problem, belongs: Callable[[str], bool]) -> Problem:
@@ -169,7 +171,7 @@ def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> Share:
 
 
 def _moved(share: Share, lead: float) -> Share:
-    return _each(share, lambda signal: signal.later(-lead / signal.period, -lead)) if lead else share
+    return _each(share, lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else share
 
 
 def _derived(share: Share) -> Share:

@@ -26,7 +26,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms.norm import amplitudes, mean_square
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
 from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import Measure, mass_rows, selected
+from laufruhe.problem.measure import Measure, mass_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
 _NOTHING, _FEW = 1e-10, 24
@@ -83,7 +83,7 @@ class WaveNorm:
 
 def averages(problem: Problem, measure: Measure) -> bool:
     """Return True if the rows are averages about angles: of means (P7), or of peaks that gas bends (no less)."""
-    bends = problem.has_gas and measure.feels_gas and measure.norm.refinement > 1
+    bends = problem.has_gas and measure.depends_on_gas and measure.norm.refinement > 1
     return measure.is_load and (measure.norm.averages or bends)
 
 
@@ -191,7 +191,7 @@ class ThrowWaves:
         engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
-            selected(measure, signal, engine)
+            narrow_signal(measure, signal, engine)
             for signal, share in zip(found.signals(measure.load), shares, strict=True)
             if share > 0.0
         ]
@@ -238,9 +238,9 @@ class ThrowWaves:
         total, kept = 0.0, np.array([float(order) for order in self.times])
         for one in signals:
             # of what bends at an angle so many orders are listed that those beyond are next to nothing
-            signal = one if one.kinks is None else one.extended(_LISTED)
+            signal = one if one.kinks is None else one.padded(_LISTED)
             out = ~orders_equal(signal.orders, kept)
-            rest = signal.holding(np.where(out[:, None, None], signal.coefficients, 0.0))
+            rest = signal.with_coefficients(np.where(out[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither is more than the root mean square, nor rows of averages more than their lengths
                 maximum = np.sqrt(mean_square(rest))
@@ -310,7 +310,7 @@ class ThrowWaves:
             series[steps] = values
             one = averaged(self.problem, measure, Spectrum(self.base, series), samples)
             # as load_rows has them: what counts of every place, at one angle after the other
-            counted = selected(measure, one, self.problem.engine).coefficients[steps]
+            counted = narrow_signal(measure, one, self.problem.engine).coefficients[steps]
             if share > 0.0 and counted.shape[1]:
                 rows = np.einsum("hpd,hs->hpsd", counted, waves)
                 blocks.append(rows.reshape(len(steps), -1, counted.shape[-1]))

@@ -140,7 +140,7 @@ class TurnedLoads:
         return self._signal(PointLoads(point, wrench, None, moving=engine, fidelity=fidelity)).series
 
     def _rows(self, spectrum: Spectrum) -> ComplexArray:
-        own = spectrum.rebased(self._base).coefficients
+        own = spectrum.with_finer_base(self._base).coefficients
         return np.asarray(own.reshape(len(own), -1))
 
 

@@ -32,7 +32,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Domain, domains_of
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, counted_rotors, radius_of, selected
+from laufruhe.problem.measure import Measure, counted_rotors, narrow_signal, radius_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
@@ -141,7 +141,7 @@ class UnevenModel:
         engine = self.problem.engine
 
         def signal(loads: PointLoads) -> Spectrum:
-            return selected(quantity, quantity.load.signal(loads).series, engine).truncated(HIGHEST)
+            return narrow_signal(quantity, quantity.load.signal(loads).series, engine).truncated(HIGHEST)
 
         return self._turned(point, at, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
 

@@ -18,7 +18,7 @@ from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.exact_angles import as_turn, cis, direction, within
+from laufruhe.numerics.exact_angles import as_turn, cis, direction, reduced_turn
 from laufruhe.numerics.spectrum import as_order
 
 E = TypeVar("E", bound=Extra)
@@ -167,7 +167,7 @@ class Engine:
     def firing_intervals(self) -> tuple[float, ...]:
         """Crank angles from each firing to the next over a cycle [rad]."""
         whole = self.cycle.turns
-        turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.cylinders)
+        turns = sorted(reduced_turn(as_turn(part.firing_angle), whole) for part in self.cylinders)
         following = [*turns[1:], turns[0] + whole] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
 

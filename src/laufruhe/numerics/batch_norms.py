@@ -40,7 +40,7 @@ class BatchNorm:
         block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
         out = np.empty(len(features))
         starts = range(0, len(features), block)
-        if not self.norm.of_row_lengths:
+        if not self.norm.is_monotone_in_lengths:
             for start in starts:
                 own = slice(start, start + block)
                 out[own] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[own]))
@@ -52,7 +52,7 @@ class BatchNorm:
                 part = features[start : start + block]
                 found = np.matmul(part, self._matrix, out=product[: len(part)])
                 size = self._lengths(found, lengths[: len(part)])
-                out[start : start + block] = self.norm.of_lengths(size, self.grid.weights)
+                out[start : start + block] = self.norm.norm_from_lengths(size, self.grid.weights)
 
         if threads <= 1 or len(starts) <= 1:
             work(starts)
@@ -63,9 +63,9 @@ class BatchNorm:
 
     def value(self, features: Array) -> float:
         """Return the norm of one design from features (n,)."""
-        if not self.norm.of_row_lengths:
+        if not self.norm.is_monotone_in_lengths:
             return self.norm.value(self.grid, np.einsum("cfk,f->kc", self.rows, features))
-        return float(self.norm.of_lengths(self._lengths(np.dot(features, self._matrix)), self.grid.weights))
+        return float(self.norm.norm_from_lengths(self._lengths(np.dot(features, self._matrix)), self.grid.weights))
 
     @cached_property
     def _matrix(self) -> Array:

@@ -15,7 +15,7 @@ _until: ContextVar[float] = ContextVar("until", default=math.inf)
 
 
 @contextmanager
-def limited(seconds: float | None) -> Iterator[None]:
+def limit_time(seconds: float | None) -> Iterator[None]:
     """Limit the work within to some seconds, and to those left outside; None sets no further limit."""
     own = math.inf if seconds is None else time.monotonic() + seconds
     before = _until.set(min(_until.get(), own))
@@ -26,7 +26,7 @@ def limited(seconds: float | None) -> Iterator[None]:
 
 
 @contextmanager
-def at_least(seconds: float) -> Iterator[None]:
+def minimum_time(seconds: float) -> Iterator[None]:
     """Give work within at least some seconds: a result needs it."""
     before = _until.set(max(_until.get(), time.monotonic() + seconds))
     try:
@@ -35,27 +35,27 @@ def at_least(seconds: float) -> Iterator[None]:
         _until.reset(before)
 
 
-def left() -> float:
+def seconds_left() -> float:
     """Return the seconds left; infinite without a limit."""
     return _until.get() - time.monotonic()
 
 
-def passed() -> bool:
+def is_time_over() -> bool:
     """Return True if the time is over."""
-    return left() <= 0.0
+    return seconds_left() <= 0.0
 
 
-def in_time(items: Iterable[T]) -> Iterator[T]:
+def until_time_limit(items: Iterable[T]) -> Iterator[T]:
     """Yield the first piece, and further ones while time is left."""
     for k, item in enumerate(items):
-        if k and passed():
+        if k and is_time_over():
             return
         yield item
 
 
-def rounds(maximum: int) -> Iterator[int]:
+def timed_rounds(maximum: int) -> Iterator[int]:
     """Yield numbers of optional rounds while time is left."""
     for k in range(maximum):
-        if passed():
+        if is_time_over():
             return
         yield k

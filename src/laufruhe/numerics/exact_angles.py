@@ -36,7 +36,7 @@ def as_turn(angle: float) -> Turn:
     return nearest if abs(float(nearest) - turns) <= 4 * _EPS * max(abs(turns), 1.0) else turns
 
 
-def within(turn: Turn, whole: int) -> Turn:
+def reduced_turn(turn: Turn, whole: int) -> Turn:
     """Reduce turns to 0 ... whole; a rounding below whole is zero."""
     rest = turn % whole
     return rest if whole - rest > SAME_TURN else Fraction(0)
@@ -45,7 +45,7 @@ def within(turn: Turn, whole: int) -> Turn:
 @lru_cache(maxsize=4096)
 def direction(angle: float) -> Turn:
     """Return an angle [rad] in turns within one turn: equal for equal directions."""
-    return within(as_turn(angle), 1)
+    return reduced_turn(as_turn(angle), 1)
 
 
 def angle_of(turn: Turn) -> float:

@@ -54,7 +54,7 @@ class SignalKinks:
     jumps: Array
 
     @property
-    def bending(self) -> Array:
+    def peak_angles(self) -> Array:
         """Angles where a peak may stand: jumps of the slope, and both sides of jumps of the value."""
         size = np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2)
         # what is left of the jumps of higher derivatives is a rounding
@@ -128,7 +128,7 @@ class SignalKinks:
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
         return _left(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
 
-    def moved(self, by: float, degrees: int = 0) -> Self:
+    def shift(self, by: float, degrees: int = 0) -> Self:
         """Shift the kinks later by an angle, and integrate them `degrees` times."""
         none = np.zeros((len(self.angles), degrees, *self.jumps.shape[2:]))
         return type(self)(self.angles + by, np.concatenate([none, self.jumps], axis=1))
@@ -140,7 +140,7 @@ class SignalKinks:
 
     def repeated(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of the same signal counted over several of its periods."""
-        return join_kinks([self.moved(k * period) for k in range(times)])
+        return join_kinks([self.shift(k * period) for k in range(times)])
 
     def folded(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of a signal that repeats `times` within `period`, over its own period."""

@@ -28,7 +28,7 @@ if hasattr(os, "register_at_fork"):
 
 
 @contextmanager
-def held(folder: Path, wait: bool = True) -> Iterator[bool | None]:
+def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool | None]:
     """Lock a folder; yield True if locked, False if another process holds it (without `wait`), None if unknown."""
     if fcntl is None:
         yield None

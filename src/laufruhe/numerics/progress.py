@@ -58,7 +58,7 @@ def progress_listener(listener: Listener | None) -> Iterator[None]:
 
 
 @contextmanager
-def within(what: str) -> Iterator[None]:
+def search_scope(what: str) -> Iterator[None]:
     """Name the search that all searches within are part of."""
     before = _within.set((*_within.get(), what))
     try:

@@ -26,7 +26,7 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
     return below
 
 
-def parted(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
+def bisect_property(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
     """Bisect to the end of a property that holds from a start on: last place known to hold, first known not to."""
     for _ in range(halvings):
         middle = 0.5 * (start + end)

@@ -18,9 +18,9 @@ from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, find_kinks, join_ki
 
 MOST_SIGNAL_KINKS = 24
 """Of one function that are taken out in closed form."""
-BEHIND = 1e-3 * SAME_ANGLE
+JUMP_OFFSET = 1e-3 * SAME_ANGLE
 """Angle behind a step at which kinks are read [rad]: far over its rounding, and far under what a signal feels."""
-FEW = 9
+MOST_WAVES = 9
 """Coefficients of a signal that is sampled wave by wave."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
@@ -77,11 +77,11 @@ class Spectrum:
             self.base, self.coefficients - self.kinks.coefficients(len(self.coefficients), float(self.base))
         )
 
-    def later(self, turn: Turn, angle: float) -> Spectrum:
+    def shift(self, turn: Turn, angle: float) -> Spectrum:
         """Return the signal shifted later by an angle [rad], also given as a share of its period."""
         turns = phasors([-turn], np.arange(len(self.coefficients)))
         moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
-        kinks = None if self.kinks is None else self.kinks.moved(angle).folded(self.period, 1)
+        kinks = None if self.kinks is None else self.kinks.shift(angle).folded(self.period, 1)
         return Spectrum(self.base, moved, kinks)
 
     @property
@@ -90,11 +90,11 @@ class Spectrum:
         return self if self.kinks is None else Spectrum(self.base, self.coefficients)
 
     @property
-    def bends(self) -> NDArray[np.float64]:
+    def kink_angles(self) -> NDArray[np.float64]:
         """Angles at which the slope jumps, shape (k,) [rad]."""
-        return np.zeros(0) if self.kinks is None else self.kinks.bending
+        return np.zeros(0) if self.kinks is None else self.kinks.peak_angles
 
-    def holding(self, coefficients: NDArray[np.complex128]) -> Spectrum:
+    def with_coefficients(self, coefficients: NDArray[np.complex128]) -> Spectrum:
         """Return the signal with other coefficients."""
         return Spectrum(self.base, coefficients, self.kinks)
 
@@ -118,7 +118,7 @@ class Spectrum:
         found = np.flatnonzero(orders_equal(self.orders, order))
         return np.asarray(self.coefficients[found].sum(axis=0))
 
-    def only(self, orders: ArrayLike) -> Spectrum:
+    def with_orders(self, orders: ArrayLike) -> Spectrum:
         """Return the signal with every other order at zero."""
         counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         return Spectrum(self.base, np.where(counted, self.coefficients, 0.0))
@@ -126,7 +126,7 @@ class Spectrum:
     @property
     def without_mean(self) -> Spectrum:
         """The signal less its mean over the period (M7); kinks have no mean."""
-        return self.holding(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
+        return self.with_coefficients(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
 
     def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
         """Return values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
@@ -138,12 +138,12 @@ class Spectrum:
         ----------
         behind
             Angle behind a step at which kinks are read [rad]. Parts of a sum have to agree on the side of a jump,
-            which rounding decides otherwise: `BEHIND` is enough.
+            which rounding decides otherwise: `JUMP_OFFSET` is enough.
         """
         if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + behind
             return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
-        if len(self.coefficients) <= FEW:
+        if len(self.coefficients) <= MOST_WAVES:
             # a product with few waves takes less time than a transform
             flat = self.coefficients.reshape(len(self.coefficients), -1)
             found = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
@@ -176,7 +176,7 @@ class Spectrum:
         """Integral over the crank angle of the alternating part, without a mean."""
         whole = np.zeros_like(self.coefficients)
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
-        return Spectrum(self.base, whole, None if self.kinks is None else self.kinks.moved(0.0, 1))
+        return Spectrum(self.base, whole, None if self.kinks is None else self.kinks.shift(0.0, 1))
 
     @property
     def derivative(self) -> Spectrum:
@@ -186,11 +186,11 @@ class Spectrum:
             return Spectrum(self.base, steep)
         return Spectrum(self.base, steep, self.kinks.derivative)
 
-    def extended(self, count: int) -> Spectrum:
+    def padded(self, count: int) -> Spectrum:
         """Return the signal with at least `count` coefficients."""
         return self + Spectrum(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
 
-    def rebased(self, base: Fraction) -> Spectrum:
+    def with_finer_base(self, base: Fraction) -> Spectrum:
         """Return the same signal counted in a finer lowest order."""
         factor = self.base / base
         if factor.denominator != 1:
@@ -209,20 +209,20 @@ class Spectrum:
         used = np.logical_or.reduce(self.coefficients.reshape(len(self.coefficients), -1), axis=1)
         return gcd(*used.nonzero()[0].tolist())
 
-    def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
+    def repeat_order(self, also: tuple[Fraction, ...] = ()) -> Fraction:
         """Return the lowest order of the shortest period that also holds some further orders."""
         orders, step = [order for order in also if order > 0], self.step
         if step:
             orders.append(self.base * step)
         return common_base(orders or [Fraction(1)])
 
-    def over(self, base: Fraction) -> Spectrum:
+    def with_base(self, base: Fraction) -> Spectrum:
         """Return the signal over another period of it, with lowest order `base`."""
         if base is self.base or base == self.base:
             return self
-        fine, step = self, times(base, self.base)
+        fine, step = self, multiple_of_base(base, self.base)
         if not step:
-            fine, step = self.rebased(_common(base, self.base)), (base / self.base).numerator
+            fine, step = self.with_finer_base(_common(base, self.base)), (base / self.base).numerator
         kinks = None if fine.kinks is None else fine.kinks.folded(fine.period / step, step)
         return Spectrum(base, fine.coefficients[::step], kinks)
 
@@ -235,7 +235,7 @@ class Spectrum:
         a, b = self, other
         if a.base != b.base:
             base = _common(a.base, b.base)
-            a, b = a.rebased(base), b.rebased(base)
+            a, b = a.with_finer_base(base), b.with_finer_base(base)
         if len(a.coefficients) < len(b.coefficients):
             a, b = b, a
         total = a.coefficients.astype(complex)
@@ -291,9 +291,9 @@ class Mapped(Spectrum):
         """The signal less its mean over the period."""
         return Mapped(self.source.without_mean, self.linear)
 
-    def over(self, base: Fraction) -> Spectrum:
+    def with_base(self, base: Fraction) -> Spectrum:
         """Return the signal over another period."""
-        return Mapped(self.source.over(base), self.linear)
+        return Mapped(self.source.with_base(base), self.linear)
 
     def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
         """Return samples of the source, mapped."""
@@ -322,7 +322,7 @@ def _common(a: Fraction, b: Fraction) -> Fraction:
     return Fraction(gcd(a.numerator, b.numerator), lcm(a.denominator, b.denominator))
 
 
-def times(order: Fraction, base: Fraction) -> int:
+def multiple_of_base(order: Fraction, base: Fraction) -> int:
     """Return an order as a multiple of a lowest order; zero if it is no whole multiple."""
     whole, rest = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
     return 0 if rest else whole
@@ -333,10 +333,10 @@ def common_base(orders: Sequence[Fraction]) -> Fraction:
     return reduce(_common, orders)
 
 
-def in_one_base(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
+def stacked_coefficients(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
     """Return a common lowest order of spectra and `bases`, and all coefficients, shape (spectra, n, ...)."""
     base = common_base([*bases, *(spectrum.base for spectrum in spectra)])
-    series = [spectrum.rebased(base).coefficients for spectrum in spectra]
+    series = [spectrum.with_finer_base(base).coefficients for spectrum in spectra]
     whole = max(map(len, series))
     sides = ((0, 0),) * (series[0].ndim - 1)
     return base, np.array([np.pad(part, ((0, whole - len(part)), *sides)) for part in series])

@@ -20,7 +20,7 @@ from pickle import PicklingError
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from laufruhe.errors import BoundError, SolverError
-from laufruhe.numerics.budget import in_time, left, limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
 from laufruhe.numerics.cores import processors
 from laufruhe.numerics.processes import ForkedWorker, Processes
 from laufruhe.numerics.progress import report_progress
@@ -155,12 +155,12 @@ def unordered_map(
     WorkersGone
         If a piece is lost again and again, or no worker is left.
     """
-    rest = enumerate(in_time(pieces) if patient else pieces)
+    rest = enumerate(until_time_limit(pieces) if patient else pieces)
     pending: dict[Future[Answer[A]], tuple[int, T, int]] = {}
 
     def submit(number: int, piece: T, losses: int = 0) -> None:
         try:
-            future = executor.submit(_answer_of, time.time() + left(), work, piece)
+            future = executor.submit(_answer_of, time.time() + seconds_left(), work, piece)
         except (RuntimeError, OSError) as error:
             raise _workers_gone(executor, error) from None
         pending[future] = (number, piece, losses)
@@ -171,7 +171,7 @@ def unordered_map(
                 submit(*following)
             if not pending:
                 return
-            seconds = LONGEST_WAIT if patient and passed() else min(max(left(), 0.0), LONGEST_WAIT)
+            seconds = LONGEST_WAIT if patient and is_time_over() else min(max(seconds_left(), 0.0), LONGEST_WAIT)
             for future in wait(pending, seconds, FIRST_COMPLETED).done:
                 number, piece, losses = pending.pop(future)
                 try:
@@ -182,7 +182,7 @@ def unordered_map(
                     submit(number, piece, losses + 1)
                 else:
                     yield number, answer
-            if passed() and pending:
+            if is_time_over() and pending:
                 if not patient:
                     raise TimeIsOver("the time limit is over")
                 pending = {future: piece for future, piece in pending.items() if not future.cancel()}
@@ -202,14 +202,14 @@ def ordered_map(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[
         Name of the pieces in reports of progress.
     """
     began, answers = time.process_time(), list[A]()
-    for piece in in_time(pieces):
+    for piece in until_time_limit(pieces):
         rest = len(pieces) - len(answers)
         pays = (time.process_time() - began) * rest > WORTH_PROCESSES * len(answers)
-        if answers and pays and worker_count() > 1 and left() > WORTH_PROCESSES:
+        if answers and pays and worker_count() > 1 and seconds_left() > WORTH_PROCESSES:
             break
         report_progress(what, len(answers), len(pieces))
         answers.append(work(piece))
-    if answers and len(answers) < len(pieces) and not passed():
+    if answers and len(answers) < len(pieces) and not is_time_over():
         later: dict[int, A] = {}
         others = pieces[len(answers) :]
         with (
@@ -233,7 +233,7 @@ class Answer(NamedTuple, Generic[A]):
 
 def _answer_of(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
     # runs in the worker, which starts no workers itself
-    with limited(until - time.time()), working_on(SERIAL), collected() as reports:
+    with limit_time(until - time.time()), working_on(SERIAL), collected() as reports:
         answer = work(piece)
     return Answer(answer, tuple(reports))
 
@@ -273,7 +273,7 @@ class Speculation(Generic[T, A]):
             free = worker_count(executor) - sum(not future.done() for future in begun)
             for key, step in islice(new, max(free, 0)):
                 with suppress(PicklingError, AttributeError, TypeError):
-                    self._pending[key] = executor.submit(_answer_of, time.time() + left(), self._work, step)
+                    self._pending[key] = executor.submit(_answer_of, time.time() + seconds_left(), self._work, step)
 
     def _workers(self) -> Executor | None:
         current = current_executor()

@@ -280,7 +280,7 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
         return np.asarray(total)
 
     from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
-    return fidelity.truncated_gas(from_firing.later(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
+    return fidelity.truncated_gas(from_firing.shift(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
 
 
 @lru_cache(maxsize=64)

@@ -35,7 +35,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
         load = Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
         if torque.kinks is not None:
             rolling = torque.kinks.mapped(lambda jumps: jumps[:, None] * ROLL)
-            kinks = join_kinks([rolling.moved(part.firing_angle) for part in parts] if rolling else [])
+            kinks = join_kinks([rolling.shift(part.firing_angle) for part in parts] if rolling else [])
             load = replace(load, kinks=kinks and kinks.folded(load.period, 1))
         total = total + load
     return total

@@ -95,7 +95,7 @@ def speed_map(
     """
     spectra = [inertia] if gas is None else [inertia, gas]
     base = common_base([spectrum.base for spectrum in spectra])
-    columns = [spectrum.rebased(base).coefficients for spectrum in spectra]
+    columns = [spectrum.with_finer_base(base).coefficients for spectrum in spectra]
     longest = max(len(c) for c in columns)
     padded = [np.pad(c, ((0, longest - len(c)), (0, 0))) for c in columns]
     # inertia grows with the square of speed, gas does not

@@ -84,7 +84,7 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     """Return mean, extremes and stored work of the torque, and the irregularity of the crank speed."""
     torque = crank_torque(engine, point, fidelity)
     # it bends where the gas does: its ends may stand there
-    values = np.concatenate([torque.sample(FINE_WORK * fidelity.samples), torque.values(torque.bends)])
+    values = np.concatenate([torque.sample(FINE_WORK * fidelity.samples), torque.values(torque.kink_angles)])
     mean = float(torque.coefficients[0].real)
     inertia = turning_inertia(engine, fidelity)
     uneven = None if inertia is None else swing_of(engine, point, fidelity).irregularity(inertia)
@@ -116,7 +116,7 @@ def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fide
 @lru_cache(maxsize=256)
 def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
     found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
-    series = found.rebased(cycle.base_order).coefficients
+    series = found.with_finer_base(cycle.base_order).coefficients
     series.setflags(write=False)
     return series
 
@@ -212,7 +212,7 @@ def _found_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     torque, steps = gas_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
     angles = engine.cycle.angle * np.arange(steps) / steps
     work = torque.integral
-    mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.bends)
+    mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.kink_angles)
     own, own_bent = (moving_inertia(engine, fidelity, at)[0] for at in (steady, bent))
     return Swing(point.speed, mean, work.sample(steps), own, work.values(bent), own_bent)
 

@@ -155,7 +155,7 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     # F2: torque of the gas less that of the load, which takes its mean
     torque = gas_torque(engine, point, fidelity)
-    return torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
+    return torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from laufruhe.problem.channels import (
     MOUNT_FORCE,
     LoadChannel,
 )
-from laufruhe.problem.evaluation import Evaluation, samples_of
+from laufruhe.problem.evaluation import Evaluation, channel_samples
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -176,7 +176,7 @@ def has_bearings(result: Result) -> bool:
 
 def bearing_paths(design: Evaluation, k: int) -> ComplexArray:
     """Return main-bearing forces at an operating point as up + i left, shape (angles, bearings) [N]."""
-    samples = samples_of(design, k, BEARINGS.channel)
+    samples = channel_samples(design, k, BEARINGS.channel)
     return np.asarray(samples[..., 2] + 1j * samples[..., 1])
 
 

@@ -32,7 +32,7 @@ from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
 """Inverse of the sizes that bear a load, shape (places,) or (places, d)."""
-OfWheel: TypeAlias = Callable[[Flywheel], float]
+FlywheelFunction: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_WEBS = (*ON_BLOCK, "webs")
@@ -42,7 +42,7 @@ AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
-def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
+def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
     """Return the function of a load inside the crankcase, which depends on the moving parts alone."""
 
     def inside_load(loads: PointLoads) -> Spectrum:
@@ -115,21 +115,21 @@ class Channel:
         Sides that a limit may have.
     minimised
         True if it may be an objective.
-    of_loads
+    depends_on_loads
         True unless a number is known not to depend on the excitation of the block.
-    of_wheel
+    flywheel_value
         Function of measure and design that returns the value as a function of the flywheel, for channels of it.
-    of_torque
+    depends_on_torque
         True if it contains the torque of the crank, which depends on other decisions than the flywheel too.
-    of_engine
+    size_value
         Value as a function of an engine, for channels of its sizes alone, monotone in each size.
-    of_cases
+    case_vectors
         Function of a block in static balance, shape (mounts, 3), whose largest length is a channel of load cases.
     simulation
         Module that simulates it if there is no expression: `peaks` for searches of mounts, `boxes` for bounds.
     missed
         Relative error of peaks between the steps of a simulation, as a function of the engine.
-    of_axis
+    axis_residual
         Residual of turning about the torque-roll axis as a mode, for channels of it.
     places
         Function that returns the names of its places, by which a file may narrow it; empty for the block.
@@ -146,12 +146,12 @@ class Channel:
     needs: Need = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
-    of_loads: bool = True
-    of_wheel: Callable[[MeasureQuery, EvaluatedDesign], OfWheel] | None = None
-    of_engine: Callable[[Engine], float] | None = None
-    of_torque: bool = False
-    of_cases: Callable[[Any], Any] | None = None
-    of_axis: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual] | None = None
+    depends_on_loads: bool = True
+    flywheel_value: Callable[[MeasureQuery, EvaluatedDesign], FlywheelFunction] | None = None
+    size_value: Callable[[Engine], float] | None = None
+    depends_on_torque: bool = False
+    case_vectors: Callable[[Any], Any] | None = None
+    axis_residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual] | None = None
     simulation: str = ""
     missed: Callable[[Engine], float] = lambda _: 0.0
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
@@ -182,17 +182,17 @@ class Channel:
     @property
     def is_flywheel(self) -> bool:
         """True if it is monotone in every number of the flywheel."""
-        return self.of_wheel is not None
+        return self.flywheel_value is not None
 
     @property
-    def of_inertia(self) -> bool:
+    def is_monotone_in_inertia(self) -> bool:
         """True if it is monotone in the inertia of all that turns."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
     def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
         """Raise `ModelError` if a size that it needs is missing."""
-        if self.of_engine is not None:
-            self.of_engine(engine)
+        if self.size_value is not None:
+            self.size_value(engine)
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,33 +205,33 @@ class LoadChannel(Channel):
         Function that returns its spectrum, shape (n, places, d), from the loads at an operating point.
     part
         Components of the wrench for a load of the block; None for loads at mounts.
-    feels_gas
+    depends_on_gas
         True if it contains the roll moment: gas gives no force (eq. 1).
-    of_wrench
+    is_block_load
         True if it follows from the wrench on the block alone; else it is a load inside the crankcase.
-    feels_unbalances
+    depends_on_unbalances
         True if rotors load it and the loads of the throws add up; else it depends on cylinders and their twist.
-    adds_up
+    sums_places
         True if its places add up, so that only the mean over the cycle has a meaning.
-    of_sizes
+    size_factors
         Factors of sizes of each place or component, by which a load inside the crankcase is multiplied (Z1).
     """
 
     keys: tuple[str, ...] = ON_BLOCK
     signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
     part: slice | None = None
-    feels_gas: bool = True
-    of_wrench: bool = False
-    feels_unbalances: bool = True
-    adds_up: bool = False
-    of_sizes: Factor | None = None
+    depends_on_gas: bool = True
+    is_block_load: bool = False
+    depends_on_unbalances: bool = True
+    sums_places: bool = False
+    size_factors: Factor | None = None
     is_load: ClassVar[bool] = True
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
         """Return its factors of sizes, shape (places, d or 1); None without such factors."""
-        if self.of_sizes is None:
+        if self.size_factors is None:
             return None
-        factors = self.of_sizes(engine, point)
+        factors = self.size_factors(engine, point)
         return factors if factors.ndim > 1 else factors[:, None]
 
     def check_sizes(self, engine: Engine, point: OperatingPoint) -> None:
@@ -241,7 +241,7 @@ class LoadChannel(Channel):
     @property
     def norms(self) -> Collection[str]:
         """Names of the norms that apply to it."""
-        return (MEAN.name,) if self.adds_up else tuple(NORMS)
+        return (MEAN.name,) if self.sums_places else tuple(NORMS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,7 +271,7 @@ class NumberChannel(Channel):
 class SizeChannel(NumberChannel):
     """Number that depends on sizes alone."""
 
-    of_loads: bool = False
+    depends_on_loads: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +287,7 @@ class PlaceChannel(NumberChannel):
     """Distance between places of balancer shafts."""
 
     keys: tuple[str, ...] = ("of",)
-    of_loads: bool = False
+    depends_on_loads: bool = False
     minimised: bool = False
     is_placing: ClassVar[bool] = True
 
@@ -305,16 +305,16 @@ def names_of_cylinders(engine: Engine) -> Sequence[str]:
     return [part.name for part in engine.slider_cranks]
 
 
-Where: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
+PlaceSpec: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
 """Keys that narrow a load, part that it needs, and function that returns the names of its places."""
-IN_EACH_CYLINDER: Where = (IN_CYLINDERS, Needs.NOTHING, names_of_cylinders)
-AT_EACH_CRANK_PIN: Where = (AT_CYLINDERS, Needs.NOTHING, names_of_cylinders)
-AT_EACH_BEARING: Where = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
-OF_EACH_BEARING: Where = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+IN_EACH_CYLINDER: PlaceSpec = (IN_CYLINDERS, Needs.NOTHING, names_of_cylinders)
+AT_EACH_CRANK_PIN: PlaceSpec = (AT_CYLINDERS, Needs.NOTHING, names_of_cylinders)
+AT_EACH_BEARING: PlaceSpec = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+OF_EACH_BEARING: PlaceSpec = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
 Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
 
 
-def inside(name: str, unit: str, where: Where, load: Load, factor: Factor | None = None) -> LoadChannel:
+def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor: Factor | None = None) -> LoadChannel:
     """Return the channel of a load inside the crankcase, multiplied by factors of sizes if there are any (Z1)."""
 
     def signal(moving: Engine, loads: PointLoads) -> Spectrum:
@@ -326,38 +326,46 @@ def inside(name: str, unit: str, where: Where, load: Load, factor: Factor | None
         return spectrum.mapped(lambda values: values * columns)
 
     keys, needs, places = where
-    return LoadChannel(name, unit, keys, needs, signal=of_what_moves(name, signal), places=places, of_sizes=factor)
+    return LoadChannel(
+        name, unit, keys, needs, signal=crankcase_signal(name, signal), places=places, size_factors=factor
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class FlywheelChannel(NumberChannel):
     """Number that is monotone in every number of the flywheel."""
 
-    of_loads: bool = False
+    depends_on_loads: bool = False
 
 
 def _of_wheel(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
-    needs: Need = Needs.FLYWHEEL, of_torque: bool = False,
+    needs: Need = Needs.FLYWHEEL, depends_on_torque: bool = False,
 ) -> FlywheelChannel:  # fmt: skip
     """Return the channel of the largest value of a number over the operating points that count."""
 
-    def of_wheel(measure: MeasureQuery, evaluation: EvaluatedDesign) -> OfWheel:
-        counted = [loads.point for loads in evaluation.loads if measure.counts_point(loads.point)]
+    def flywheel_value(measure: MeasureQuery, evaluation: EvaluatedDesign) -> FlywheelFunction:
+        counted = [loads.point for loads in evaluation.loads if measure.includes_point(loads.point)]
         swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
         return lambda wheel: max((number(wheel, swing) for swing in swings), default=0.0)
 
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
         # an uneven speed needs an inertia only
-        return () if inertia is None else (of_wheel(measure, evaluation)(wheel or Flywheel(inertia)),)
+        return () if inertia is None else (flywheel_value(measure, evaluation)(wheel or Flywheel(inertia)),)
 
-    return FlywheelChannel(name, unit, keys, needs, values=values, of_wheel=of_wheel, of_torque=of_torque)
+    return FlywheelChannel(
+        name, unit, keys, needs, values=values, flywheel_value=flywheel_value, depends_on_torque=depends_on_torque
+    )
 
 
 _AT_POINTS = ("operating_points",)
 IRREGULARITY = _of_wheel(
-    "degree of irregularity", "", lambda wheel, swing: swing.irregularity(wheel.inertia), _AT_POINTS, of_torque=True
+    "degree of irregularity",
+    "",
+    lambda wheel, swing: swing.irregularity(wheel.inertia),
+    _AT_POINTS,
+    depends_on_torque=True,
 )
 FLYWHEEL_INERTIA = _of_wheel("flywheel inertia", "kg m^2", lambda wheel, _: wheel.inertia)
 FLYWHEEL_MASS = _of_wheel("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
@@ -390,7 +398,7 @@ def _transmissibility(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Seq
     ratios = [
         mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
         for loads in evaluation.loads
-        if measure.counts_point(loads.point) and loads.mount_forces is not None
+        if measure.includes_point(loads.point) and loads.mount_forces is not None
     ]
     return (max(ratios, default=0.0),)
 
@@ -407,7 +415,9 @@ def _of_axis(
     def value(mounting: ElasticMounting, measure: MeasureQuery) -> float:
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
-    return MountChannel(name, unit, ("frequency",), values=_of_mounting(value), of_axis=residual, of_loads=False)
+    return MountChannel(
+        name, unit, ("frequency",), values=_of_mounting(value), axis_residual=residual, depends_on_loads=False
+    )
 
 
 def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
@@ -428,7 +438,7 @@ def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
 
     keys = ("load_cases", "mounts", "direction_weights")
     return MountChannel(
-        name, unit, keys, Needs.CASES, values=values, of_cases=part, of_loads=False,
+        name, unit, keys, Needs.CASES, values=values, case_vectors=part, depends_on_loads=False,
         places=_names_of_mounts,
     )  # fmt: skip
 
@@ -440,19 +450,19 @@ SAG = MountChannel(
     "static sag",
     "m",
     sides=("min", "max"),
-    of_loads=False,
+    depends_on_loads=False,
     values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting)),
 )
 FREQUENCIES = MountChannel(
-    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_loads=False,
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, depends_on_loads=False,
     values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
 )  # fmt: skip
 DECOUPLING = MountChannel(
-    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_loads=False,
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, depends_on_loads=False,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(
-    "decoupling shortfall", "", ("motions", "wanted"), of_loads=False,
+    "decoupling shortfall", "", ("motions", "wanted"), depends_on_loads=False,
     values=_of_mounting(
         lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
     ),
@@ -460,7 +470,7 @@ DECOUPLING_SHORTFALL = MountChannel(
 TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual)
 RAW_TORQUE_ROLL = _of_axis("raw torque-roll residual", "N m/rad", mount_numbers.raw_residual)
 TOTAL_STIFFNESS = MountChannel(
-    "total stiffness", "N/m", sides=("min", "max"), of_loads=False,
+    "total stiffness", "N/m", sides=("min", "max"), depends_on_loads=False,
     values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
 )  # fmt: skip
 OF_MOUNTING = (
@@ -469,11 +479,11 @@ OF_MOUNTING = (
 )  # fmt: skip
 
 
-def _on_block(name: str, unit: str, part: slice, feels_gas: bool = False) -> LoadChannel:
+def _on_block(name: str, unit: str, part: slice, depends_on_gas: bool = False) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
         return loads.wrench.mapped(lambda wrench: wrench[:, None, part])
 
-    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas, of_wrench=True)
+    return LoadChannel(name, unit, signal=signal, part=part, depends_on_gas=depends_on_gas, is_block_load=True)
 
 
 def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
@@ -483,14 +493,14 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
             raise ValueError(f"this mounting has no {name}")
         return spectrum
 
-    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, of_wrench=True)
+    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, is_block_load=True)
 
 
 def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
     return lambda loads: channel.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True))
 
 
-_ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
+_ON_CRANK: PlaceSpec = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
 
 
 def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -512,33 +522,33 @@ def _of_places(
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 RESULTANT_MOUNT_FORCE = LoadChannel(
-    "resultant mount force", "N", needs=Needs.MOUNTS, signal=_summed(MOUNT_FORCE), of_wrench=True
+    "resultant mount force", "N", needs=Needs.MOUNTS, signal=_summed(MOUNT_FORCE), is_block_load=True
 )
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
 """Loads for which bounds of mounts have formulas."""
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3))
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6))
-ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), feels_gas=True)
+ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), depends_on_gas=True)
 SURGING_FORCE = _on_block("surging force", "N", slice(1, 2))
 SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6))
 OF_BLOCK = (SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE)
-MAIN_BEARING_FORCE = inside("main-bearing force", "N", AT_EACH_BEARING, bearings.main_bearing_forces)
-MAIN_BEARING_PRESSURE = inside(
+MAIN_BEARING_FORCE = crankcase_channel("main-bearing force", "N", AT_EACH_BEARING, bearings.main_bearing_forces)
+MAIN_BEARING_PRESSURE = crankcase_channel(
     "main-bearing pressure", "Pa", AT_EACH_BEARING, bearings.main_bearing_forces, bearings.bearing_factors
 )
-HAMMER_BLOW = inside("hammer blow", "N", OF_EACH_BEARING, bearings.hammer_blows)
-CRANK_TORQUE = inside("crank torque", "N m", _ON_CRANK, _crank_torque)
-STORED_WORK = inside("stored work", "J", _ON_CRANK, lambda *at: _crank_torque(*at).integral)
-CRANK_PIN_FORCE = inside("crank-pin force", "N", AT_EACH_CRANK_PIN, bearings.pin_forces)
-CRANK_PIN_PRESSURE = inside(
+HAMMER_BLOW = crankcase_channel("hammer blow", "N", OF_EACH_BEARING, bearings.hammer_blows)
+CRANK_TORQUE = crankcase_channel("crank torque", "N m", _ON_CRANK, _crank_torque)
+STORED_WORK = crankcase_channel("stored work", "J", _ON_CRANK, lambda *at: _crank_torque(*at).integral)
+CRANK_PIN_FORCE = crankcase_channel("crank-pin force", "N", AT_EACH_CRANK_PIN, bearings.pin_forces)
+CRANK_PIN_PRESSURE = crankcase_channel(
     "crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, bearings.pin_forces, bearings.crank_pin_factors
 )
-SIDE_FORCE = inside("side force", "N", IN_EACH_CYLINDER, _side_forces)
-ROD_FORCE = inside("rod force", "N", IN_EACH_CYLINDER, bearings.piston_pin_forces)
+SIDE_FORCE = crankcase_channel("side force", "N", IN_EACH_CYLINDER, _side_forces)
+ROD_FORCE = crankcase_channel("rod force", "N", IN_EACH_CYLINDER, bearings.piston_pin_forces)
 FRICTION_POWER = replace(
-    inside("friction power", "W", OF_EACH_BEARING, bearings.main_bearing_forces, bearings.drag_factors),
-    adds_up=True, keys=("operating_points", "orders", "bearings"),
+    crankcase_channel("friction power", "W", OF_EACH_BEARING, bearings.main_bearing_forces, bearings.drag_factors),
+    sums_places=True, keys=("operating_points", "orders", "bearings"),
 )  # fmt: skip
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))

@@ -27,7 +27,7 @@ from laufruhe.problem.channels import (
     LoadChannel,
     mounting_in,
 )
-from laufruhe.problem.evaluation import Evaluation, over
+from laufruhe.problem.evaluation import Evaluation, with_common_base
 from laufruhe.problem.loads import PointLoads
 
 if TYPE_CHECKING:
@@ -118,7 +118,9 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
 
     def sampled(signals: list[list[Spectrum]]) -> Array:
         base = first.engine.cycle.base_order
-        return np.array([[over(base, [one])[0].sample(steps) for one in of_design] for of_design in signals])
+        return np.array(
+            [[with_common_base(base, [one])[0].sample(steps) for one in of_design] for of_design in signals]
+        )
 
     wrenches = sampled([[loads.wrench for loads in design.loads] for design in designs.values()])
     direction = CurveAxis("direction", axes)
@@ -151,7 +153,7 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         own = (CurveAxis(place, tuple(channel.places(first.engine))),)
         signals[name] = (words, channel.unit, own, channel.signal)
     spectra = {
-        name: [[signal(loads).rebased(base) for loads in design.loads] for design in designs.values()]
+        name: [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
         for name, (_, _, _, signal) in signals.items()
     }
     count = max(len(one.coefficients) for rows in spectra.values() for row in rows for one in row)

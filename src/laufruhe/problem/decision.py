@@ -138,7 +138,7 @@ class Numbers:
         mounts = base.mounts
         if self.mounts:
             rows = iter(self.mounts)
-            mounts = tuple(mount.mapped(lambda spring: mount_of(spring, next(rows))) for mount in base.mounts)
+            mounts = tuple(mount.mapped(lambda spring: mount_from_numbers(spring, next(rows))) for mount in base.mounts)
         shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in base.geared})
         # a sum of changes may leave a bound by a rounding
         geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in base.geared)
@@ -289,7 +289,7 @@ class AddressDrive:
         raise TypeError(f"{self.path} is a number of the file; the engine is put together anew with it")
 
 
-def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:
+def mount_from_numbers(mount: Mount, numbers: Sequence[float]) -> Mount:
     """Return a mount with these fourteen numbers (E13)."""
     rows = turned_axes(NUMBERS, numbers[TURNED]).tolist()
     # a sum of changes may leave a bound of zero by a rounding
@@ -336,7 +336,7 @@ class Decision:
         return self.set.upper
 
     @property
-    def start_number(self) -> float:
+    def real_start(self) -> float:
         """Start of a real number."""
         return self.start.real
 
@@ -388,7 +388,7 @@ def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tup
     return tuple(decision for decision in others if decision.drives)
 
 
-def moved_numbers(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
+def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
     """Move the numbers in place to decisions at these values, and return them."""
     for decision, value in zip(decisions, values, strict=True):
         for drive in decision.drives:
@@ -455,32 +455,32 @@ def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
     return tuple(domains)
 
 
-def ends_of(domains: Sequence[Domain]) -> tuple[Array, Array]:
+def column_bounds(domains: Sequence[Domain]) -> tuple[Array, Array]:
     """Return lower and upper bounds of every column of a decision vector."""
     low, high = (np.array([d.ends[k] for d in domains for _ in range(d.width)], dtype=float) for k in (0, 1))
     return low, high
 
 
-def sides_of(decisions: Sequence[Decision]) -> tuple[Array, Array]:
+def real_bounds(decisions: Sequence[Decision]) -> tuple[Array, Array]:
     """Return lower and upper bounds of real decisions."""
     lower, upper = (np.array([getattr(d, side) for d in decisions], dtype=float) for side in ("lower", "upper"))
     return lower, upper
 
 
-def scales_of(domains: Sequence[Domain]) -> Array:
+def column_scales(domains: Sequence[Domain]) -> Array:
     """Return the largest size of every column of a decision vector."""
     return np.array([d.scale for d in domains for _ in range(d.width)], dtype=float)
 
 
-def vector_of(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:
+def decision_vector(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:
     """Return the decision vector of complex values; by default those of the design as given."""
     own = [domain.decision.start for domain in domains] if values is None else values
     return np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, own, strict=True))])
 
 
-def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
+def projected_vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
     """Return the decision vector of complex values, each projected onto its set."""
-    out = vector_of(domains, values)
+    out = decision_vector(domains, values)
     for domain in domains:
         out[domain.columns] = domain.project(out)
     return out

@@ -174,7 +174,7 @@ def falls_with_flywheel(channel: Channel) -> bool:
     return TABLE[channel.name].get(Kind.FLYWHEEL) is Dependence.MONOTONE_DOWN
 
 
-def kinds_of(problem: Problem) -> frozenset[Kind]:
+def open_kinds(problem: Problem) -> frozenset[Kind]:
     """Return the kinds of open numbers and choices."""
     stars = [Kind.STAR] if problem.phasing is not None else []
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
@@ -199,7 +199,7 @@ def shares_gas(problem: Problem) -> bool:
     names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
     led = (part for part in parts if part.shaft.name in names)
-    return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)
+    return problem.depends_on_gas and any(part.faces(other) for part in led for other in parts if other is not part)
 
 
 def _moves_carried(problem: Problem) -> bool:

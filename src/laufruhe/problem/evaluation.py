@@ -14,7 +14,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
-from laufruhe.numerics.spectrum import Spectrum, common_base, times
+from laufruhe.numerics.spectrum import Spectrum, common_base, multiple_of_base
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mount_forces import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
@@ -64,7 +64,7 @@ class Evaluation(EvaluatedDesign):
         """Return the rows of a measure over the whole cycle, of a peak at its kinks too."""
         if not measure.is_load:
             return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
-        signals = over(self.engine.cycle.base_order, self.signals(measure.load))
+        signals = with_common_base(self.engine.cycle.base_order, self.signals(measure.load))
         points = [loads.point for loads in self.loads]
         return load_rows(measure, points, signals, self.engine, samples or self.samples, bends)
 
@@ -97,21 +97,21 @@ class Evaluation(EvaluatedDesign):
         """Return a measure of this design [SI], a maximum sought between samples too; infinite on a resonance."""
         return self.values(measure)[0]
 
-    def standing(self, limit: Limit) -> Standing:
+    def check_limit(self, limit: Limit) -> LimitCheck:
         """Return how this design stands to a limit (E15)."""
         # a shaft that is left out has no place to limit
         nothing = math.inf if limit.maximum == math.inf else max(limit.minimum, 0.0)
-        pairs = ((value, *limit.room(value)) for value in self.values(limit.measure) or (nothing,))
+        pairs = ((value, *limit.slack(value)) for value in self.values(limit.measure) or (nothing,))
         value, room, edge, side = min(pairs, key=lambda pair: pair[1])
-        return Standing(value, edge, side, -room)
+        return LimitCheck(value, edge, side, -room)
 
     def violation(self, limits: Sequence[Limit]) -> float:
         """Return the largest relative violation of limits, negative if all have slack; zero without limits."""
-        return max((self.standing(limit).violation for limit in limits), default=0.0)
+        return max((self.check_limit(limit).violation for limit in limits), default=0.0)
 
 
 @dataclass(frozen=True)
-class Standing:
+class LimitCheck:
     """A value, the nearest side of its limit, and its relative violation.
 
     A limit on several values, such as natural frequencies, shows the value with the least slack.
@@ -133,16 +133,16 @@ def with_fine_sampling(evaluation: Evaluation) -> Evaluation:
     return replace(evaluation, samples=fine_samples(evaluation.samples))
 
 
-def finer(problem: Problem, times: int) -> Problem:
-    """Return the problem with `times` as many samples; the gas keeps its own."""
+def with_more_samples(problem: Problem, factor: int) -> Problem:
+    """Return the problem with `factor` as many samples; the gas keeps its own."""
     own = problem.fidelity
-    return problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
+    return problem.at(replace(own, samples=factor * own.samples, gas_samples=own.gas_steps))
 
 
 def with_default_sampling(problem: Problem) -> Problem:
     """Return the problem with the default number of samples at least: bounds at few samples hold at these only."""
-    times = math.ceil(EXACT.samples / problem.fidelity.samples)
-    return problem if times == 1 else finer(problem, times)
+    factor = math.ceil(EXACT.samples / problem.fidelity.samples)
+    return problem if factor == 1 else with_more_samples(problem, factor)
 
 
 def is_coarsely_sampled(measure: Measure, samples: int) -> bool:
@@ -155,10 +155,10 @@ def limit_samples(measure: Measure, samples: int) -> int:
     return fine_samples(samples) if is_coarsely_sampled(measure, samples) else samples
 
 
-def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
+def with_common_base(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
     """Return signals with one common base order, at most `base`."""
     finest = common_base([base, *(signal.base for signal in signals)])
-    return [signal.rebased(finest) for signal in signals]
+    return [signal.with_finer_base(finest) for signal in signals]
 
 
 def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None = None) -> Evaluation:
@@ -191,7 +191,7 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
     return Evaluation(engine, problem.fidelity, loads, samples or problem.fidelity.samples)
 
 
-def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:
+def with_mounts(evaluation: Evaluation, engine: Engine) -> Evaluation:
     """Return the evaluation on other mounts; `engine` differs in its mounts alone."""
     loads = _on_mounts(engine, evaluation.fidelity, [(loads.point, loads.wrench) for loads in evaluation.loads])
     return replace(evaluation, engine=engine, loads=loads)
@@ -220,13 +220,13 @@ def value_of_loads(problem: Problem, evaluation: Evaluation) -> float:
     return sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms)
 
 
-def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> Array:
+def channel_samples(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> Array:
     """Return a channel at operating point k over the whole cycle, shape (samples, places, d)."""
     signal = channel.signal(evaluation.loads[k])
-    return over(evaluation.engine.cycle.base_order, [signal])[0].sample(evaluation.samples)
+    return with_common_base(evaluation.engine.cycle.base_order, [signal])[0].sample(evaluation.samples)
 
 
-def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
+def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
     """Return mean, maximum and rms at every place of a channel at operating point k, maxima sought between samples."""
     known = evaluation._place_measures
     if (k, channel) in known:
@@ -236,7 +236,7 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
     (once,), samples = _one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
     fine, coarse = (lengths(each.sample(samples)) for each in (once, once.series))
-    top = np.maximum(fine.max(axis=0), lengths(signal.values(signal.bends)).max(axis=0, initial=0.0))
+    top = np.maximum(fine.max(axis=0), lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0))
     known[k, channel] = [
         replace(cycle_measures(values[:, None]), max=float(largest))
         for values, largest in zip(coarse[::BETWEEN].T, top, strict=True)
@@ -246,8 +246,8 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
 
 def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
     # signals over the period in which all repeat, and the samples of the cycle in it
-    once = common_base([signal.repeats() for signal in signals])
-    periods = times(once, base)
+    once = common_base([signal.repeat_order() for signal in signals])
+    periods = multiple_of_base(once, base)
     if not periods or samples % periods:
-        return over(base, signals), samples
-    return [signal.over(once) for signal in signals], samples // periods
+        return with_common_base(base, signals), samples
+    return [signal.with_base(once) for signal in signals], samples // periods

@@ -81,7 +81,7 @@ class MeasureQuery:
     wanted: float = 1.0
     alternating: bool = False
 
-    def counts_point(self, point: OperatingPoint) -> bool:
+    def includes_point(self, point: OperatingPoint) -> bool:
         """Return True if an operating point counts."""
         return self.points is None or point.name in self.points
 

@@ -18,7 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
-from laufruhe.numerics.spectrum import BEHIND, Spectrum, orders_equal
+from laufruhe.numerics.spectrum import JUMP_OFFSET, Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, is_at_mounts
 from laufruhe.problem.loads import MeasureQuery, PointLoads
 
@@ -83,24 +83,24 @@ class Measure(MeasureQuery):
     @property
     def is_inside(self) -> bool:
         """True for a load inside the crankcase."""
-        return self.is_load and not self.load.of_wrench
+        return self.is_load and not self.load.is_block_load
 
     @property
-    def feels_gas(self) -> bool:
+    def depends_on_gas(self) -> bool:
         """True if gas contributes to it."""
         if self.is_load:
-            return self.load.feels_gas
+            return self.load.depends_on_gas
         channel = self.channel
-        return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.of_loads)
+        return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.depends_on_loads)
 
     @property
     def is_cylinder_resolved(self) -> bool:
         """True for a number of the crankshaft's twist, which no sum over the cylinders gives."""
-        return self.channel.of_loads and self.channel.is_number and not self.is_mounting
+        return self.channel.depends_on_loads and self.channel.is_number and not self.is_mounting
 
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
         """Return the weight of every operating point, shape (points,); they add up to one, zero does not count."""
-        weights = [p.weight if self.counts_point(p) else 0.0 for p in points]
+        weights = [p.weight if self.includes_point(p) else 0.0 for p in points]
         return np.array(weights) / (sum(weights) or math.nan)
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
@@ -109,18 +109,18 @@ class Measure(MeasureQuery):
         return counts & ~orders_equal(orders, 0.0) if self.alternating else counts
 
     @property
-    def counts_mean(self) -> bool:
+    def includes_mean(self) -> bool:
         """True if the mean of a load over the cycle is a part of it."""
         return self.is_load and bool(self.counted([0.0])[0])
 
     @property
-    def of_all_orders(self) -> Measure:
+    def with_all_orders(self) -> Measure:
         """Measure of the whole load, its mean included."""
         return replace(self, orders=None, alternating=False)
 
     def signal(self, loads: PointLoads, engine: Engine) -> Spectrum:
         """Return the part of a load that counts at an operating point, shape (n, places, d)."""
-        return selected(self, self.load.signal(loads), engine)
+        return narrow_signal(self, self.load.signal(loads), engine)
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Limit:
     minimum: float = -math.inf
     outside: tuple[float, float] | None = None
 
-    def room(self, value: float) -> tuple[float, float, str]:
+    def slack(self, value: float) -> tuple[float, float, str]:
         """Return the relative slack to the nearest side, negative outside; that side [SI], and its sense (E15)."""
         sides = []
         if self.minimum > -math.inf:
@@ -220,11 +220,11 @@ def load_rows(
     for signal, share, own in zip(signals, measure.shares(points), bends, strict=True):
         if share == 0.0:
             continue
-        counted = selected(measure, signal, engine)
+        counted = narrow_signal(measure, signal, engine)
         if measure.norm.refinement == 1:
             values = counted.series.sample(samples)
         else:
-            values = np.concatenate([counted.sample(samples, BEHIND), counted.values(own)])
+            values = np.concatenate([counted.sample(samples, JUMP_OFFSET), counted.values(own)])
         # an engine without the named places has no load there
         if not values.shape[1]:
             continue
@@ -243,12 +243,12 @@ def kinks_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> l
     """Return the angles of kinks [rad] where a peak may stand, as many for every operating point (L5a)."""
     if measure.norm.refinement == 1:
         return [np.zeros(0)] * len(signals)
-    kinks = [selected(measure, signal, engine).bends for signal in signals]
+    kinks = [narrow_signal(measure, signal, engine).kink_angles for signal in signals]
     count = max(map(len, kinks))
     return [np.resize(own, count) if len(own) else np.zeros(count) for own in kinks]
 
 
-def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
+def narrow_signal(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
     """Return the places and orders of a signal (n, places, d) that count, its directions weighted.
 
     Signals of places that add up are multiplied by their number: the mean over them is then their sum.
@@ -257,10 +257,10 @@ def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
         signal = signal.mapped(lambda values: values[:, measure.places(measure.load.places(engine)), :])
     if measure.direction_weights is not None:
         signal = signal.mapped(lambda values: values * np.array(measure.direction_weights))
-    if measure.load.adds_up:
+    if measure.load.sums_places:
         signal = signal.mapped(lambda values: values * values.shape[1])
     if measure.orders is not None:
-        signal = signal.only(measure.orders)
+        signal = signal.with_orders(measure.orders)
     return signal.without_mean if measure.alternating else signal
 
 
@@ -276,7 +276,7 @@ def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ..
     return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
-def counted_parts(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
+def counterweight_masses(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
     """Return the counterweights of mechanisms that a measure adds up [kg]; none if it names rotors."""
     counts = Role.COUNTERWEIGHT in _roles(measure) and measure.rotors is None
     return [mass for part in parts if counts and (mass := part.counterweight_mass) is not None]
@@ -286,7 +286,7 @@ def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderC
     """Return rows U / radius of the counted rotors and counterweights, shape (rows, 2) [kg]; a zero row for none."""
     counted = counted_rotors(measure, rotors)
     vectors = [[r.unbalance.real / radius_of(r), r.unbalance.imag / radius_of(r)] for r in counted]
-    vectors += [[mass, 0.0] for mass in counted_parts(measure, parts)]
+    vectors += [[mass, 0.0] for mass in counterweight_masses(measure, parts)]
     return Rows(MEAN, np.array(vectors or [[0.0, 0.0]]), Grid(np.ones(max(len(vectors), 1)), 1))
 
 

@@ -62,7 +62,7 @@ def _cached_zero(problem: Problem) -> float:
     all_orders = replace(
         even,
         objective=tuple(
-            replace(term, measure=term.measure.of_all_orders if term.measure.is_load else term.measure)
+            replace(term, measure=term.measure.with_all_orders if term.measure.is_load else term.measure)
             for term in even.objective
         ),
     )

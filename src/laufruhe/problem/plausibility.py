@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from laufruhe.errors import Complaint
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.exact_angles import as_turn, within
+from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
@@ -46,11 +46,11 @@ def plausibility_warnings(
     return tuple(first.values())
 
 
-def together(engine: Engine) -> list[list[str]]:
+def simultaneous_firings(engine: Engine) -> list[list[str]]:
     """Return groups of names of cylinders that fire at one crank angle."""
     fires: dict[float, list[str]] = defaultdict(list)
     for part in engine.cylinders:
-        fires[round(float(within(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)
+        fires[round(float(reduced_turn(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)
     return [names for names in fires.values() if len(names) > 1]
 
 
@@ -107,7 +107,7 @@ def _of_mounts(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_firing(engine: Engine) -> Iterator[Complaint]:
-    groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in together(engine)]
+    groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in simultaneous_firings(engine)]
     remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
     if groups:
         yield Complaint("firing", "", f"is at once in {'; in '.join(groups)}", remedy)

@@ -16,7 +16,7 @@ from laufruhe.errors import Complaint, ModelError, counted, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.problem.decision import Decision, Numbers, moved_numbers
+from laufruhe.problem.decision import Decision, Numbers, apply_decisions
 from laufruhe.problem.measure import Limit, Measure, PriorityLevel, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import plausibility_warnings
@@ -299,17 +299,17 @@ class Problem:
         return any(self.fidelity.gas_of(point) is not None for point in self.points)
 
     @property
-    def feels_gas(self) -> bool:
+    def depends_on_gas(self) -> bool:
         """True if gas affects a measure; gas gives a roll moment only, but everything at an uneven speed."""
-        return self.has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
+        return self.has_gas and (any(measure.depends_on_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
-    def feels_order(self) -> bool:
+    def depends_on_firing_order(self) -> bool:
         """True if a measure depends on the firing order of one star: twist, and loads inside the crankcase with gas."""
         if any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]
-        return (self.has_gas and bool(loads)) or not all(load.feels_unbalances for load in loads)
+        return (self.has_gas and bool(loads)) or not all(load.depends_on_unbalances for load in loads)
 
     @property
     def objective_name(self) -> str:
@@ -434,7 +434,7 @@ class Problem:
         moved = self.decisions if decisions is None else decisions
         on_mounts = any(decision.mount_drives for decision in moved)
         start = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
-        return moved_numbers(start, moved, values)
+        return apply_decisions(start, moved, values)
 
 
 def _check_name(name: object) -> None:

@@ -38,7 +38,7 @@ class StaticPart:
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
     """Return the static part of loads on the block and its mounts in the objective, or None where it is negligible."""
     whole = with_mean_loads(problem)
-    counted = [term for term in whole.objective if term.measure.counts_mean and not term.measure.is_inside]
+    counted = [term for term in whole.objective if term.measure.includes_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
         return None
     value = objective_value(whole, evaluation)
@@ -62,6 +62,6 @@ def _with_loads(problem: Problem, alternating: bool) -> Problem:
     terms = []
     for term in problem.objective:
         whole = replace(term.measure, alternating=False)
-        may = whole.counts_mean and "alternating" in whole.channel.keys
+        may = whole.includes_mean and "alternating" in whole.channel.keys
         terms.append(replace(term, measure=replace(whole, alternating=alternating and may)))
     return replace(problem, objective=tuple(terms))

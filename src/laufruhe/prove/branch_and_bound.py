@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.witness import is_over
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
@@ -162,7 +162,7 @@ class BranchAndBound(Generic[P]):
             self.propose(queue[0].part)
             if self.is_fathomed(queue[0]):
                 break
-            self.complete = self.node_count < max_nodes and not passed()
+            self.complete = self.node_count < max_nodes and not is_time_over()
             if not self.complete:
                 break
             limits = (self.value, queue[0].bound) if self.reports_bounds else (math.inf, -math.inf)

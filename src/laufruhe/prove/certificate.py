@@ -230,7 +230,9 @@ def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
         gradient += weight * norm.pullback(z)
-    limits = [norm.norm.balanced(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)]
+    limits = [
+        norm.norm.balanced_dual(norm.grid, z) for (_, norm), z in zip(problem.limits, multipliers.limits, strict=True)
+    ]
     for (maximum, norm), z in zip(problem.limits, limits, strict=True):
         price = norm.dual_norm(z)
         constant += float(np.vdot(z, norm.constant)) - price * maximum
@@ -286,7 +288,7 @@ def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound
     interpolated = interpolate_duals(problem, solution)
     aligned = Multipliers(
         tuple(
-            norm.norm.aligned(norm.grid, norm.rows(x), z)
+            norm.norm.aligned_dual(norm.grid, norm.rows(x), z)
             for (_, norm), z in zip(problem.terms, interpolated.terms, strict=True)
         ),
         interpolated.limits,
@@ -388,7 +390,7 @@ def _interior_directions(problem: AffineProblem, x: Array) -> Array:
 
 def _interpolate(fine: AffineNorm, z: Array) -> Array:
     """Interpolate dual rows of a coarser grid, shape (k, d), to the grid of a norm; rows of masses stay."""
-    signals, kinks = len(fine.grid.weights) // fine.grid.steps, fine.grid.bends
+    signals, kinks = len(fine.grid.weights) // fine.grid.steps, fine.grid.kinks
     factor, remainder = divmod(len(fine.grid.weights) - signals * kinks, max(len(z) - signals * kinks, 1))
     if remainder:
         # rows of a grid that this one does not refine
@@ -398,7 +400,9 @@ def _interpolate(fine: AffineNorm, z: Array) -> Array:
     # rows at kinks of the signals stay
     by_signal = z.reshape(signals, -1, z.shape[-1])
     coarse, at_kinks = by_signal[:, : by_signal.shape[1] - kinks], by_signal[:, by_signal.shape[1] - kinks :]
-    rows = fine.norm.spread(coarse.reshape(-1, z.shape[-1]), coarse.shape[1], factor).reshape(signals, -1, z.shape[-1])
+    rows = fine.norm.refined_dual(coarse.reshape(-1, z.shape[-1]), coarse.shape[1], factor).reshape(
+        signals, -1, z.shape[-1]
+    )
     return np.concatenate([rows, at_kinks], axis=1).reshape(-1, z.shape[-1])
 
 

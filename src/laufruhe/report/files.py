@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import InputError, printed, refused
-from laufruhe.numerics.locks import held
+from laufruhe.numerics.locks import folder_lock
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.strict_json import is_ours
@@ -119,7 +119,7 @@ def staged(wanted: FileSet) -> Iterator[Path]:
         with _reporting(wanted):
             above = wanted.folder.parent
             # wait while another run swaps the folder
-            with held(above) if above.is_dir() else nullcontext():
+            with folder_lock(above) if above.is_dir() else nullcontext():
                 wanted.checked()
             stage = until_then.enter_context(_stage_for(wanted.folder))
             # the folder may be missing, also while another run swaps it
@@ -127,7 +127,7 @@ def staged(wanted: FileSet) -> Iterator[Path]:
                 shutil.copymode(wanted.folder, stage)
         with _with_final_name(stage, wanted.folder):
             yield stage
-        with held(wanted.folder.parent):
+        with folder_lock(wanted.folder.parent):
             made = wanted.checked()
             if wanted.adds:
                 for name in made - {entry.name for entry in stage.iterdir()}:
@@ -223,16 +223,16 @@ def _stage_for(place: Path) -> Iterator[Path]:
     with ExitStack() as undone:
         undone.callback(_remove_empty, missing)
         place.parent.mkdir(parents=True, exist_ok=True)
-        with held(place.parent):
+        with folder_lock(place.parent):
             for left in place.parent.glob(f"{mark}*"):
-                with held(left, wait=False) as ours:
+                with folder_lock(left, wait=False) as ours:
                     if ours:
                         _clear(left, place)
             stage = place.parent / f"{mark}{secrets.token_hex(4)}"
             stage.mkdir()
             undone.callback(_clear, stage, place)
             _note(stage, "", None)
-            undone.enter_context(held(stage))
+            undone.enter_context(folder_lock(stage))
         yield stage
 
 

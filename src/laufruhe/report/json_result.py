@@ -18,7 +18,7 @@ from laufruhe.physics.torque import torque_facts
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel, mounting_in
-from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
+from laufruhe.problem.evaluation import Evaluation, channel_samples, place_measures, with_common_base
 from laufruhe.problem.static_load import static_part
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.section import EXTENSION_SECTIONS
@@ -151,7 +151,7 @@ def _point(result: Result, k: int) -> Record:
 
 def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
     forces = channel.signal(result.final.loads[k])
-    before, after = measured(result.initial, k, channel), measured(result.final, k, channel)
+    before, after = place_measures(result.initial, k, channel), place_measures(result.final, k, channel)
     amplitudes = mount_orders(forces)
     present = np.flatnonzero(np.any(amplitudes != 0.0, axis=1))
     return [
@@ -169,12 +169,12 @@ def _series(result: Result, k: int) -> Record:
     # loads at the sample angles [rad], place by place, and the wrench (C7)
     final, cycle = result.final, result.final.engine.cycle.angle
     angles = cycle * np.arange(final.samples) / final.samples
-    wrench = over(final.engine.cycle.base_order, [final.loads[k].wrench])[0].sample(final.samples)
+    wrench = with_common_base(final.engine.cycle.base_order, [final.loads[k].wrench])[0].sample(final.samples)
     return {
         "angle": _plain(angles),
         "components": list(WRENCH),
         "shaking": _plain(wrench),
-        **{places.key: _plain(samples_of(final, k, places.channel)) for places in places_of(result)},
+        **{places.key: _plain(channel_samples(final, k, places.channel)) for places in places_of(result)},
     }
 
 

@@ -47,7 +47,7 @@ from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
 from laufruhe.present.tables import Table
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
-from laufruhe.problem.evaluation import measured
+from laufruhe.problem.evaluation import place_measures
 from laufruhe.report import files
 from laufruhe.report.section import EXTENSION_SECTIONS, NumberTables
 from laufruhe.report.sections import tables_of as printed_tables
@@ -89,7 +89,7 @@ def _measures(result: Result) -> Table:
         for k, point in enumerate(result.problem.points)
         for design, evaluation in designs_with_loads(result).items()
         for name, each in zip(
-            places.channel.places(evaluation.engine), measured(evaluation, k, places.channel), strict=True
+            places.channel.places(evaluation.engine), place_measures(evaluation, k, places.channel), strict=True
         )
     ]  # fmt: skip
     return Table(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)

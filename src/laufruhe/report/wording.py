@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.numerics.exact_angles import as_turn, within
+from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.present.measures import breaks_a_limit, has_firing, is_changed
 from laufruhe.present.numbers import figure, number, percent, share, trimmed
 from laufruhe.present.static_load import static_sentence
-from laufruhe.problem.plausibility import together
+from laufruhe.problem.plausibility import simultaneous_firings
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.sections.reach import sentences
 from laufruhe.solvers.result import Result, Status
@@ -72,13 +72,13 @@ def fired(result: Result) -> str:
     if len(engine.cylinders) < 2:
         return ""
     firing = has_firing(result)
-    turns = [float(within(as_turn(part.firing_angle), engine.cycle.turns)) for part in engine.cylinders]
+    turns = [float(reduced_turn(as_turn(part.firing_angle), engine.cycle.turns)) for part in engine.cylinders]
     order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
     spacing = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
     sentence, do = f"{lead}, {spacing}.", "fire" if firing else "stand there"
-    groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in together(engine)]
+    groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in simultaneous_firings(engine)]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
 

@@ -8,7 +8,7 @@ from functools import partial
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, missed, missed_of_gas, reference, relative, sampling_error
-from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.budget import is_time_over, until_time_limit
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -28,7 +28,7 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     exact, so only the error of sampling remains.
     """
     terms = [(term, term.measure.channel) for term in problem.objective]
-    runs = [term for term, channel in terms if channel.simulation or channel.of_torque]
+    runs = [term for term, channel in terms if channel.simulation or channel.depends_on_torque]
     load_error = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
         return load_error
@@ -64,7 +64,9 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
     ):
         return result
     (missed, interpolated), steps = missed_of_gas(problem, result.final), fidelity.gas_steps
-    while missed > problem.tolerance * value_of_loads(problem, result.final) and steps < MOST_GAS and not passed():
+    while (
+        missed > problem.tolerance * value_of_loads(problem, result.final) and steps < MOST_GAS and not is_time_over()
+    ):
         steps *= TIMES
         result = solve(problem.at(replace(fidelity, gas_samples=steps)))
         if result.certificate is None:
@@ -94,7 +96,7 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
         return result
     if tolerance is None:
         return _with_gas(problem, solve, result)
-    for _ in () if passed() else in_time(range(_ROUNDS)):
+    for _ in () if is_time_over() else until_time_limit(range(_ROUNDS)):
         # a simulation has the same time steps at every fidelity
         if _error_of_loads(result.problem, result.final) <= tolerance:
             break

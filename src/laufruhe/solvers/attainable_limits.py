@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from laufruhe.errors import LaufruheError
-from laufruhe.numerics.budget import in_time, left, limited, passed
-from laufruhe.numerics.progress import report_progress, within
+from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, until_time_limit
+from laufruhe.numerics.progress import report_progress, search_scope
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
@@ -83,11 +83,11 @@ def with_attainable_limits(
     is_core = not problem.extras and not problem.ranks
     solve, answers = partial(_surely, solve, problem) if is_core else solve, []
     # a time limit of the caller replaces the default
-    seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, spent)
-    with limited(seconds), within(result.message or str(result.status)):
+    seconds = None if math.isfinite(seconds_left()) else max(LEAST_SECONDS, spent)
+    with limit_time(seconds), search_scope(result.message or str(result.status)):
         for k, limit in enumerate(limits):
             report_progress("what limits can reach", k, len(limits))
-            with within(f"what '{limit.name}' can reach"), limited(left() / (len(limits) - k)):
+            with search_scope(f"what '{limit.name}' can reach"), limit_time(seconds_left() / (len(limits) - k)):
                 answers.append(_in_time(_answer(limit, problem, kinds, result, solve)))
         if len(result.conflict) > 1 and any(answer.is_none for answer in answers):
             result = _narrowed(result, problem, solve)
@@ -137,7 +137,7 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Res
         if math.isinf(limit_value):
             continue
         entry = replace(default, side=side, limit=limit_value)
-        if passed():
+        if is_time_over():
             return _Answer(replace(entry, why=LONG))
         if not depends(measure.channel, kinds, problem):
             known = {entry.name: entry.value for entry in result.limits}
@@ -162,7 +162,9 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Res
 
 def _in_time(answer: _Answer) -> _Answer:
     entry = answer.told
-    return replace(answer, told=replace(entry, ended=passed() and not entry.why and entry.proof is not Proof.GLOBAL))
+    return replace(
+        answer, told=replace(entry, ended=is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL)
+    )
 
 
 def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
@@ -199,7 +201,7 @@ def _none(entry: AttainableLimit, result: Result) -> _Answer:
         names = quoted(result.conflict)
         reason = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
         return _Answer(replace(entry, why=reason), is_none=True)
-    return _Answer(replace(entry, why=LONG if passed() else "no design was found that keeps the other limits"))
+    return _Answer(replace(entry, why=LONG if is_time_over() else "no design was found that keeps the other limits"))
 
 
 def _narrowed(result: Result, problem: Problem, solve: Solve) -> Result:
@@ -208,7 +210,7 @@ def _narrowed(result: Result, problem: Problem, solve: Solve) -> Result:
 
     def excluded(subset: Sequence[Limit]) -> bool:
         part = _asking(problem, problem.objective, tuple(subset))
-        return not passed() and solve(part).status is Status.INFEASIBLE
+        return not is_time_over() and solve(part).status is Status.INFEASIBLE
 
     names = smallest_conflict(limits, excluded)
     return result if len(names) == len(limits) else replace(result, conflict=names, message=contradiction(names))
@@ -224,7 +226,7 @@ def _at_edges(
         return _none(entry, unlimited)
     nearest, value = unlimited, _extreme(unlimited, limit, is_maximum)
     unreached, bound = entry.limit, entry.limit if status is Status.INFEASIBLE else math.nan
-    for _ in in_time(range(HALVINGS)):
+    for _ in until_time_limit(range(HALVINGS)):
         if abs(value - unreached) <= CLOSE * abs(entry.limit):
             break
         middle = 0.5 * (value + unreached)

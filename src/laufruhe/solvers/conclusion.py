@@ -14,7 +14,7 @@ from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision, Kind
-from laufruhe.problem.dependence import depends, kinds_of
+from laufruhe.problem.dependence import depends, open_kinds
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -224,7 +224,7 @@ def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price
         return math.inf
     error = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
-        standing = fine.standing(limit)
+        standing = fine.check_limit(limit)
         if standing.side == side and price.relaxed > 0.0:
             error += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
     return error
@@ -352,13 +352,13 @@ def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], t
 
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
     """Return names of limits whose relative violation is more than `KEPT`."""
-    return tuple(limit.name for limit in limits if evaluation.standing(limit).violation > KEPT)
+    return tuple(limit.name for limit in limits if evaluation.check_limit(limit).violation > KEPT)
 
 
 def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> Nearest:
     """Return the record of an infeasible design: its decisions, and the limit with the largest violation."""
-    limit = max(problem.limits, key=lambda limit: design.standing(limit).violation)
-    standing = design.standing(limit)
+    limit = max(problem.limits, key=lambda limit: design.check_limit(limit).violation)
+    standing = design.check_limit(limit)
     names = broken_limits(problem.limits, design)
     return Nearest(
         limit.name,
@@ -401,7 +401,7 @@ def _limit_value(
     value: float,
     price_floor: float = _PRICE_FLOOR,
 ) -> LimitValue:
-    standing = evaluation.standing(limit)
+    standing = evaluation.check_limit(limit)
     if prices is None:
         # no decision can move
         price = Price.both(math.nan)
@@ -433,7 +433,7 @@ def _limit_value(
 def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
     """Return True if a small step of a decision changes the limited measure at a design."""
     channel = limit.measure.channel
-    if not depends(channel, kinds_of(problem), problem):
+    if not depends(channel, open_kinds(problem), problem):
         return False
     # no step of a decision moves a throw
     moves_throws = problem.phasing is not None and depends(channel, {Kind.STAR}, problem)

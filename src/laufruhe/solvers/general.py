@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import rounds
+from laufruhe.numerics.budget import timed_rounds
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
@@ -80,7 +80,7 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
     """Alternate cone programs of `INNER` decisions and local programs of all while the objective falls."""
     problem = program.problem
     other_decisions = tuple(decision for decision in problem.decisions if decision.kind not in INNER)
-    for k in rounds(ROUNDS):
+    for k in timed_rounds(ROUNDS):
         rank = program.rank(best)
         report_progress("cones and local programs in turn", k, ROUNDS, rank[1])
         values = dict(zip((d.name for d in problem.decisions), program.values(best), strict=True))

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -96,7 +96,11 @@ def _together(
     if len(stages) < len(problem.ranks):
         name = problem.ranks[len(stages)].terms[0].measure.name
         # the last design meets all limits of the missing rank
-        reason = "was not decided: time was over" if passed() else "found no design under the limits of those before it"
+        reason = (
+            "was not decided: time was over"
+            if is_time_over()
+            else "found no design under the limits of those before it"
+        )
         message = f"objective {len(stages) + 1}, {name}, {reason}"
     weakest = min((rank.proof for rank in ranks), key=PROOF_RANK)
     is_complete = not message and all(stage.status is Status.OPTIMAL for stage in stages)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from laufruhe.numerics.norms import Norm
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, Channel
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import Dependence, dependence, kinds_of
+from laufruhe.problem.dependence import Dependence, dependence, open_kinds
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
@@ -19,7 +19,7 @@ from laufruhe.solvers.result import Result
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
 OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
 """Channels for which programs of mounts have formulas or a simulation."""
-OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.of_engine is not None)
+OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.size_value is not None)
 """Channels that depend on the sizes of an engine only."""
 
 
@@ -88,7 +88,7 @@ class Method:
 
     def suits(self, problem: Problem) -> bool:
         """Return True if the method solves a problem, by its open numbers and its measures."""
-        kinds = kinds_of(problem)
+        kinds = open_kinds(problem)
         return (
             kinds <= self.decides
             and all(self._names(m, kinds, problem) for m in problem.measures)

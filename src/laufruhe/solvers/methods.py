@@ -11,7 +11,7 @@ from functools import cache, partial
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
-from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
@@ -23,7 +23,7 @@ from laufruhe.problem.channels import (
     OF_SHAFT_PLACES,
 )
 from laufruhe.problem.decision import KINDS, Kind
-from laufruhe.problem.dependence import Dependence, depends, kinds_of
+from laufruhe.problem.dependence import Dependence, depends, open_kinds
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -76,7 +76,7 @@ def solve_with_places(problem: Problem) -> Result:
 
 
 def _closes_without_places(problem: Problem) -> bool:
-    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).strength is ProofStrength.EXACT
+    return Kind.PLACE in open_kinds(problem) and _method(without_places(problem)).strength is ProofStrength.EXACT
 
 
 def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
@@ -226,7 +226,7 @@ def solve(
     ModelError
         If the initial design cannot be evaluated, or no method solves the problem.
     """
-    with limited(time_limit), progress_listener(listener), collected() as reports:
+    with limit_time(time_limit), progress_listener(listener), collected() as reports:
         started, spent = time.perf_counter(), time.thread_time()
         result: Result | None
         try:
@@ -238,10 +238,10 @@ def solve(
             why = f"what is open needs {error.name}, which is not installed; pip install {error.name}"
             raise SolverError(why) from None
         except SolverError:
-            if not passed():
+            if not is_time_over():
                 raise
             result = None
-        result = result if result is not None and not passed() else _cut_short(problem, result)
+        result = result if result is not None and not is_time_over() else _cut_short(problem, result)
         # a method may have changed the problem, but its file is the same
         result = replace(result, problem=replace(result.problem, origin=problem.origin))
         if reports:
@@ -251,7 +251,7 @@ def solve(
             return result
         if result.status is Status.OPTIMAL:
             return replace(result, free=free_decisions(result))
-        result = with_attainable_limits(result, problem, kinds_of(problem), time.perf_counter() - started, _decided)
+        result = with_attainable_limits(result, problem, open_kinds(problem), time.perf_counter() - started, _decided)
         return without_proof(result, reports[0]) if reports else result
 
 
@@ -295,7 +295,7 @@ def refuse(problem: Problem) -> None:
     if reduction is not None and reduction.refuse is not None:
         reduction.refuse(problem)
         return
-    kinds = kinds_of(problem)
+    kinds = open_kinds(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
@@ -317,7 +317,7 @@ def _decided(problem: Problem, remaining: Sequence[Reduction] | None = None) -> 
 
 def _by_method(problem: Problem) -> Result:
     """Solve a problem by the first method that suits it, with the bound of an exact method for part of its measures."""
-    method, kinds = _method(problem), kinds_of(problem)
+    method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
     conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
@@ -335,7 +335,7 @@ def _refuse_any_rank(problem: Problem) -> None:
 
 
 def _fixed_limits(problem: Problem) -> list[Limit]:
-    kinds = kinds_of(problem)
+    kinds = open_kinds(problem)
     return [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
 
 
@@ -353,7 +353,7 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
 
 
 def _is_settled(problem: Problem) -> bool:
-    kinds = kinds_of(problem)
+    kinds = open_kinds(problem)
     if not kinds or not problem.objective or problem.phasing is not None:
         return False
     return not any(depends(term.measure.channel, kinds, problem) for term in problem.objective)

@@ -316,7 +316,7 @@ def affine_prices(
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
     """Return all slopes of a norm at a design; None if unknown, or if too many rows are zero."""
     rows = norm.rows(x)
-    kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
+    kinks = norm.norm.subdifferential(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
     if kinks is None or len(kinks.vanishing) > MOST_VANISHING:
         return None
     hull = np.array([norm.pullback(multiplier) for multiplier in (kinks.base, *kinks.others)])

@@ -11,16 +11,16 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.fidelity.error_bounds import missed
-from laufruhe.numerics.budget import rounds
+from laufruhe.numerics.budget import timed_rounds
 from laufruhe.numerics.witness import check_bound
 from laufruhe.problem.evaluation import (
     FINE_SAMPLES,
     Evaluation,
-    finer,
     is_coarsely_sampled,
     objective_value,
     with_default_sampling,
     with_fine_sampling,
+    with_more_samples,
 )
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -38,13 +38,13 @@ FELT, LEAST_TIMES = 0.1, 2.0
 def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
     """Solve with more samples until fine sampling confirms limits and gap; the last result has fine sampling."""
     result = solve(problem)
-    for _ in rounds(ROUNDS):
+    for _ in timed_rounds(ROUNDS):
         fidelity = problem.fidelity
         disagreement = _sampling_disagreement(result) if fidelity.samples < FINE_SAMPLES else 0.0
         if disagreement <= 1.0:
             return result
         # the error of a mean falls with the square of the step; the gas pressure keeps its samples
-        problem = finer(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MOST_TIMES))
+        problem = with_more_samples(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MOST_TIMES))
         result = solve(problem)
     return result if _sampling_disagreement(result) <= 1.0 else _evaluated_at_fine_sampling(result)
 
@@ -104,7 +104,8 @@ def _untold(result: Result) -> float:
     # a failed search with fewer samples than the default is repeated with the default
     minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / coarse.samples) ** 2
     return max(
-        (max(minimum, abs(fine.standing(x).violation - coarse.standing(x).violation)) for x in limits), default=0.0
+        (max(minimum, abs(fine.check_limit(x).violation - coarse.check_limit(x).violation)) for x in limits),
+        default=0.0,
     )
 
 

@@ -19,7 +19,7 @@ from laufruhe.errors import BoundError, LaufruheError
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import Domain, columns_of, domains_of, vector_of
+from laufruhe.problem.decision import Domain, decision_vector, domains_of, projected_vector
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import SOONEST, Candidate
@@ -184,7 +184,7 @@ class _Walk:
             value = objective_value(problem, evaluation)
             if not math.isfinite(value) or (best is not None and best.violation <= 0.0 and value >= best.value):
                 return None
-            excesses = [evaluation.standing(limit).violation for limit in self.limits]
+            excesses = [evaluation.check_limit(limit).violation for limit in self.limits]
         except LaufruheError:
             return None
         sure = max((violation + error for violation, error in zip(excesses, self.errors, strict=True)), default=0.0)
@@ -271,7 +271,7 @@ def _along(direction: Array) -> Move:
 
     def move(stand: Stand, step: float) -> Stand | None:
         domains = domains_of(stand.problem.decisions)
-        x = vector_of(domains, stand.values)
+        x = decision_vector(domains, stand.values)
         if len(x) != len(direction):
             return None
         widths = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
@@ -387,7 +387,7 @@ def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | N
     values_by_name = dict(zip((d.name for d in stand.problem.decisions), stand.values, strict=True))
     values = [values_by_name.get(decision.name, decision.start) for decision in problem.decisions]
     domains = domains_of(problem.decisions)
-    x = columns_of(domains, values)
+    x = projected_vector(domains, values)
     return Stand(problem, tuple(_value(domain, x) for domain in domains), candidate)
 
 
@@ -405,7 +405,7 @@ def _is_shown(result: Result, witness: Visit, bound: float | None) -> bool:
         factor = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
         if witness.value * factor + numerical_zero(problem, evaluation.engine) >= bound:
             return False
-    standings = ((limit, evaluation.standing(limit)) for limit in problem.limits)
+    standings = ((limit, evaluation.check_limit(limit)) for limit in problem.limits)
     is_feasible = all(
         standing.violation + relative(missed(limit.measure, evaluation), standing.value) <= 0.0
         for limit, standing in standings

@@ -13,7 +13,7 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import kinds_of
+from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem, Search
@@ -156,7 +156,7 @@ def _begun(problem: Problem, neighbour: Result) -> Problem:
 
 def _unproven(problem: Problem, starts: int, maximum: int) -> Search:
     # search settings with few starts and boxes, without proof
-    boxes = min(problem.search.boxes_or(maximum), maximum) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
+    boxes = min(problem.search.boxes_or(maximum), maximum) if open_kinds(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 
 

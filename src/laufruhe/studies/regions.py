@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import refused
-from laufruhe.numerics.locks import held
+from laufruhe.numerics.locks import folder_lock
 from laufruhe.studies.part import Record, Template
 
 VALUES, COLUMNS, DONE = "values", "columns", "done"
@@ -181,7 +181,7 @@ def locked_store(root: Path) -> Iterator[None]:
     with ExitStack() as until_then:
         try:
             root.mkdir(parents=True, exist_ok=True)
-            ours = until_then.enter_context(held(root, wait=False))
+            ours = until_then.enter_context(folder_lock(root, wait=False))
         except OSError as error:
             rule = f"cannot be written ({error.strerror})"
             raise refused("results", str(root), rule, "name another place by --out") from None

@@ -12,7 +12,7 @@ from pathlib import Path
 import xarray as xr
 
 from laufruhe.errors import SolverError
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import (
     TimeIsOver,
     WorkersGone,
@@ -139,7 +139,7 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Point
             if jobs > 1 and ahead * (1.0 - 1.0 / jobs) > POOL_PAYS:
                 break
             answer = _answer(k, task, scenes)
-            if passed():
+            if is_time_over():
                 # a time limit may have cut the answer short
                 raise _time_limit_error()
             yield answer
@@ -187,7 +187,7 @@ def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -
             with closing(unordered_map(_work, pieces(), executor)) as results:
                 for _, done_now in results:
                     done, spent = done + len(done_now), spent + sum(answer.seconds for answer in done_now)
-                    if passed():
+                    if is_time_over():
                         raise _time_limit_error()
                     yield from done_now
         except TimeIsOver:

@@ -19,7 +19,7 @@ from laufruhe.files.measures import QuantityName
 from laufruhe.files.study_tables import CaseTable, SweepAxis, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.evaluation import Evaluation, place_measures
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
@@ -122,7 +122,7 @@ def _finite(value: float) -> float:
 def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[float, float]]:
     if not evaluation.engine.mounts:
         return {}
-    each = [measured(evaluation, k) for k in range(len(problem.points))]
+    each = [place_measures(evaluation, k) for k in range(len(problem.points))]
     weights = [point.weight for point in problem.points]
     return {
         name: (sum(w * m.mean for w, m in zip(weights, of, strict=True)) / sum(weights), max(m.max for m in of))

@@ -18,7 +18,7 @@ from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
@@ -139,7 +139,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         physics = replace(variant.fidelity, tolerance=None), len(variant.points)
         row = replace(measured[physics], name=name) if physics in measured else _row(name, variant, scale, decided)
         measured[physics] = row
-        if passed():
+        if is_time_over():
             # a time limit may have cut the last row short
             break
         rows.append(row)

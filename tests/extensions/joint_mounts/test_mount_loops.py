@@ -117,7 +117,7 @@ def test_limits_at_rest_are_over_zero_only_where_they_break(seed: int) -> None:
     for lower, upper in boxes_of(problem, generator, 300, 0.02):
         over = max(float(each.min()) for each in rest.over(lower, upper))
         design = evaluate_start(problem.changed(engine=problem.design(upper.tolist(), problem.mount_decisions)))
-        violation = max(design.standing(limit).violation for limit in problem.mount_limits)
+        violation = max(design.check_limit(limit).violation for limit in problem.mount_limits)
         # none is over zero where a design keeps all, and small boxes tell of what breaks one
         assert over <= 0.0 or violation > 0.0
         assert violation < 0.1 or over > 0.0

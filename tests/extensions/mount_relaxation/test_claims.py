@@ -17,7 +17,7 @@ from laufruhe.errors import BoundError
 from laufruhe.extensions.mount_relaxation.cone_solver import new_solver
 from laufruhe.extensions.mount_relaxation.prover import applies, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
-from laufruhe.numerics.budget import at_least, left, limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time, minimum_time, seconds_left
 from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
 from problem_files import PROBLEMS
 
@@ -66,9 +66,9 @@ def test_no_bound_counts_what_it_does_not_name() -> None:
 def test_a_relaxation_stops_when_time_is_over_unless_it_is_given_more() -> None:
     cones, settings = [clarabel.NonnegativeConeT(3)], {"verbose": False}
     solver = new_solver(np.ones(3), csc_array(-np.eye(3)), -np.arange(3.0), cones, settings)
-    with limited(1e-9):
+    with limit_time(1e-9):
         assert solver.solve().iterations <= 1
-        with at_least(60.0):
-            assert left() > 50.0
+        with minimum_time(60.0):
+            assert seconds_left() > 50.0
             assert solver.solve().x == pytest.approx([0.0, 1.0, 2.0], abs=1e-6)
-        assert passed()
+        assert is_time_over()

@@ -16,7 +16,7 @@ from laufruhe.extensions.mount_relaxation.limits import UNBOUNDED, Limits
 from laufruhe.extensions.mount_relaxation.program import proven_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
@@ -51,7 +51,7 @@ def drawn(problem: Problem, count: int) -> list[tuple[np.ndarray, float, float]]
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     for share in generator.random((count, len(low))):
         x = low * (high / low) ** share
-        each = remounted(given, problem.design(x.tolist()))
+        each = with_mounts(given, problem.design(x.tolist()))
         if each.violation(problem.limits) <= 0.0:
             found.append((x, objective_value(problem, each), each.value(asked_limit(problem).measure)))
     return found
@@ -114,7 +114,7 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
     tables["constraints"][0]["max"] = f"{1.01 * value:.9g}"
     problem = load(tables)
     boxes = SdpRelaxation(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
-    near = np.array([d.start_number for d in problem.mount_decisions])
+    near = np.array([d.real_start for d in problem.mount_decisions])
     box = BoxRelaxation(boxes, boxes._terms[0][1], (np.inf, np.inf), near * (1.0 - 1e-9), near * (1.0 + 1e-9))
     found = []
     for ratio in boxes.limits.ratios:
@@ -191,7 +191,7 @@ def test_a_half_of_the_motions_may_have_nothing_open() -> None:
     result, given = solve(problem), evaluate(problem)
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
-    others = [remounted(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
+    others = [with_mounts(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
     minimum = min(objective_value(problem, each) for each in others if each.violation(problem.limits) <= 0.0)
     assert result.certificate.lower_bound <= minimum
     assert result.objective is not None

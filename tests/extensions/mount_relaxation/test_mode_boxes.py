@@ -23,7 +23,7 @@ from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 
 DECOUPLED = {"limit": "kinetic-energy decoupling", "motions": ["bounce", "roll"], "min": "0.5"}
@@ -84,7 +84,7 @@ def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[
     low, high = sides(problem)
     while len(found) < count:
         x = np.clip(near * np.exp(generator.normal(0.0, 0.25, len(near))), low, high)
-        each = remounted(given, problem.design(x.tolist()))
+        each = with_mounts(given, problem.design(x.tolist()))
         if each.violation(problem.limits) <= 0.0:
             found.append((x, objective_value(problem, each)))
     return found

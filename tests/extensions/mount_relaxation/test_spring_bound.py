@@ -34,7 +34,7 @@ from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts, sp
 from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import TURNED as ANGLES
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.ranges import number_ranges
@@ -82,7 +82,7 @@ def designs_of(
     generator, given = np.random.default_rng(seed), evaluate(problem)
     for share in generator.random((count, len(low))):
         x = low + share * (high - low)
-        each = remounted(given, problem.design(x.tolist()))
+        each = with_mounts(given, problem.design(x.tolist()))
         if each.violation(problem.limits) <= 0.0:
             yield x, objective_value(problem, each)
 
@@ -244,7 +244,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
     (tmp_path / "four.toml").write_text(tractor(name), encoding="utf-8")
     problem = plain or load(tmp_path / "four.toml")
     boxes, generator = asked_of(problem), np.random.default_rng(4)
-    about = np.array([d.start_number for d in problem.mount_decisions])
+    about = np.array([d.real_start for d in problem.mount_decisions])
     kept, halves = 0, set[int]()
     for low, high, x, u in designs_in(generator, boxes, about, 40):
         parts, orders = boxes.parts(low, high), boxes._terms[0][1].orders
@@ -480,7 +480,7 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
     """E62: forces by solving anew, with an inclination and a place open; of both halves and of all motions."""
     problem = load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
     boxes, generator = asked_of(problem), np.random.default_rng(6)
-    about, tight = np.array([d.start_number for d in problem.mount_decisions]), 0.0
+    about, tight = np.array([d.real_start for d in problem.mount_decisions]), 0.0
     omega = 2.0 * np.pi * 70.0
     for low, high, x, _ in designs_in(generator, boxes, about, 30):
         parts = boxes.parts(low, high)
@@ -565,7 +565,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
 
     def worth(s: np.ndarray) -> float:
-        each = remounted(given, problem.design(np.clip(low * (high / low) ** s, low, high).tolist()))
+        each = with_mounts(given, problem.design(np.clip(low * (high / low) ** s, low, high).tolist()))
         return objective_value(problem, each) * (1.0 + 100.0 * max(each.violation(problem.limits), 0.0))
 
     best = np.log(np.array([decision.value for decision in result.decisions]) / low) / np.log(high / low)

@@ -12,7 +12,7 @@ import laufruhe
 from laufruhe.extensions.robust.result import RobustResult
 from laufruhe.extensions.robust.tolerance import tolerances_of, with_errors
 from laufruhe.files.reader import load_tables
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
@@ -153,7 +153,7 @@ def test_time_that_is_over_leaves_no_proof_that_few_angles_alone_have(throw: flo
     """Of the heaviest piston, nothing open: 48 angles have 0.6 % too little, or a quarter of a percent too much."""
     engine = {**ENGINE, "throws": [throw]}
     asked = problem(engine=engine, objective=SECOND)
-    with limited(1e-9):
+    with limit_time(1e-9):
         result = solve(asked)
     assert result.objective is not None
     assert result.certificate is not None

@@ -26,7 +26,7 @@ from laufruhe.extensions.run_ups.runs import run_loads, run_through
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.time_model import time_model
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -349,7 +349,7 @@ def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     kept = met = 0
     for x in low + (high - low) * r.random((80, len(low))):
-        design = remounted(given, problem.design(x.tolist()))
+        design = with_mounts(given, problem.design(x.tolist()))
         met += design.value(OF_RUNS[1]) > 1.1e-3
         if design.violation(problem.limits) <= 0.0:
             kept += 1
@@ -380,7 +380,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
     given = evaluate(bare)
     r = np.random.default_rng(seed)
     low, high = (np.array([getattr(d, side) for d in bare.mount_decisions]) for side in ("lower", "upper"))
-    designs = [remounted(given, bare.design(x.tolist())) for x in low + (high - low) * r.random((100, len(low)))]
+    designs = [with_mounts(given, bare.design(x.tolist())) for x in low + (high - low) * r.random((100, len(low)))]
     problem = bare
     if limit is not None:
         name, unit, scale = limit

@@ -13,7 +13,7 @@ from extensions.run_ups.test_run_boxes import OF_RUNS, READY, random_problem
 from lanes import first_fast
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.evaluation import evaluate, remounted
+from laufruhe.problem.evaluation import evaluate, with_mounts
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.mounts.bounds import conflict_of, excludes
 
@@ -24,7 +24,7 @@ def limits_of(problem: Problem, share: float, seed: int = 0) -> list[dict[str, A
     given = evaluate(problem)
     low, high = sides(problem)
     found = np.array([
-        [remounted(given, problem.design(x.tolist())).value(measure) for measure in OF_RUNS[:2]]
+        [with_mounts(given, problem.design(x.tolist())).value(measure) for measure in OF_RUNS[:2]]
         for x in low + (high - low) * r.random((60, len(low)))
     ])  # fmt: skip
     middle = np.median(found, axis=0)
@@ -57,7 +57,7 @@ def test_what_is_excluded_no_search_meets(seed: int) -> None:
     given = evaluate(problem)
 
     def violation(x: Array) -> float:
-        return remounted(given, problem.design(np.clip(x, low, high).tolist())).violation(problem.limits)
+        return with_mounts(given, problem.design(np.clip(x, low, high).tolist())).violation(problem.limits)
 
     r = np.random.default_rng(seed)
     start = min(low + (high - low) * r.random((60, len(low))), key=violation)

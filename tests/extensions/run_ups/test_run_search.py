@@ -22,7 +22,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.time_model import time_model
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -113,7 +113,7 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
         assert travel.shadow_price == pytest.approx(-force / moved, rel=5e-3)
     # what is best without the limit breaks it
     free = laufruhe.solve(problem.changed(limits=problem.limits[:1]))
-    assert not free.final.standing(problem.limits[1]).violation <= 0.0
+    assert not free.final.check_limit(problem.limits[1]).violation <= 0.0
     assert free.objective.value < result.objective.value
 
 
@@ -125,11 +125,11 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
     grid = np.exp(np.linspace(np.log(40e3), np.log(600e3), 20))
     best, looked = np.inf, 0
     for pair in np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2).tolist():
-        design = remounted(initial, problem.design(pair))
+        design = with_mounts(initial, problem.design(pair))
         value = objective_value(problem, design)
-        if value < 1.1 * result.objective.value and design.standing(problem.limits[0]).violation <= 0.0:
+        if value < 1.1 * result.objective.value and design.check_limit(problem.limits[0]).violation <= 0.0:
             looked += 1
-            if design.standing(problem.limits[1]).violation <= 0.0:
+            if design.check_limit(problem.limits[1]).violation <= 0.0:
                 best = min(best, value)
     assert looked > 15
     assert result.objective.value <= best * (1.0 + 1e-6) < np.inf
@@ -232,9 +232,9 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
     assert by_scipy(result.final.engine, problem)[0] == pytest.approx(force.value, rel=2e-3)
     initial = evaluate(problem)
     for stiffness in np.linspace(60e3, 400e3, 40):
-        design = remounted(initial, problem.design([float(stiffness)]))
+        design = with_mounts(initial, problem.design([float(stiffness)]))
         if objective_value(problem, design) < result.objective.value * (1.0 - 2e-3):
-            assert design.standing(problem.limits[0]).violation > 0.0
+            assert design.check_limit(problem.limits[0]).violation > 0.0
 
 
 @pytest.mark.slow

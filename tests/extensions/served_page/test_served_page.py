@@ -299,7 +299,7 @@ def test_limits_of_a_run_up_are_measured_when_sliders_rest(page: Page) -> None:
     problem = laufruhe.load(path)
     values = decided(problem, design)
     built = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
-    assert told == pytest.approx(built.standing(problem.limits[0]).value, rel=1e-9)
+    assert told == pytest.approx(built.check_limit(problem.limits[0]).value, rel=1e-9)
 
 
 def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from laufruhe.extensions.sizes.solver import solve_sizes
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import limit_time
 from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status, solve
@@ -69,7 +69,7 @@ def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> Non
     maximum = 0.998 * of_many_angles(0).objective.value
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{maximum} N"}
     asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
-    with limited(1e-9):
+    with limit_time(1e-9):
         result = refine_sampling(asked, solve_sizes)
     assert with_fine_sampling(result.final).violation(asked.limits) > KEPT
     assert result.status is Status.FAILED

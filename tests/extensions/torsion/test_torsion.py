@@ -139,7 +139,7 @@ def test_any_mechanism_drives_its_throw(name: str) -> None:
     own = (discs[0], *parts, discs[1])
     engine = problem.engine.with_extra(Torsion(own, tuple(ShaftSection(d.name, 1e5) for d in own[1:])))
     together = throw_torques(engine, problem.points[0]).coefficients.sum(axis=1)
-    whole = crank_torque(engine, problem.points[0]).rebased(engine.cycle.base_order).coefficients
+    whole = crank_torque(engine, problem.points[0]).with_finer_base(engine.cycle.base_order).coefficients
     count = min(len(together), len(whole))
     assert together[:count] == pytest.approx(whole[:count], abs=1e-9 * np.abs(whole).max())
     assert np.abs(together[count:]).max(initial=0.0) < 1e-9 * np.abs(whole).max()

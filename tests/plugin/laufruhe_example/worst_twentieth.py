@@ -24,7 +24,7 @@ class WorstTwentieth(Norm):
         size = np.sort(lengths(rows))
         return float(size[-max(len(size) // 20, 1) :].mean())
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return a bound of the largest length."""
         return MAXIMUM.above(signals, shares)
 

@@ -27,7 +27,7 @@ from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult, ThinBoxBounder
@@ -83,7 +83,7 @@ def mixes_corners(problem: Problem) -> bool:
     terms = problem.load_terms
     if named_part(problem) is not problem or problem.mount_terms or len(terms) != len(problem.objective):
         return False
-    summed = any(measure.load.adds_up for measure in problem.measures if measure.is_load and measure.on_mounts)
+    summed = any(measure.load.sums_places for measure in problem.measures if measure.is_load and measure.on_mounts)
     on_mounts = any(term.measure.on_mounts for term in terms)
     return on_mounts and not summed and not problem.known_rows and is_looped(problem)
 
@@ -111,7 +111,7 @@ class DesignBoxes:
     def __init__(self, problem: Problem, value: float, exact_objective: ExactObjective) -> None:
         problem = with_default_sampling(problem)
         self.loads, self.value, self._exact_objective = MountedLoads(problem), value, exact_objective
-        self.lower, self.upper = sides_of(problem.mount_decisions)
+        self.lower, self.upper = real_bounds(problem.mount_decisions)
         self._rest = RestLimits(problem)
         self._corners: dict[tuple[float, ...], Corner] = {}
         orders = self.loads.orders

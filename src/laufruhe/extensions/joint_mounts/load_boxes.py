@@ -25,7 +25,7 @@ from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
-from laufruhe.problem.decision import Kind, ends_of, sides_of
+from laufruhe.problem.decision import Kind, column_bounds, real_bounds
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
@@ -130,7 +130,7 @@ class LoadBoxes:
     def __init__(self, problem: Problem, left_out: float, throws: OpenThrows | None = None) -> None:
         self.problem = problem = with_default_sampling(problem)
         self.loads, turns = MountedLoads(problem, throws), throws is not None
-        (low, high), (minimum, maximum) = sides_of(problem.mount_decisions), ends_of(self.loads.domains)
+        (low, high), (minimum, maximum) = real_bounds(problem.mount_decisions), column_bounds(self.loads.domains)
         first, last = throws.sides if throws else (np.zeros(0), np.zeros(0))
         self.lower, self.upper = np.concatenate([low, minimum, first]), np.concatenate([high, maximum, last])
         self._numbers, self._orders = len(low), self.loads.orders

@@ -12,7 +12,7 @@ from laufruhe.extensions.joint_mounts.open_throws import OpenThrows
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import Spectrum, in_one_base
+from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.channels import mounting_in
@@ -79,7 +79,9 @@ class MountedLoads:
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
         angles = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (constant, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
-            base, series = in_one_base([constant, *slopes, *(self._throws.wrenches(p) if self._throws else ())])
+            base, series = stacked_coefficients(
+                [constant, *slopes, *(self._throws.wrenches(p) if self._throws else ())]
+            )
             loads = series @ moved
             waves = np.exp(1j * float(base) * np.outer(angles, np.arange(loads.shape[1])))
             loads[0] -= np.einsum("pk,pki->ki", waves, loads[1 + len(slopes) :])

@@ -59,7 +59,7 @@ class OpenThrows:
 
         def turned(part: Moving) -> Spectrum:
             wrench = part.found[0].loads[point].wrench.series
-            return wrench.holding(wrench.coefficients * np.exp(1j * wrench.orders * part.ahead)[:, None])
+            return wrench.with_coefficients(wrench.coefficients * np.exp(1j * wrench.orders * part.ahead)[:, None])
 
         parts = self.waves.parts
         return [sum((turned(part) for part in parts if part.pin == pin), start=_NONE) for pin in self.open]
@@ -71,7 +71,7 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
     Gas loads are nonlinear in the throws, and open bank angles, pins or shafts are not throws.
     """
     is_unsupported = (
-        problem.feels_gas or problem.fidelity.is_uneven or any(phasing.is_geometry_open) or phasing.shafts.optional
+        problem.depends_on_gas or problem.fidelity.is_uneven or any(phasing.is_geometry_open) or phasing.shafts.optional
     )
     if phasing.throw_bounds is None or is_unsupported:
         return None

@@ -12,7 +12,7 @@ from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, designed_
 from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.open_throws import throws_at
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import domains_of, vector_of
+from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
@@ -71,7 +71,9 @@ def _known(question: Question) -> Witness | None:
     if known is None:
         return None
     pairs = zip(question.near, problem.decisions, strict=True)
-    columns = vector_of(domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine])
+    columns = decision_vector(
+        domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine]
+    )
     return replace(known, place=np.append(known.place, columns))
 
 

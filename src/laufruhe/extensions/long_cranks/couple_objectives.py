@@ -26,7 +26,7 @@ from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves, star_sums
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, kinks_of, load_rows
 from laufruhe.problem.problem import Problem
 
@@ -99,9 +99,9 @@ class CoupleTerm:
             part = slice(start, start + step)
             rows = self.constant.reshape(-1) + couples[part] @ flat
             rows = rows.reshape(-1, *self.constant.shape)
-            if self.norm.of_row_lengths:
+            if self.norm.is_monotone_in_lengths:
                 row_lengths = np.sqrt(np.einsum("nkd,nkd->nk", rows, rows))
-                out[part] = self.norm.of_lengths(row_lengths, self.grid.weights)
+                out[part] = self.norm.norm_from_lengths(row_lengths, self.grid.weights)
             else:
                 out[part] = self.norm.values(self.grid, rows)
         return self.weight * out
@@ -252,7 +252,9 @@ class _Spread:
         """Separate the loads of three stars; None where they differ in more than couples."""
         base = designs[0].engine.cycle.base_order
         channels = {term.measure.load for term in problem.objective}
-        signals = {channel: [over(base, design.signals(channel)) for design in designs] for channel in channels}
+        signals = {
+            channel: [with_common_base(base, design.signals(channel)) for design in designs] for channel in channels
+        }
         every = [signal for by_design in signals.values() for star_loads in by_design for signal in star_loads]
         if any(signal.base != base for signal in every):
             return None
@@ -282,7 +284,7 @@ class _Spread:
                     return None
                 shared[places] = 0.0
                 used |= np.abs(unit).max(axis=(1, 2)) * float(np.abs(space.places).sum()) > _NEGLIGIBLE * size
-                rest[channel].append(by_design[0][at].holding(shared))
+                rest[channel].append(by_design[0][at].with_coefficients(shared))
                 units[channel].append(unit)
         selected = tuple(order for order, use in zip(orders, used, strict=True) if use)
         return cls(problem, designs[0], selected, rest, {c: [u[used] for u in values] for c, values in units.items()})

@@ -19,7 +19,7 @@ import numpy as np
 from laufruhe.extensions.long_cranks.throw_halves import Counts, Free, Window, meeting, shares_of, work_of
 from laufruhe.load_models.amplitudes import NEGLIGIBLE
 from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.numerics.budget import in_time, limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time, until_time_limit
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
 from laufruhe.physics.crank_stars import Stars, StarSpace
@@ -74,7 +74,7 @@ def search_stars(
     known
         Good stars to start from; sought when left out.
     """
-    with limited(time_limit):
+    with limit_time(time_limit):
         best = best_starts(space, objective, count, known)
         search = _Search(space, objective, best)
         search.run()
@@ -159,7 +159,7 @@ def _explored(piece: _Piece) -> tuple[BestStars, int, bool]:
     best.offer(piece.best.stars, piece.best.values)
     window, cut = None, np.nan
     for share in piece.shares:
-        if passed():
+        if is_time_over():
             return best, seen, True
         if best.cut != cut:
             # stars equal to the last of the best are left out: any of them will do
@@ -217,7 +217,7 @@ def _arranged(space: StarSpace, objective: CoupleObjective, star: Stars, throws:
     """Return the best star with these throws in any order on their steps, by halves that meet (S5)."""
     free, value = Free.from_throws(star, throws), float(objective.values(space, star[None])[0])
     pattern = tuple(map(int, np.bincount(star, minlength=space.phases)))
-    for share in in_time(shares_of(space, free)):
+    for share in until_time_limit(shares_of(space, free)):
         window = objective.window(space, pattern, value * (1.0 - SLACK))
         if window is None:
             break

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes, couple_norms, three_stars
 from laufruhe.extensions.long_cranks.couple_search import best_starts, search_stars
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.budget import is_time_over, until_time_limit
 from laufruhe.numerics.norms import RMS
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.problem.channels import ROCKING_COUPLE
@@ -155,9 +155,9 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
 def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:
     """Return the best star that exchanges lead to, everything else at its optimum at few angles (S44)."""
     value = coarse_value(model, star, built, owners)
-    while not passed():
+    while not is_time_over():
         minimum, best = min(
-            ((coarse_value(model, other, built, owners), other) for other in in_time(exchanges(star))),
+            ((coarse_value(model, other, built, owners), other) for other in until_time_limit(exchanges(star))),
             default=(math.inf, star),
         )
         if not minimum < value * (1.0 - WORTH):

@@ -35,7 +35,7 @@ from laufruhe.extensions.mount_relaxation.program import (
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
 from laufruhe.extensions.mount_relaxation.speculation import Objectives
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.budget import rounds
+from laufruhe.numerics.budget import timed_rounds
 
 if TYPE_CHECKING:
     from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
@@ -139,7 +139,7 @@ class BoxRelaxation:
         """
         lower, units = root_bounds.copy(), np.array([variable.unit for variable in variables])
         no_mode_slopes = np.zeros(5 * len(self.modes))
-        for _ in rounds(ROUNDS):
+        for _ in timed_rounds(ROUNDS):
             mean = self._mean(variables, lower)
             if mean.floor >= self.upper_norm:
                 break

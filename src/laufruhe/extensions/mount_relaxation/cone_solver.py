@@ -22,7 +22,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
 
 from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 
 # rounds of scaling, and the range of scales
 _ROUNDS, _MIN_SCALE, _MAX_SCALE = 10, 1e-4, 1e4
@@ -174,7 +174,7 @@ def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], setti
         setattr(options, name, value)
     no_squares = csc_array((len(cost), len(cost)))
     solver = clarabel.DefaultSolver(no_squares, cost, rows, right, cones, options)
-    solver.set_termination_callback(lambda _: passed())
+    solver.set_termination_callback(lambda _: is_time_over())
     return solver
 
 

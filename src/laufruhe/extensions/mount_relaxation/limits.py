@@ -177,7 +177,7 @@ def limits_of(
     ratios: list[RatioLimit] = []
     for limit in problem.mount_limits:
         measure = limit.measure
-        if not measure.channel.of_loads or known.value(measure) < NEAR_LIMIT * limit.maximum:
+        if not measure.channel.depends_on_loads or known.value(measure) < NEAR_LIMIT * limit.maximum:
             continue
         query = of_all_motions(Measure(channels.MOUNT_FORCE, RMS, points=measure.points, orders=measure.orders))
         for point in query.points:

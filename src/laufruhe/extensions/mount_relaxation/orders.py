@@ -16,11 +16,11 @@ from laufruhe.extensions.mount_relaxation.unbalance_basis import UnbalanceBasis
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import in_one_base
+from laufruhe.numerics.spectrum import stacked_coefficients
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation, over
-from laufruhe.problem.measure import Measure, selected
+from laufruhe.problem.evaluation import Evaluation, with_common_base
+from laufruhe.problem.measure import Measure, narrow_signal
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import is_travel
 
@@ -158,14 +158,14 @@ def measure_orders(
     """
     moved = moved_wrench(NUMBERS, mounting_in(problem.engine).block.centre_of_gravity)
     base = problem.engine.cycle.base_order
-    signals = over(base, near.signals(measure.load))
+    signals = with_common_base(base, near.signals(measure.load))
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     shares, points = measure.shares(problem.points), []
     for p, (point, (constant, slopes)) in enumerate(zip(problem.points, model.wrenches(), strict=True)):
         if shares[p] == 0.0:
             continue
-        coefficients = selected(measure, signals[p], near.engine).coefficients
-        step, series = in_one_base([constant, *slopes], base)
+        coefficients = narrow_signal(measure, signals[p], near.engine).coefficients
+        step, series = stacked_coefficients([constant, *slopes], base)
         loads = series @ moved.T
         loads[0] += np.einsum("q,qki->ki", basis[1], loads[1:])
         loads[1:] = np.einsum("cq,qki->cki", basis[0].domain_map, loads[1:])
@@ -185,7 +185,7 @@ def measure_orders(
     return MeasureOrders(
         measure, tuple(orders), tuple(chosen), np.array(measure.direction_weights or (1.0, 1.0, 1.0)), shares,
         near.samples if has_one_base else 0,
-        measure.norm.refinement > 1 and any(len(signal.bends) for signal in signals),
+        measure.norm.refinement > 1 and any(len(signal.kink_angles) for signal in signals),
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.extensions.mount_relaxation.speculation import Objectives, bounds_ahead
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
@@ -164,7 +164,7 @@ def _prove_levels(
         level, remaining = level_of(share), maximum - spent
         if level <= bound:
             continue
-        if (spent > 1 and AHEAD * spent > maximum) or remaining <= 0 or passed():
+        if (spent > 1 and AHEAD * spent > maximum) or remaining <= 0 or is_time_over():
             break
         is_root = share == root_share
         narrowing = _Narrowing(
@@ -235,7 +235,7 @@ class _Narrowing(BoxBisection):
                 return FathomedPart(min(best, self.level))
             if previous > -math.inf:
                 narrows = best - previous >= PROGRESS * (self.cutoff - previous)
-            if self.spent >= self._maximum or passed() or not scores.any() or not narrows:
+            if self.spent >= self._maximum or is_time_over() or not scores.any() or not narrows:
                 return best, Box(lower, upper, int(np.argmax(scores)), narrows)
             box, solved = narrowed(self._search, lower, upper, scores)
             self.spent += solved

@@ -30,7 +30,7 @@ from laufruhe.extensions.mount_relaxation.unbalance_basis import unbalance_basis
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
@@ -78,7 +78,7 @@ class SdpRelaxation:
         self, problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], ahead: Ahead | None = None
     ) -> None:
         self.problem, self.value, self.cutoff, self.ahead = problem, value, value - GAP_SAFETY * gap_tolerance, ahead
-        lower, upper = sides_of(problem.mount_decisions)
+        lower, upper = real_bounds(problem.mount_decisions)
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._frames = number_ranges(problem, self._near, self._near)[0]
         self._planes = open_mounts(problem, lower, upper, PlaneFrames(self._frames)).planes

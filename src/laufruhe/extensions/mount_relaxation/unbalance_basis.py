@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.problem.decision import Domain, ends_of, vector_of
+from laufruhe.problem.decision import Domain, column_bounds, decision_vector
 from laufruhe.problem.sets import Value
 
 # relative size of a load that counts as zero
@@ -73,9 +73,9 @@ class UnbalanceBasis:
 
 def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> tuple[UnbalanceBasis, Array]:
     """Return the basis of all columns of domains, with a design's unbalances in it, and the columns' middles."""
-    low, high = ends_of(domains)
+    low, high = column_bounds(domains)
     middles, reaches = 0.5 * (low + high), 0.5 * (high - low)
-    near = (vector_of(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
+    near = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
     sets, size = [], 1 + len(near)
     for domain in domains:
         # an interval or a disc, and the sides of a sector

@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import turning_amplitudes
 from laufruhe.problem.channels import CHANNELS, mounting_in
-from laufruhe.problem.evaluation import measured, samples_of
+from laufruhe.problem.evaluation import channel_samples, place_measures
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.solvers.result import Result
 
@@ -87,7 +87,7 @@ def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
 
 
 def _signal(result: Result, _: QuantityQuery) -> Labelled:
-    values = samples_of(result.final, 0)[:, :, 1:]
+    values = channel_samples(result.final, 0)[:, :, 1:]
     turns = result.final.engine.cycle.turns
     angle = (360.0 * turns * np.arange(len(values)) / len(values)).tolist()
     names = result.final.mount_names
@@ -97,7 +97,7 @@ def _signal(result: Result, _: QuantityQuery) -> Labelled:
 def _over_cycle(measure: Measure, result: Result, _: QuantityQuery) -> Labelled:
     """Return a load over the cycle, place by place (C2); a single place has no label."""
     channel = measure.load
-    values = samples_of(result.final, 0, channel)
+    values = channel_samples(result.final, 0, channel)
     degrees = 360.0 * result.final.engine.cycle.turns
     labels: dict[str, list[Any]] = {"angle": (degrees * np.arange(len(values)) / len(values)).tolist()}
     place = next((name for name in PLACES if f"{name}s" in channel.keys), "")
@@ -110,7 +110,7 @@ def _over_cycle(measure: Measure, result: Result, _: QuantityQuery) -> Labelled:
 
 
 def _by_mount(measure: str, result: Result, _: QuantityQuery) -> Labelled:
-    values = [getattr(one, measure) for one in measured(result.final, 0)]
+    values = [getattr(one, measure) for one in place_measures(result.final, 0)]
     return Labelled(values, {"mount": result.final.mount_names})
 
 

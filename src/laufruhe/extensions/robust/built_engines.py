@@ -18,7 +18,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.load_models.batch import by_feature
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import BatchNorm
-from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, over
+from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, with_common_base
 from laufruhe.problem.measure import Limit, Measure, kinks_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -56,7 +56,7 @@ class BuiltEngines:
         drawn, refinement = self._built[0], measure.norm.refinement
         kinks = None
         if measure.is_load:
-            signals = over(drawn.engine.cycle.base_order, drawn.signals(measure.load))
+            signals = with_common_base(drawn.engine.cycle.base_order, drawn.signals(measure.load))
             kinks = kinks_of(measure, signals, drawn.engine)
         rows = [evaluation.rows(measure, refinement * self.samples, kinks) for evaluation in self._built]
         constant = rows[0].vectors

@@ -26,8 +26,8 @@ from laufruhe.extensions.robust.conclusion import ActiveErrors, compare_designs,
 from laufruhe.extensions.robust.tolerance import Population, robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import report_progress, within
+from laufruhe.numerics.budget import until_time_limit
+from laufruhe.numerics.progress import report_progress, search_scope
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Kind
@@ -123,7 +123,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         return replace(result, objective=replace(result.objective, initial=initial.value))
     over = robust_of(problem).over
     started = time.perf_counter()
-    with within("drawing"):
+    with search_scope("drawing"):
         drawing = solve(problem.drawing)
     nonzero = tolerances_of(problem).nonzero
     is_unsolved = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
@@ -165,7 +165,7 @@ def _decide(
     # with symmetric errors at least half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     robust = replace(robust, bound=bound if problem.decisions else robust.worst.bound)
-    for _ in in_time(range(READINGS)):
+    for _ in until_time_limit(range(READINGS)):
         if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
         sampled = replace(sampled, samples=fine_samples(robust.samples))
@@ -310,7 +310,7 @@ def _minimise_worst_case(
     program, values, bound = _Program(problem, zero_level), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, previous_violation, is_solved = program.angles // COARSER, 0.0, math.inf, True
-    for _ in in_time(range(MOST_ROUNDS)):
+    for _ in until_time_limit(range(MOST_ROUNDS)):
         is_worse = worst.value > level * (1.0 + JOIN_SHARE * problem.tolerance)
         is_new = is_solved and (is_worse or FEASIBLE < worst.violation < MIN_FALL * previous_violation)
         if is_new and program.add(worst.errors):
@@ -348,7 +348,7 @@ def _minimise_worst_case(
 
 
 def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float) -> RobustDesign:
-    for _ in in_time(range(READINGS)):
+    for _ in until_time_limit(range(READINGS)):
         if not is_over(best.bound, best.worst.bound, zero_level):
             break
         adversary = replace(adversary, samples=fine_samples(best.samples))
@@ -359,7 +359,7 @@ def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float
 def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) -> RobustDesign:
     """Lower limits until the proven bound of a design satisfies them, if the bound alone violates them."""
     program.margin = best.margin
-    for _ in in_time(range(MOST_MARGINS)):
+    for _ in until_time_limit(range(MOST_MARGINS)):
         if not KEPT < best.worst.violation <= MAX_MARGIN:
             break
         program.lower(best.worst.violation)
@@ -383,7 +383,7 @@ def _minimise_share(
     """Return the design with the smallest objective of a share of random engines that the search finds (R9)."""
     count = math.ceil(share * len(adversary.errors))
     values, best = start, None
-    for _ in in_time(range(SHARE_ROUNDS)):
+    for _ in until_time_limit(range(SHARE_ROUNDS)):
         order = np.argsort(adversary.objective(values), kind="stable")
         lower_share = adversary.subset(order[:count])
         candidate = _minimise_worst_case(problem, lower_share, values, zero_level)

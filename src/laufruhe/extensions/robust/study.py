@@ -29,7 +29,7 @@ from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import percent
-from laufruhe.problem.evaluation import evaluate, over
+from laufruhe.problem.evaluation import evaluate, with_common_base
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Drawing, Problem
 from laufruhe.studies.part import Part, Record, variable
@@ -98,7 +98,7 @@ def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array
     point, steps = OperatingPoint("", speed), ANGLES * engine.cycle.turns
     engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
     # an engine without errors may have a shorter period, so use that of the cycle
-    loads = over(engine.cycle.base_order, [shaking_loads(variant, point) for variant in engines])
+    loads = with_common_base(engine.cycle.base_order, [shaking_loads(variant, point) for variant in engines])
     drawn, *unit_errors = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
     return np.array([forces - drawn for forces in unit_errors]).reshape(tolerances.count, steps, 2)
 

@@ -319,7 +319,7 @@ class _TermAbout:
         """Return the upper bound of the weighted norm with each row at its own worst (R5)."""
         kind, grid, rows = self.norm.norm, self.norm.grid, self.rows
         bound = self.weight * kind.value(grid, rows) + float(self.sizes.sum())
-        if not kind.of_row_lengths:
+        if not kind.is_monotone_in_lengths:
             return bound
         pulls = np.einsum("kd,kdn->kn", rows, self.moves)
         pull_sum = np.zeros(len(rows))
@@ -335,7 +335,7 @@ class _TermAbout:
     def value(self, sizes: Array) -> float:
         """Return the weighted norm of rows of these lengths, shape (k,); 0 if the norm needs more than lengths."""
         kind = self.norm.norm
-        return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.of_row_lengths else 0.0
+        return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.is_monotone_in_lengths else 0.0
 
 
 def _over_majorants(
@@ -460,6 +460,10 @@ def _reach(norm: AffineNorm, block: ErrorBlock, cache: dict[_Key, _Reach]) -> _R
         else:
             rows = sum((lengths(column) for column in columns), np.zeros(len(move)))
         kind, grid = norm.norm, norm.grid
-        rise = kind.value(grid, rows[:, None]) if kind.of_row_lengths else sum(kind.value(grid, c) for c in columns)
+        rise = (
+            kind.value(grid, rows[:, None])
+            if kind.is_monotone_in_lengths
+            else sum(kind.value(grid, c) for c in columns)
+        )
         cache[key] = _Reach(move, rows, rise)
     return cache[key]

@@ -1,4 +1,4 @@
-"""Rotary engines: rotors with three flanks on eccentrics, each in a housing of two lobes (Y1 to Y8)."""
+"""Rotary engines: rotors with three flanks on eccentrics, each in a housing of two lobes (Y1 to Y6)."""
 
 from laufruhe.extension import Extension
 

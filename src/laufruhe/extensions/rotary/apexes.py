@@ -23,7 +23,7 @@ class ApexChannel(NumberChannel):
     keys: tuple[str, ...] = ("operating_points",)
     needs: Need = ROTORS
     minimised: bool = False
-    of_loads: bool = False
+    depends_on_loads: bool = False
 
 
 def _maximum(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:

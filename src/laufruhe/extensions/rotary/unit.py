@@ -1,4 +1,4 @@
-"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (Y1-Y8)."""
+"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (Y1-Y6)."""
 
 from __future__ import annotations
 

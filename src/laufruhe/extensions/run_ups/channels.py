@@ -36,7 +36,7 @@ class RunChannel(NumberChannel):
     """
 
     needs: Need = RUN
-    of_loads: bool = False
+    depends_on_loads: bool = False
     simulation: str = "laufruhe.extensions.run_ups.simulation"
     missed: Callable[[Engine], float] = _missed
     part: Callable[[RunResponse], Array] = field(kw_only=True)

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.budget import until_time_limit
 from laufruhe.numerics.progress import report_progress
-from laufruhe.problem.decision import domains_of, vector_of
+from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
@@ -39,9 +39,9 @@ def solve_run_cones(
     if not steps.gather():
         names = [limit.name for limit in steps.problem.load_limits]
         return infeasible_result(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
-    for _ in in_time(range(_AGAIN)):
+    for _ in until_time_limit(range(_AGAIN)):
         result = decide(steps.problem)
-        x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
+        x = decision_vector(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
         fidelity = result.problem.fidelity
         if fidelity != problem.fidelity:
             # compute the rows again with the fidelity that the accuracy needs
@@ -102,8 +102,8 @@ class _Steps:
 
     def gather(self) -> bool:
         """Add steps until a design of coarse sampling satisfies all of them; return True if there is one."""
-        x = vector_of(domains_of(self._problem.decisions))
-        for _ in in_time(range(_ROUNDS)):
+        x = decision_vector(domains_of(self._problem.decisions))
+        for _ in until_time_limit(range(_ROUNDS)):
             self.add(x)
             report_progress("steps of the run-up", sum(map(len, self._places.values())))
             optimum = solve_cones(self.affine()).x

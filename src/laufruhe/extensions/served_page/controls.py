@@ -137,7 +137,7 @@ def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Contr
         if not decision.is_affine and decision.set.width == 1:
             unit, factor = typed(decision.unit)
             value, low, high = (
-                float(f"{factor * x:.10g}") for x in (decision.start_number, decision.lower, decision.upper)
+                float(f"{factor * x:.10g}") for x in (decision.real_start, decision.lower, decision.upper)
             )
             yield Control("fix", decision.name, "Open numbers", decision.name, value, low, high, unit, open=True)
 

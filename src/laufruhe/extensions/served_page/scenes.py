@@ -17,7 +17,7 @@ from laufruhe.extensions.served_page.pareto import partners
 from laufruhe.files.measures import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import depends, kinds_of
+from laufruhe.problem.dependence import depends, open_kinds
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -120,7 +120,7 @@ class PageScene:
         return Simplification(tuple(phrases), tuple(left_out))
 
     def _reads(self, limit: Limit) -> bool:
-        moved = depends(limit.measure.channel, kinds_of(self.problem), self.problem)
+        moved = depends(limit.measure.channel, open_kinds(self.problem), self.problem)
         return limit in self.problem.load_limits or not moved
 
 

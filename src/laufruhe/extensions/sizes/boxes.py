@@ -91,11 +91,11 @@ class SizeBoxes:
         return SizePrograms(self.model, terms, [x[:2] for x in self.limits if x[1].pieces], ask)
 
     def _number(self, measure: Measure, sense: float) -> SizeNumber:
-        if measure.channel.of_engine is not None:
+        if measure.channel.size_value is not None:
             return SizeNumber(
                 measure, sense, self._monotonicity(lambda x: np.array([sense * self.model.value(measure, x)]))
             )
-        if not measure.norm.of_row_lengths or sense < 0.0:
+        if not measure.norm.is_monotone_in_lengths or sense < 0.0:
             raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
         pieces = self.model.pieces(measure)
 

@@ -16,9 +16,9 @@ from laufruhe.problem.channels import (
     IN_EACH_CYLINDER,
     Need,
     Needs,
+    PlaceSpec,
     SizeChannel,
-    Where,
-    inside,
+    crankcase_channel,
     names_of_cylinders,
 )
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
@@ -28,8 +28,8 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 
-_AT_EACH_PIN: Where = (AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders)
-_AT_EACH_WEB: Where = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
+_AT_EACH_PIN: PlaceSpec = (AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders)
+_AT_EACH_WEB: PlaceSpec = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -37,34 +37,42 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spect
 
 
 def _size_channel(
-    name: str, unit: str, needs: Need, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
+    name: str, unit: str, needs: Need, sides: tuple[str, ...], size_value: Callable[[Engine], float]
 ) -> SizeChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-        return (of_engine(evaluation.engine),)
+        return (size_value(evaluation.engine),)
 
     minimised = sides == ("max",)
     return SizeChannel(
-        name, unit, (), needs, sides=sides, minimised=minimised, values=values, of_engine=of_engine
+        name, unit, (), needs, sides=sides, minimised=minimised, values=values, size_value=size_value
     )  # fmt: skip
 
 
-CRANK_PIN_STRESS = inside(
+CRANK_PIN_STRESS = crankcase_channel(
     "crank-pin bending stress", "Pa", _AT_EACH_PIN, strength.pin_moments, strength.big_end_factors
 )
-WEB_STRESS = inside("web stress", "Pa", _AT_EACH_WEB, strength.side_forces, strength.web_factors)
-JOURNAL_TORSION = inside("journal torsion stress", "Pa", AT_EACH_BEARING, _torques, strength.journal_factors)
-JOURNAL_STRESS = inside("journal stress", "Pa", _AT_EACH_WEB, strength.side_loads, strength.side_factors)
-MAIN_BEARING_PV = inside(
+WEB_STRESS = crankcase_channel("web stress", "Pa", _AT_EACH_WEB, strength.side_forces, strength.web_factors)
+JOURNAL_TORSION = crankcase_channel("journal torsion stress", "Pa", AT_EACH_BEARING, _torques, strength.journal_factors)
+JOURNAL_STRESS = crankcase_channel("journal stress", "Pa", _AT_EACH_WEB, strength.side_loads, strength.side_factors)
+MAIN_BEARING_PV = crankcase_channel(
     "main-bearing pressure times speed", "W/m^2", AT_EACH_BEARING, main_bearing_forces, strength.journal_speeds
 )
-ROD_STRESS = inside("rod stress", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.rod_stress_factors)
-ROD_BUCKLING = inside("share of the buckling load", "", IN_EACH_CYLINDER, piston_pin_forces, strength.buckling_factors)
-BOLT_STRESS = inside("bolt stress", "Pa", IN_EACH_CYLINDER, strength.cap_forces, strength.bolt_factors)
-PIN_PRESSURE = inside("piston-pin pressure", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.boss_factors)
-PIN_STRESS = inside(
+ROD_STRESS = crankcase_channel("rod stress", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.rod_stress_factors)
+ROD_BUCKLING = crankcase_channel(
+    "share of the buckling load", "", IN_EACH_CYLINDER, piston_pin_forces, strength.buckling_factors
+)
+BOLT_STRESS = crankcase_channel("bolt stress", "Pa", IN_EACH_CYLINDER, strength.cap_forces, strength.bolt_factors)
+PIN_PRESSURE = crankcase_channel(
+    "piston-pin pressure", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.boss_factors
+)
+PIN_STRESS = crankcase_channel(
     "piston-pin bending stress", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.pin_bending_factors
 )
-PIN_DEFLECTION = inside("piston-pin deflection", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.deflection_factors)
-PIN_OVALITY = inside("piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors)
+PIN_DEFLECTION = crankcase_channel(
+    "piston-pin deflection", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.deflection_factors
+)
+PIN_OVALITY = crankcase_channel(
+    "piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors
+)
 THROW_CLEARANCE = _size_channel("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
 GEAR_MASS = _size_channel("running-gear mass", "kg", Needs.NOTHING, ("max",), strength.gear_mass)

@@ -14,7 +14,7 @@ _ALONE = {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}
 
 
 def _is_of_row_lengths(norm: Norm) -> bool:
-    return is_pointwise(norm) and norm.of_row_lengths
+    return is_pointwise(norm) and norm.is_monotone_in_lengths
 
 
 def _minimises_loads(problem: Problem) -> bool:

@@ -23,8 +23,8 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Decision, Kind, domains_of, ends_of, vector_of
-from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.decision import Decision, Kind, column_bounds, decision_vector, domains_of
+from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
@@ -138,8 +138,8 @@ class SizeModel:
     def value(self, measure: Measure, x: Array, unbalances: Array | None = None) -> float:
         """Return the value of a measure [SI] for sizes `x`, with the initial unbalances or columns of unbalances."""
         engine = self.engine(x)
-        if measure.channel.of_engine is not None:
-            return measure.channel.of_engine(engine)
+        if measure.channel.size_value is not None:
+            return measure.channel.size_value(engine)
         columns = np.append(self.masses(x), self.start if unbalances is None else unbalances)
         pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
         return max(piece.value(self.factors(piece, measure, engine), columns) for piece in pieces)
@@ -157,7 +157,7 @@ class SizeModel:
         if not measure.is_load:
             return lambda at: self._new_pieces(measure, at)
         base = self.problem.engine.cycle.base_order
-        signals = over(base, self._unit_evaluations(length)[0].signals(measure.load))
+        signals = with_common_base(base, self._unit_evaluations(length)[0].signals(measure.load))
         kinks = kinks_of(measure, signals, self.problem.engine)
         return lambda at: self._new_pieces(measure, at, kinks)
 
@@ -176,7 +176,8 @@ class SizeModel:
         lengths = [start, *np.linspace(low, high, BETWEEN)]
         base = self.problem.engine.cycle.base_order
         signals = [
-            over(base, self._unit_evaluations(float(length_at))[0].signals(measure.load)) for length_at in lengths
+            with_common_base(base, self._unit_evaluations(float(length_at))[0].signals(measure.load))
+            for length_at in lengths
         ]
         kinks = kinks_of(measure, signals[0], self.problem.engine)
         steps = self._steps(measure)
@@ -205,7 +206,7 @@ class SizeModel:
     @cached_property
     def start(self) -> Array:
         """Columns of the initial unbalances."""
-        return vector_of(self.domains)
+        return decision_vector(self.domains)
 
     @cached_property
     def mass_corners(self) -> Array:
@@ -252,7 +253,7 @@ class SizeModel:
         channel = measure.load
         base = problem.engine.cycle.base_order
         steps = self._steps(measure)
-        signals: list[list[Spectrum]] = [over(base, unit.signals(channel)) for unit in evaluations]
+        signals: list[list[Spectrum]] = [with_common_base(base, unit.signals(channel)) for unit in evaluations]
         kinks = kinks_of(measure, signals[0], problem.engine) if kinks_at is None else kinks_at
         if self._averages(measure):
             signals = [[signal.averaged(signal.period / steps) for signal in unit_signals] for unit_signals in signals]
@@ -275,7 +276,7 @@ class SizeModel:
             piece = Piece(affine, at, tuple(_factors(measure, evaluations[0].engine, problem, at)))
             scalar = kinks_at is None and (not piece.given or piece.given[0].size == 1)
             if scalar:
-                ends = zip(self.mass_box, ends_of(self.domains), strict=True)
+                ends = zip(self.mass_box, column_bounds(self.domains), strict=True)
                 piece = piece.pruned(*(np.append(masses, columns) for masses, columns in ends))
             pieces.append(piece)
         return tuple(pieces)

@@ -92,7 +92,7 @@ def _decision_values(without_mounts: Problem, result: Result) -> list[Value]:
 def _bound(problem: Problem, design: Design) -> float:
     model = SizeModel(_without_mounts(problem))
     depends_on_sizes = any(
-        term.measure.channel.of_engine is not None or _has_size_factors(term.measure) for term in problem.objective
+        term.measure.channel.size_value is not None or _has_size_factors(term.measure) for term in problem.objective
     )
     if model.moves_rod or depends_on_sizes or design.violation > KEPT:
         return 0.0
@@ -121,11 +121,11 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
     mass_decisions = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in open_masses]
     other_decisions = tuple(d for d in problem.decisions if d not in model.sizes)
     limits = tuple(
-        x for x in problem.limits if x.measure.channel.of_engine is None and not _has_size_factors(x.measure)
+        x for x in problem.limits if x.measure.channel.size_value is None and not _has_size_factors(x.measure)
     )
     relaxed = replace(problem, engine=engine, decisions=(*mass_decisions, *other_decisions), limits=limits)
     return relaxed, [*(float(masses[k]) for k in open_masses), *(values_by_name[d.name] for d in other_decisions)]
 
 
 def _has_size_factors(measure: Measure) -> bool:
-    return measure.is_load and measure.load.of_sizes is not None
+    return measure.is_load and measure.load.size_factors is not None

@@ -60,7 +60,7 @@ class SizeProgram(LocalProgram):
         sizes, unbalances = columns[self.sized], columns[~self.sized]
         value = sum(term.weight * self.model.value(term.measure, sizes, unbalances) for term in problem.objective)
         margins = [
-            limit.room(self.model.value(limit.measure, sizes, unbalances))[0] - MARGIN for limit in problem.limits
+            limit.slack(self.model.value(limit.measure, sizes, unbalances))[0] - MARGIN for limit in problem.limits
         ]
         return np.array([value, *margins, *self.edges(shares)])
 
@@ -158,7 +158,7 @@ def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[A
 def _coarser(norm: AffineNorm, steps: int) -> AffineNorm:
     grid = norm.grid
     stride = max((n for n in range(1, grid.steps // steps + 1) if grid.steps % n == 0), default=1)
-    if not norm.norm.averages or grid.bends or stride == 1:
+    if not norm.norm.averages or grid.kinks or stride == 1:
         return norm
     weights = stride * grid.weights[::stride]
     return replace(

@@ -74,9 +74,9 @@ class _OfInertia:
     """The inertia of all that turns, or a degree of irregularity that falls with it (T9, V14)."""
 
     def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
-        if measure.channel.of_wheel is None:
+        if measure.channel.flywheel_value is None:
             raise TypeError(f"{measure.name} is not of the flywheel")
-        self._number = measure.channel.of_wheel(measure, evaluation)
+        self._number = measure.channel.flywheel_value(measure, evaluation)
         self._rises = not falls_with_flywheel(measure.channel)
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
@@ -277,7 +277,7 @@ class TwistBoxes:
         for lines, twist in zip(self._lines, twists, strict=True):
             point = lines.loads.point
             rate = lines.orders * point.speed
-            for k, absorber in enumerate(chains[0].absorbers if limit.measure.counts_point(point) else ()):
+            for k, absorber in enumerate(chains[0].absorbers if limit.measure.includes_point(point) else ()):
                 row = np.zeros(len(root))
                 row[len(chains[0].discs) + k], row[chains[0].index(absorber.on)] = 1.0, -1.0
                 swing = mapped(twist, np.broadcast_to(row / root, (1, len(rate), 1, len(root))))
@@ -305,7 +305,7 @@ def _twist_of(sections: int, angles: int) -> Array:
 
 
 def _turns(measure: Measure) -> bool:
-    return measure.channel.of_inertia
+    return measure.channel.is_monotone_in_inertia
 
 
 def _is_square(measure: Measure) -> bool:

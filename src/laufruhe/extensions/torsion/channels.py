@@ -10,7 +10,7 @@ from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.channels import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, of_what_moves
+from laufruhe.problem.channels import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, crankcase_signal
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Resonances: TypeAlias = Callable[[MeasureQuery, EvaluatedDesign], Sequence[physics.Resonance]]
@@ -36,11 +36,11 @@ def _of_shafts(
     name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
     title: str = "", places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = CHAIN,
 ) -> LoadChannel:  # fmt: skip
-    of_sections = of_what_moves(
+    of_sections = crankcase_signal(
         name, lambda moving, at: signal(moving, at.point, at.fidelity).mapped(lambda values: values[:, :, None])
     )
     return LoadChannel(
-        name, unit, (*ON_BLOCK, "sections"), needs, signal=of_sections, places=places, feels_unbalances=False,
+        name, unit, (*ON_BLOCK, "sections"), needs, signal=of_sections, places=places, depends_on_unbalances=False,
         title=title, place="section",
     )  # fmt: skip
 
@@ -65,7 +65,7 @@ def _of_modes(name: str, unit: str, keys: tuple[str, ...], resonances: Resonance
         return [float(x) for resonance in resonances(measure, evaluation) for x in resonance.numbers(chain)]
 
     sides = ("min", "max", "outside")
-    return NumberChannel(name, unit, keys, CHAIN, sides, minimised=False, values=values, of_loads=False)
+    return NumberChannel(name, unit, keys, CHAIN, sides, minimised=False, values=values, depends_on_loads=False)
 
 
 def _heat(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:

@@ -26,7 +26,7 @@ from laufruhe.extensions.torsion.physics import (
 )
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.roots import parted
+from laufruhe.numerics.roots import bisect_property
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, load_rows
@@ -176,7 +176,7 @@ def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: flo
 
 def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
     """Return a function that says if the limit is broken at a speed, under the load of any point that counts."""
-    counted = [load for load in design.loads if limit.measure.counts_point(load.point)]
+    counted = [load for load in design.loads if limit.measure.includes_point(load.point)]
     # points that differ in their speed alone are one
     loads = {load.point.gas: load for load in counted}.values()
 
@@ -212,5 +212,5 @@ def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[flo
 
 
 def _edge(is_barred: Callable[[float], bool], low: float, high: float, after: bool) -> float:
-    low, high = parted(lambda speed: is_barred(speed) != after, low, high, _HALVINGS)
+    low, high = bisect_property(lambda speed: is_barred(speed) != after, low, high, _HALVINGS)
     return low if after else high

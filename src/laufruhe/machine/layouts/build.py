@@ -13,7 +13,7 @@ from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, cis, within
+from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, cis, reduced_turn
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def firing_angles(
     start: Turn | None = None
     for number in firing_order:
         k = number - 1
-        centre = within(layout.dead_centre(throws, k), 1)
+        centre = reduced_turn(layout.dead_centre(throws, k), 1)
         while centre <= previous + SAME_TURN:
             centre += 1
         start = centre if start is None else start
@@ -205,7 +205,7 @@ def build(
     fires = (
         firing_angles(cycle, layout, angles, firing_order)
         if firing_order
-        else tuple(angle_of(within(layout.dead_centre(angles, k), 1)) for k in cylinders)
+        else tuple(angle_of(reduced_turn(layout.dead_centre(angles, k), 1)) for k in cylinders)
     )
     slider_cranks = tuple(
         mechanism.cylinder(

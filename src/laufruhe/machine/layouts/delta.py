@@ -15,7 +15,7 @@ from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.exact_angles import Turn, angle_of, as_turn, cis, within
+from laufruhe.numerics.exact_angles import Turn, angle_of, as_turn, cis, reduced_turn
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class Triangle:
 def closing_lead(ratios: tuple[int, int, int], first: Turn, second: Turn) -> Turn:
     """Return the lead of the third bank that closes the angles round the triangle (K18)."""
     half = Fraction(1, 2)
-    return within(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
+    return reduced_turn(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
 
 
 def equal_lead(ratios: tuple[int, int, int]) -> Turn:
@@ -103,7 +103,7 @@ class Delta(LayoutKind):
         if rest:
             raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(inputs.cylinders))
         triangle, places = self._triangle(inputs), stations(rows, inputs.spacing(rows))
-        turns = [angle_of(within(triangle.centre(bank, bank), 1)) for bank in range(3)]
+        turns = [angle_of(reduced_turn(triangle.centre(bank, bank), 1)) for bank in range(3)]
         return Layout(
             "delta",
             places * 3,
@@ -157,7 +157,9 @@ class Delta(LayoutKind):
 def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> None:
     if order is None:
         return
-    turns = [within(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order]
+    turns = [
+        reduced_turn(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order
+    ]
     if turns != sorted(turns):
         told = sorted(range(len(firsts)), key=lambda k: firsts[k].firing_angle)
         raise ModelError(f"these throws fire in the order {[k + 1 for k in told]}, not {list(order)}")
@@ -167,8 +169,8 @@ def _piston(
     triangle: Triangle, corner: int, bank: int, x: float, throw: float, inputs: LayoutInput, number: int
 ) -> SliderCrank:
     shaft = triangle.shafts[corner]
-    centre = within(triangle.centre(corner, bank) - as_turn(throw), 1)
+    centre = reduced_turn(triangle.centre(corner, bank) - as_turn(throw), 1)
     axis = triangle.axis(corner, bank)
-    angle = within(axis - triangle.ratios[corner] * centre, 1)
-    angles = (angle_of(angle), angle_of(within(axis, 1)), angle_of(centre))
+    angle = reduced_turn(axis - triangle.ratios[corner] * centre, 1)
+    angles = (angle_of(angle), angle_of(reduced_turn(axis, 1)), angle_of(centre))
     return inputs.mechanism.cylinder(number, x, *angles, shaft=shaft)

@@ -10,13 +10,13 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
-    COUNTS,
-    TOUCHES,
+    DUAL_TOL,
+    LONGEST_TOL,
     Cones,
     EpigraphProgram,
     Grid,
-    Kinks,
     Norm,
+    Subdifferential,
     amplitudes,
     curvature,
     fine_lengths,
@@ -31,7 +31,7 @@ class Maximum(Norm):
 
     name = "maximum"
     refinement = 8
-    is_largest = is_convex = of_row_lengths = is_pointwise = True
+    is_largest = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return max_k |v_k|."""
@@ -45,25 +45,25 @@ class Maximum(Norm):
             z[k] = rows[k] / size[k]
         return z
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return rows as long as the longest, and those that the given dual rows use."""
         size, shares = lengths(rows), lengths(z)
-        counts = (size >= (1.0 - TOUCHES) * size.max(initial=0.0)) | (shares > COUNTS * shares.sum())
-        return Kinks(z, np.flatnonzero(counts & (size > 0.0)))
+        counts = (size >= (1.0 - LONGEST_TOL) * size.max(initial=0.0)) | (shares > DUAL_TOL * shares.sum())
+        return Subdifferential(z, np.flatnonzero(counts & (size > 0.0)))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return sum_k |z_k|."""
         return float(lengths(z).sum())
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return the solver's rows: one row is too little where several are as long."""
         return z
 
-    def spread(self, z: Array, steps: int, times: int) -> Array:
+    def refined_dual(self, z: Array, steps: int, times: int) -> Array:
         """Return the rows in place, with zeros at the angles between."""
         return in_place(z, steps, times)
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the largest length."""
         return np.asarray(lengths.max(axis=-1))
 
@@ -80,7 +80,7 @@ class Maximum(Norm):
         program.hold(softened_lengths(rows / unit, share) - top)
         return top * unit
 
-    def limited(
+    def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the squares, which are smooth at zero."""
@@ -88,7 +88,7 @@ class Maximum(Norm):
 
         return ca.sum2(rows * rows), maximum * maximum, 2.0 * maximum
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Bound by the sum of the orders' amplitudes."""
         used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
         return max((float(amplitudes(signal).max(initial=0.0)) for signal in used), default=0.0)
@@ -101,7 +101,7 @@ class Maximum(Norm):
             if share > 0.0:
                 size, step = fine_lengths(signal, coarse, times)
                 bends.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
-                bent = lengths(signal.values(signal.bends)).max(axis=0, initial=0.0)
+                bent = lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0)
                 maximum, minimum = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
                 errors.append(float((np.maximum(maximum, bent) - np.maximum(minimum, bent)).max(initial=0.0)))
         return max(errors) + max(bends)

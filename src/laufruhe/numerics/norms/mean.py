@@ -10,12 +10,12 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
-    VANISHES,
+    ZERO_TOL,
     Cones,
     EpigraphProgram,
     Grid,
-    Kinks,
     Norm,
+    Subdifferential,
     curvature,
     fine_lengths,
     jumped,
@@ -36,7 +36,7 @@ class Mean(Norm):
 
     name = "mean"
     averages = True
-    sums_lengths = is_convex = of_row_lengths = is_pointwise = True
+    sums_lengths = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return sum_k w_k |v_k|."""
@@ -47,17 +47,17 @@ class Mean(Norm):
         size = lengths(rows)
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
 
-    def across(self, grid: Grid, rows: Array) -> Array | None:
+    def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
         """Return w_k / |v_k|, with a short row in place of a zero one."""
         size = lengths(rows)
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return rows along the design's own, free where they vanish."""
         size = lengths(rows)
-        vanishing = size <= VANISHES * float(size.max(initial=0.0))
+        vanishing = size <= ZERO_TOL * float(size.max(initial=0.0))
         base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
-        return Kinks(base, vanishing=np.flatnonzero(vanishing))
+        return Subdifferential(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return max_k |z_k| / w_k; infinite where a weightless row is used."""
@@ -72,13 +72,13 @@ class Mean(Norm):
         shrink = np.divide(weights, size, out=np.ones(len(size)), where=size > weights)
         return np.asarray(z * shrink[:, None])
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return the design's directions, the solver's only where a row vanishes."""
         size = lengths(rows)
         small = size <= 1e-6 * float(size.max(initial=0.0))
         return np.where(small[:, None], z, self.subgradient(grid, rows))
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return lengths times weights."""
         return np.asarray(np.dot(lengths, weights))
 
@@ -98,7 +98,7 @@ class Mean(Norm):
 
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Bound by the root mean square of the same place."""
         squares = np.array([mean_square(signal) for signal in signals])
         return float(shares @ np.sqrt(squares).mean(axis=1))

@@ -35,7 +35,7 @@ class Grid:
         w_k, shape (k,).
     steps
         Rows of one signal; rows come in groups of as many.
-    bends
+    kinks
         The last rows of every signal, at angles where it bends; those before follow each other at equal steps of its
         period.
     points
@@ -44,11 +44,11 @@ class Grid:
 
     weights: Array
     steps: int
-    bends: int = 0
+    kinks: int = 0
     points: int = 1
 
 
-TOUCHES, VANISHES, COUNTS = 1e-5, 1e-6, 1e-4
+LONGEST_TOL, ZERO_TOL, DUAL_TOL = 1e-5, 1e-6, 1e-4
 """Shares of the longest row that a row may lack and be as long, and up to which it is none; share of all dual rows
 from which one counts."""
 MOST_KINKS = 64
@@ -56,7 +56,7 @@ MOST_KINKS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Kinks:
+class Subdifferential:
     """Dual rows that touch a norm at a design (P19).
 
     Attributes
@@ -89,11 +89,11 @@ class Cones:
         Of each cone the head that is over it, shape (cones,).
     factors
         What each row is multiplied by inside its cone, shape (k,).
-    whole
+    is_single
         Whether one cone holds all rows; else each row has its own.
     centred
         Whether the rows of every signal are counted from a vector that is free.
-    under
+    linear_rows
         Linear functions of the heads that are at most zero: their numbers, heads and factors, shapes (n,).
     squares
         Heads a, b, c with t_a^2 <= t_b t_c, shapes (n,): rotated cones of heads alone.
@@ -102,9 +102,9 @@ class Cones:
     value: Array
     head: NDArray[np.intp]
     factors: Array
-    whole: bool = False
+    is_single: bool = False
     centred: bool = False
-    under: tuple[NDArray[np.intp], NDArray[np.intp], Array] | None = None
+    linear_rows: tuple[NDArray[np.intp], NDArray[np.intp], Array] | None = None
     squares: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]] | None = None
 
 
@@ -124,7 +124,7 @@ class EpigraphProgram(Protocol):
 _ONLY: dict[type[Norm], Norm] = {}
 
 
-def only(kind: type[Norm]) -> Norm:
+def norm_instance(kind: type[Norm]) -> Norm:
     """Return the single instance of a norm's class."""
     return _ONLY.setdefault(kind, kind())
 
@@ -155,7 +155,7 @@ class Norm(ABC):
         Whether it is the largest diameter of the balls that hold the signals: at most twice the longest row.
     is_convex
         Whether its cones and its dual norm hold: it is at least <Z, V> for every Z of dual norm one.
-    of_row_lengths
+    is_monotone_in_lengths
         Whether nothing but the lengths of the rows matters, wherever they stand, and it never falls with one of them.
     is_pointwise
         Whether it is a weighted sum, a root of weighted squares, or the largest of what rows or signals alone have:
@@ -171,7 +171,7 @@ class Norm(ABC):
     is_largest_mean: ClassVar[bool] = False
     is_diameter: ClassVar[bool] = False
     is_convex: ClassVar[bool] = False
-    of_row_lengths: ClassVar[bool] = False
+    is_monotone_in_lengths: ClassVar[bool] = False
     is_pointwise: ClassVar[bool] = False
 
     def __repr__(self) -> str:
@@ -179,7 +179,7 @@ class Norm(ABC):
 
     def __reduce__(self) -> tuple[Callable[[type[Norm]], Norm], tuple[type[Norm]]]:
         # a norm is one and the same in every process
-        return only, (type(self),)
+        return norm_instance, (type(self),)
 
     @abstractmethod
     def value(self, grid: Grid, rows: Array) -> float:
@@ -196,7 +196,7 @@ class Norm(ABC):
         """
         raise self._unclaimed("subgradient")
 
-    def across(self, grid: Grid, rows: Array) -> Array | None:
+    def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
         """Return the second derivative across every row, shape (k,); None if the norm is no sum over rows (P10)."""
         return None
 
@@ -209,23 +209,23 @@ class Norm(ABC):
         violation = self.dual_norm(grid, z)
         return z if violation <= 1.0 else z / violation
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return all dual rows that touch the norm here, with those given; None where they are not known (P19)."""
         return None
 
-    def balanced(self, grid: Grid, z: Array) -> Array:
+    def balanced_dual(self, grid: Grid, z: Array) -> Array:
         """Return nearby dual rows with a finite dual norm (P3)."""
         return z
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
         raise self._unclaimed("dual norm")
 
-    def spread(self, z: Array, steps: int, times: int) -> Array:
+    def refined_dual(self, z: Array, steps: int, times: int) -> Array:
         """Interpolate dual rows at `steps` angles of each signal to a grid `times` as fine (P6)."""
         return between(z, steps, times)
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the norm of many designs from row lengths (..., k), shape (...); overwrites the lengths."""
         raise TypeError(f"{self.name} is not known from lengths alone")
 
@@ -246,7 +246,7 @@ class Norm(ABC):
         """Return a smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
         raise self._unclaimed("smooth form")
 
-    def limited(
+    def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Return a smooth expression for norm <= `maximum`, its largest value, and the slope of that by `maximum`.
@@ -256,7 +256,7 @@ class Norm(ABC):
         return self.smooth_expression(program, grid, rows, 1.0, share), maximum, 1.0
 
     @abstractmethod
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return an upper bound of the norm of signals (n, places, d), without samples (F6)."""
 
     @abstractmethod

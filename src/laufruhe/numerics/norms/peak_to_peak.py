@@ -19,13 +19,13 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.enclosing_ball import enclosing_balls
 from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (  # fmt: skip
+    LONGEST_TOL,
     MOST_KINKS,
-    TOUCHES,
     Cones,
     EpigraphProgram,
     Grid,
-    Kinks,
     Norm,
+    Subdifferential,
     amplitudes,
     curvature,
     lengths,
@@ -64,14 +64,14 @@ class PeakToPeak(Norm):
             np.add.at(z, at, 2.0 * shares[:, None] * along)
         return z
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return the shares of points that hold every largest ball; None where they are many (P19).
 
         No more points than directions and one have shares of their own; all others are mixtures of these.
         """
         balls, found = enclosing_balls(_signals(rows, grid.steps)), list[Array]()
         largest = float(balls.radii.max(initial=0.0))
-        for k in np.flatnonzero(balls.radii >= (1.0 - TOUCHES) * largest) if largest else ():
+        for k in np.flatnonzero(balls.radii >= (1.0 - LONGEST_TOL) * largest) if largest else ():
             first = int(k) * grid.steps
             along = (rows[first : first + grid.steps] - balls.centres[k]) / balls.radii[k]
             at = _peaks(lengths(along))
@@ -84,7 +84,7 @@ class PeakToPeak(Norm):
                     own = np.zeros_like(rows)
                     own[first + np.array(few)] = 2.0 * shares[:, None] * along[[*few]]
                     found.append(own)
-        return Kinks(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
+        return Subdifferential(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return half the sum of lengths; infinite if the rows of a signal do not add up to zero."""
@@ -94,18 +94,18 @@ class PeakToPeak(Norm):
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
         """Balance, then scale."""
-        return super().dual_feasible(grid, self.balanced(grid, z))
+        return super().dual_feasible(grid, self.balanced_dual(grid, z))
 
-    def balanced(self, grid: Grid, z: Array) -> Array:
+    def balanced_dual(self, grid: Grid, z: Array) -> Array:
         """Subtract the mean of every signal."""
         blocks = z.reshape(-1, grid.steps, z.shape[-1])
         return np.asarray(blocks - blocks.mean(axis=1, keepdims=True)).reshape(z.shape)
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return the solver's rows: several signals may be as large."""
         return z
 
-    def spread(self, z: Array, steps: int, times: int) -> Array:
+    def refined_dual(self, z: Array, steps: int, times: int) -> Array:
         """Return the rows in place, with zeros at the angles between."""
         return in_place(z, steps, times)
 
@@ -132,7 +132,7 @@ class PeakToPeak(Norm):
             program.hold(softened_lengths(signal - ca.repmat(centre, grid.steps, 1), share) - top)
         return top
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Bound by twice the sum of the amplitudes of alternating orders."""
         used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
         return max((_swing(signal) for signal in used), default=0.0)
@@ -147,7 +147,7 @@ class PeakToPeak(Norm):
             samples = signal.sample(coarse * times).swapaxes(0, 1)
             step = 2.0 * math.pi / float(signal.base) / (coarse * times)
             bends.append(step**2 / 8.0 * 2.0 * float(curvature(signal)[0].max(initial=0.0)))
-            for place, bent in zip(samples, signal.values(signal.bends).swapaxes(0, 1), strict=True):
+            for place, bent in zip(samples, signal.values(signal.kink_angles).swapaxes(0, 1), strict=True):
                 whole, starts = _reach(place, bent), (place[first::times] for first in range(times))
                 errors.append(max(whole - _reach(start, bent) for start in starts))
         return max(errors) + max(bends)
@@ -158,7 +158,7 @@ def _signals(rows: Array, steps: int) -> Array:
 
 
 def _peaks(sizes: Array) -> NDArray[np.intp]:
-    touching = np.flatnonzero(sizes >= (1.0 - TOUCHES) * sizes.max(initial=0.0))
+    touching = np.flatnonzero(sizes >= (1.0 - LONGEST_TOL) * sizes.max(initial=0.0))
     groups = np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1)
     if len(groups) > 1 and groups[0][0] == 0 and groups[-1][-1] == len(sizes) - 1:
         groups = [np.concatenate([groups.pop(), groups[0]]), *groups[1:]]
@@ -179,7 +179,7 @@ def _shares_of(along: Array) -> Array | None:
 
 
 def _swing(signal: Spectrum) -> float:
-    alternating = signal.holding(np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
+    alternating = signal.with_coefficients(np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
     return 2.0 * float(amplitudes(alternating).max(initial=0.0))
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, EpigraphProgram, Grid, Kinks, Norm, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, EpigraphProgram, Grid, Norm, Subdifferential, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -17,7 +17,7 @@ class RootMeanSquare(Norm):
     """Euclidean norm of weighted rows."""
 
     name = "rms"
-    is_euclidean = is_convex = of_row_lengths = is_pointwise = True
+    is_euclidean = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return sqrt(sum_k w_k |v_k|^2)."""
@@ -32,9 +32,9 @@ class RootMeanSquare(Norm):
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return rows along the design's own: the norm is smooth except at zero."""
-        return Kinks(self.subgradient(grid, rows) if rows.any() else z)
+        return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""
@@ -46,11 +46,11 @@ class RootMeanSquare(Norm):
             return 0.0
         return largest * float(np.sqrt((np.square(size / largest) / np.where(weights > 0.0, weights, 1.0)).sum()))
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return the design's own direction."""
         return self.subgradient(grid, rows)
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the root of weighted squares."""
         return np.asarray(np.sqrt(np.dot(np.multiply(lengths, lengths, out=lengths), weights)))
 
@@ -61,7 +61,7 @@ class RootMeanSquare(Norm):
 
     def cones(self, grid: Grid) -> Cones:
         """Return a single cone over all rows, each times the root of its weight."""
-        return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)
+        return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), is_single=True)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the norm softened as a single length."""
@@ -70,7 +70,7 @@ class RootMeanSquare(Norm):
         softness = share * unit
         return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + softness**2) - softness
 
-    def limited(
+    def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the mean square, which is smooth at zero."""
@@ -78,7 +78,7 @@ class RootMeanSquare(Norm):
 
         return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), maximum * maximum, 2.0 * maximum
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return Parseval's sum, exact except for orders of kinks."""
         squares = np.array([mean_square(signal) for signal in signals])
         return math.sqrt(float(shares @ squares.mean(axis=1)))
@@ -88,5 +88,5 @@ class RootMeanSquare(Norm):
         squares = [float(np.square(lengths(s.series.sample(steps))).mean()) for s in signals]
         sampled = math.sqrt(float(shares @ np.array(squares)))
         # the orders of corners beyond those that are counted add something between nothing and a bound
-        counted = self.above([s.series for s in signals], shares)
-        return max(abs(sampled - counted), abs(sampled - self.above(signals, shares)))
+        counted = self.upper_bound([s.series for s in signals], shares)
+        return max(abs(sampled - counted), abs(sampled - self.upper_bound(signals, shares)))

@@ -13,8 +13,8 @@ from laufruhe.numerics.norms.norm import (
     Cones,
     EpigraphProgram,
     Grid,
-    Kinks,
     Norm,
+    Subdifferential,
     amplitudes,
     lengths,
     mean_square,
@@ -26,7 +26,7 @@ class RootMeanQuad(Norm):
     """The fourth root of the mean of fourth powers."""
 
     name = "rmq"
-    is_convex = of_row_lengths = True
+    is_convex = is_monotone_in_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return (sum_k w_k |v_k|^4)^(1/4)."""
@@ -42,9 +42,9 @@ class RootMeanQuad(Norm):
         share = np.where(grid.weights > 0.0, lengths(rows) / value, 0.0)
         return np.asarray((grid.weights * share**2)[:, None] * (rows / value))
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return the gradient: the norm is smooth but at zero."""
-        return Kinks(self.subgradient(grid, rows) if rows.any() else z)
+        return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4); infinite where a row without weight is used."""
@@ -55,11 +55,11 @@ class RootMeanQuad(Norm):
         longest = float(density.max(initial=0.0))
         return longest and longest * float(weights @ (density / longest) ** (4.0 / 3.0)) ** 0.75
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return the gradient at the design."""
         return self.subgradient(grid, rows)
 
-    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+    def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the norms of many designs."""
         return np.asarray(np.sqrt(np.sqrt(np.dot(np.square(np.square(lengths)), weights))))
 
@@ -73,7 +73,7 @@ class RootMeanQuad(Norm):
             value,
             length,
             np.ones(count),
-            under=(
+            linear_rows=(
                 np.zeros(count + 1, dtype=np.intp),
                 np.append(2 * count + length, 3 * count),
                 np.append(grid.weights, -1.0),
@@ -92,7 +92,7 @@ class RootMeanQuad(Norm):
         squares = ca.sum2(rows * rows) / unit**2
         return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + share**4)) - share)
 
-    def limited(
+    def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Return the mean of fourth powers, which is smooth at zero."""
@@ -101,7 +101,7 @@ class RootMeanQuad(Norm):
         squares = ca.sum2(rows * rows)
         return ca.dot(ca.DM(grid.weights), squares * squares), maximum**4, 4.0 * maximum**3
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return a bound by Hölder's inequality: |v|^4 has at most the largest square times the mean square."""
         fourth = [float((amplitudes(s) ** 2 * mean_square(s)).mean()) for s in signals]
         return math.sqrt(math.sqrt(float(shares @ np.array(fourth))))

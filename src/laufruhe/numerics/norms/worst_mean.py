@@ -13,13 +13,13 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import (
+    LONGEST_TOL,
     MOST_KINKS,
-    TOUCHES,
     Cones,
     EpigraphProgram,
     Grid,
-    Kinks,
     Norm,
+    Subdifferential,
     lengths,
     softened_lengths,
 )
@@ -47,23 +47,23 @@ class WorstMean(Norm):
             z[own] = _MEAN.subgradient(Grid(_shares(grid)[own], grid.steps), rows[own])
         return z
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+    def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return the kinks of the largest means; None where a row of one vanishes."""
         means, size, found = self._means(grid, rows), _size(grid), list[Array]()
-        for point in np.flatnonzero(means >= (1.0 - TOUCHES) * means.max(initial=0.0)):
+        for point in np.flatnonzero(means >= (1.0 - LONGEST_TOL) * means.max(initial=0.0)):
             own, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
-            mean = _MEAN.kinks(Grid(_shares(grid)[own], grid.steps), rows[own], rows[own])
+            mean = _MEAN.subdifferential(Grid(_shares(grid)[own], grid.steps), rows[own], rows[own])
             if len(mean.vanishing):
                 return None
             base[own] = mean.base
             found.append(base)
-        return Kinks(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
+        return Subdifferential(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """sum_p max_k |z_k| / w_k, weights of every operating point adding up to one."""
         return float(self._prices(grid, z).sum())
 
-    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """The design's own directions, by the solver's shares of the operating points."""
         size, shares = lengths(rows), _shares(grid)
         prices = np.repeat(self._prices(grid, z), _size(grid))
@@ -82,7 +82,7 @@ class WorstMean(Norm):
             np.concatenate([np.arange(count), np.full(grid.points, count)]),
             np.concatenate([_shares(grid), np.full(grid.points, -1.0)]),
         )
-        return Cones(value, np.arange(count), np.ones(count), under=under)
+        return Cones(value, np.arange(count), np.ones(count), linear_rows=under)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """A variable that no mean of softened lengths exceeds (E22)."""
@@ -95,9 +95,9 @@ class WorstMean(Norm):
         program.hold(means - top)
         return top * unit
 
-    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+    def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """The largest of what the means do not exceed."""
-        return max((_MEAN.above([own], np.ones(1)) for own in _counted(signals, shares)), default=0.0)
+        return max((_MEAN.upper_bound([own], np.ones(1)) for own in _counted(signals, shares)), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Return the bound of the mean that is off most."""

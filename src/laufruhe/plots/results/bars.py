@@ -15,7 +15,7 @@ from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, in_thousands, ink_
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.present.pictures import rows_of
-from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.evaluation import Evaluation, place_measures
 from laufruhe.solvers.result import Result
 
 MOST_POINTS, MOST_GROUPS = 4, 7
@@ -51,7 +51,7 @@ def figure(result: Result) -> Figure:
 
 
 def _measures(design: Evaluation, k: int) -> Array:
-    each = measured(design, k)
+    each = place_measures(design, k)
     mean, maximum = np.array([m.mean for m in each]), np.array([m.max for m in each])
     return np.array([[*mean, mean.mean()], [*maximum, maximum.max()]])
 

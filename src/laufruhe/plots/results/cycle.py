@@ -29,7 +29,7 @@ from laufruhe.plots.words import (
     width_of,
 )
 from laufruhe.present.measures import firing_words, hardest_point, has_loads
-from laufruhe.problem.evaluation import over
+from laufruhe.problem.evaluation import with_common_base
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
@@ -163,7 +163,7 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[R
 
 
 def _closed(signal: Spectrum, base: Fraction) -> Array:
-    samples = over(base, [signal])[0].sample(STEPS)
+    samples = with_common_base(base, [signal])[0].sample(STEPS)
     return np.concatenate([samples, samples[:1]])
 
 

@@ -21,7 +21,7 @@ from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
 from laufruhe.present.pictures import rows_of
-from laufruhe.problem.evaluation import samples_of
+from laufruhe.problem.evaluation import channel_samples
 from laufruhe.solvers.result import Result
 
 MOST_PANELS, MOST_COLUMNS = 12, 4
@@ -74,7 +74,7 @@ class Frame:
 def figure(result: Result) -> Figure:
     """Draw one panel per mount, to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
-    paths, steady = _moving([_closed(samples_of(one.design, k)) for one in series])
+    paths, steady = _moving([_closed(channel_samples(one.design, k)) for one in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     frame, columns = Frame.from_paths(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)

@@ -52,7 +52,7 @@ class LeadSwing:
         angles = problem.engine.cycle.angle * np.arange(self._steps) / self._steps
         self._points: list[tuple[float, list[_Part]]] = []
         for point in problem.points:
-            if measure.counts_point(point):
+            if measure.includes_point(point):
                 parts = []
                 for engine in engines:
                     torque = gas_torque(engine, point, fidelity)
@@ -94,13 +94,13 @@ class LeadSwing:
 
 
 def _earlier(signal: Spectrum, lead: float) -> Spectrum:
-    return signal.later(-lead / signal.period, -lead) if lead else signal
+    return signal.shift(-lead / signal.period, -lead) if lead else signal
 
 
 def largest_torque(torque: Spectrum) -> float:
     """Return an upper bound of |torque - mean torque| [N m]."""
-    swing = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
+    swing = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
-    values = np.concatenate([swing.sample(steps), swing.values(swing.bends)])
+    values = np.concatenate([swing.sample(steps), swing.values(swing.kink_angles)])
     bent = curvature(swing.mapped(lambda each: each[:, None, None]))[0]
     return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * bent.max(initial=0.0))

@@ -97,8 +97,8 @@ class LeadBoxes:
         self._limits = [limit.measure for limit in problem.load_limits]
         self._rests = {m: [self._rest(m, s) for s in range(len(model.names))]
                        for m in dict.fromkeys([*self._terms, *self._limits]) if m.is_load}  # fmt: skip
-        of_torque = dict.fromkeys(measure for measure in problem.measures if measure.channel.of_torque)
-        self._swings = {measure: LeadSwing(problem, model, measure) for measure in of_torque}
+        torque_measures = dict.fromkeys(measure for measure in problem.measures if measure.channel.depends_on_torque)
+        self._swings = {measure: LeadSwing(problem, model, measure) for measure in torque_measures}
 
     def numbers(self, leads: Array) -> list[float]:
         """Return every degree of irregularity of the problem at some leads."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.roots import parted
+from laufruhe.numerics.roots import bisect_property
 from laufruhe.numerics.witness import EXCESS
 from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
@@ -172,4 +172,4 @@ def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign
 def _cut_side(violated: Callable[[float], bool], start: float, end: float) -> float:
     if start == end or not violated(start):
         return start
-    return parted(violated, start, end, CUTS)[0]
+    return bisect_property(violated, start, end, CUTS)[0]

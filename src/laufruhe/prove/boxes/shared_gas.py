@@ -32,7 +32,7 @@ from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.seiliger_cycle import seiliger_cut_off
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Measure, load_rows, selected
+from laufruhe.problem.measure import Measure, load_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
 CELLS = 1440
@@ -183,7 +183,7 @@ class SharedGasBoxes:
         # upper bound of the slope of a norm by the lead of the masses on a shaft [1/rad]
         shares = measure.shares(self.problem.points)
         own = [signal.derivative for signal in self._model.counted(measure, shaft)]
-        return float(measure.norm.above(own, shares[shares > 0.0]))
+        return float(measure.norm.upper_bound(own, shares[shares > 0.0]))
 
     def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
         # load of a unit roll moment at every counted place, shape (places,)
@@ -193,7 +193,7 @@ class SharedGasBoxes:
             mounting = mounting_of(engine, fidelity)
         forces = mounting.forces(wrench, point.speed) if mounting is not None else None
         loads = PointLoads(point, wrench, forces, None, engine, fidelity)
-        signal = selected(measure.of_all_orders, measure.load.signal(loads), engine)
+        signal = narrow_signal(measure.with_all_orders, measure.load.signal(loads), engine)
         return lengths(signal.coefficients[1].real)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:

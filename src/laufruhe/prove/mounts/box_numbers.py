@@ -42,8 +42,8 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
 
 def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
     """Bound the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
-    assert asked.channel.of_axis is not None
-    axis = asked.channel.of_axis(model.mounting(model.lower).block, asked.frequency)
+    assert asked.channel.axis_residual is not None
+    axis = asked.channel.axis_residual(model.mounting(model.lower).block, asked.frequency)
     bounds = np.zeros(len(lower))
     slopes = axis.left @ model.stiffness_slopes @ axis.right
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):

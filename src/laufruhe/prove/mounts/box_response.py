@@ -20,7 +20,7 @@ from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, mounting_in
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -120,7 +120,7 @@ class BoxModel:
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.evaluation = problem, evaluation
         decisions = problem.mount_decisions
-        self.lower, self.upper = sides_of(decisions)
+        self.lower, self.upper = real_bounds(decisions)
         base = self.mounting(self.lower)
         self.root = mass_root(base.block)
         self.travels = (base.motions @ self.root.T).reshape(-1, 6)

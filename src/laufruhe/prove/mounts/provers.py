@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from laufruhe.extension import in_order
-from laufruhe.numerics.budget import at_least, passed
+from laufruhe.numerics.budget import is_time_over, minimum_time
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
@@ -107,13 +107,13 @@ def proven(question: Question) -> BoxResult:
     results: dict[Iterator[BoxResult], BoxResult] = {}
 
     def is_over() -> bool:
-        return bool(results) and (passed() or not question.bound < question.value - question.room)
+        return bool(results) and (is_time_over() or not question.bound < question.value - question.room)
 
     while running and not is_over():
         for bounds in tuple(running):
             if is_over():
                 break
-            with at_least(LEAST_SECONDS) if not results else nullcontext():
+            with minimum_time(LEAST_SECONDS) if not results else nullcontext():
                 result = next(bounds, None)
             if result is None:
                 running.remove(bounds)

@@ -34,7 +34,7 @@ def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | N
     ]
     for decision, *edges in zip(decisions, *sides, strict=True):
         for drive in decision.mount_drives:
-            ends = [drive.gain * (edge - decision.start_number) for edge in edges]
+            ends = [drive.gain * (edge - decision.real_start) for edge in edges]
             low[drive.mount, drive.number] += min(ends)
             high[drive.mount, drive.number] += max(ends)
     return low, high

@@ -29,7 +29,7 @@ def is_ratio(measure: Measure) -> bool:
 def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: LoadedOrders) -> list[Mask]:
     """Return masks of the lines of each ratio: one per operating point and named order, or all orders above zero."""
     out = []
-    for p in (p for p in np.unique(lines.points) if quantity.counts_point(points[p])):
+    for p in (p for p in np.unique(lines.points) if quantity.includes_point(points[p])):
         moving = (lines.points == p) & (lines.orders > 0.0)
         orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
         out += [moving if order is None else moving & orders_equal(lines.orders, order) for order in orders]

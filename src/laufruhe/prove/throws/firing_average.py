@@ -15,7 +15,7 @@ from operator import add
 from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.problem.evaluation import Evaluation, over
+from laufruhe.problem.evaluation import Evaluation, with_common_base
 from laufruhe.problem.measure import load_rows
 from laufruhe.problem.problem import Problem
 
@@ -41,7 +41,7 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
             if not measure.is_mass:
                 return 0.0
             continue
-        signals = over(engine.cycle.base_order, design.signals(measure.load))
+        signals = with_common_base(engine.cycle.base_order, design.signals(measure.load))
         if any(signal.base != engine.cycle.base_order for signal in signals):
             return 0.0
         shared = [_averaged(signal, len(engine.cylinders)) for signal in signals]
@@ -52,7 +52,7 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
 
 
 def _averaged(signal: Spectrum, count: int) -> Spectrum:
-    shifted = [signal.later(Fraction(k, count), k * signal.period / count) for k in range(count)]
+    shifted = [signal.shift(Fraction(k, count), k * signal.period / count) for k in range(count)]
     return reduce(add, shifted).mapped(lambda values: values / count)
 
 

@@ -98,7 +98,7 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
     for (weight, norm), rows in zip(fine.terms, multipliers.terms, strict=True):
         parts.append((weight * norm.norm.dual_feasible(norm.grid, rows), norm))
     for (maximum, norm), rows in zip(fine.limits, multipliers.limits, strict=True):
-        z = norm.norm.balanced(norm.grid, rows)
+        z = norm.norm.balanced_dual(norm.grid, rows)
         reach = norm.norm.dual_norm(norm.grid, z) * maximum
         constant -= reach
         scale += reach

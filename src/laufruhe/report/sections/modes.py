@@ -9,7 +9,7 @@ from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, i
 from laufruhe.present.numbers import DASH, RPM, figure, number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.problem.channels import MOUNT_TRAVEL
-from laufruhe.problem.evaluation import measured
+from laufruhe.problem.evaluation import place_measures
 from laufruhe.solvers.result import Result
 
 
@@ -49,7 +49,7 @@ def _of_fluid(facts: MountingFacts) -> str:
 def _mounts(result: Result, facts: MountingFacts) -> Table:
     rows, points = [], result.problem.points
     slowest = min(range(len(points)), key=lambda k: points[k].speed)
-    travels = measured(result.final, slowest, MOUNT_TRAVEL)
+    travels = place_measures(result.final, slowest, MOUNT_TRAVEL)
     for k, spring in every_spring(result.final.engine.mounts):
         stiffness = " / ".join(trimmed(1e-3 * k) for k in spring.stiffness)
         place = ", ".join(trimmed(1e3 * c) for c in spring.position)

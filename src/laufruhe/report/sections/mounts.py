@@ -6,7 +6,7 @@ from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.present.measures import Places, evaluations_with_loads, places_of
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.present.tables import Table
-from laufruhe.problem.evaluation import measured
+from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.measure import Measure
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
@@ -25,14 +25,14 @@ def _table(result: Result, places: Places) -> Table:
     measures = [
         ((point.name, name) if len(points) > 1 else (name,), each)
         for k, point in enumerate(points)
-        for name, *each in zip(names, *(measured(design, k, places.channel) for design in designs), strict=True)
+        for name, *each in zip(names, *(place_measures(design, k, places.channel) for design in designs), strict=True)
     ]
     unit, factor = readable(places.channel.unit)
     scale = factor * max((each[0].max for _, each in measures), default=0.0)
     rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in measures)
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
-    if places.channel.adds_up:
+    if places.channel.sums_places:
         sums = [number(design.value(Measure(places.channel))) for design in designs]
         note = f"In sum {' before and '.join(sums)}{' after' if len(sums) > 1 else ''}, on average over the cycle."
     head = (*first, *(TWO if len(designs) > 1 else ONE))

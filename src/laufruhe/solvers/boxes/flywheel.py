@@ -11,7 +11,7 @@ import numpy as np
 
 from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import Numbers, moved_numbers, sides_of
+from laufruhe.problem.decision import Numbers, apply_decisions, real_bounds
 from laufruhe.problem.dependence import falls_with_flywheel
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
@@ -65,7 +65,7 @@ class _Coordinates:
         values = x.tolist()
         if self.width is not None:
             values = [*values[: self.width], self.problem.decisions[self.width].start, *values[self.width : -1]]
-        wheel = moved_numbers(Numbers(), self.problem.decisions, values).flywheel(self.given)
+        wheel = apply_decisions(Numbers(), self.problem.decisions, values).flywheel(self.given)
         return wheel if self.width is None else wheel.weighing(float(x[-1]))
 
     def decisions(self, x: Array) -> Array:
@@ -85,7 +85,7 @@ class _Coordinates:
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the decisions, shape (n,) each."""
-        return sides_of(self.problem.decisions)
+        return real_bounds(self.problem.decisions)
 
     def monotone_problem(self, initial: Evaluation, limits: Sequence[Limit]) -> MonotoneProblem:
         """Return objective and limits as monotone functions of the coordinates.
@@ -105,11 +105,11 @@ class _Coordinates:
             )
 
         def monotone(measure: Measure) -> Monotone:
-            if measure.channel.of_wheel is None:
+            if measure.channel.flywheel_value is None:
                 raise TypeError(f"{measure.name} is not of the flywheel")
-            of_wheel = measure.channel.of_wheel(measure, initial)
+            flywheel_value = measure.channel.flywheel_value(measure, initial)
             sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
-            return Monotone(lambda x: of_wheel(self.wheel(x)), np.full(len(lower), sign))
+            return Monotone(lambda x: flywheel_value(self.wheel(x)), np.full(len(lower), sign))
 
         return MonotoneProblem(
             tuple((term.weight, monotone(term.measure)) for term in self.problem.objective),

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import Role, Rotor
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import ADDED_MASS
-from laufruhe.problem.decision import Decision, Kind, RotorDrive, sides_of
+from laufruhe.problem.decision import Decision, Kind, RotorDrive, real_bounds
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -201,7 +201,7 @@ class Relaxation:
 def without_places(problem: Problem) -> Problem:
     """Return the relaxation of a problem over all positions (P8, P20)."""
     relaxation = Relaxation(problem, 1.0)
-    return relaxation.program(*sides_of(relaxation.places))
+    return relaxation.program(*real_bounds(relaxation.places))
 
 
 def _vertices(nodes: Sequence[Array], axes: Sequence[int]) -> tuple[dict[int, float], ...]:

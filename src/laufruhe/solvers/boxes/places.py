@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -122,7 +122,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Bounds of all positions [m]."""
-        return sides_of(self.places)
+        return real_bounds(self.places)
 
     def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
         """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
@@ -242,7 +242,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         active = [
             (limit, k, side)
             for limit in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
-            for room, _, side in (limit.room(value),) if room <= ACTIVE
+            for room, _, side in (limit.slack(value),) if room <= ACTIVE
         ]  # fmt: skip
         if not active:
             return {}

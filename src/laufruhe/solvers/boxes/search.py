@@ -11,7 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.certificate import gap_of
@@ -132,7 +132,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
             if design is not None and design.rank < self.best.rank:
                 self.best, self.value, self.witness = design, design.value, search.known(design)
             yield part if isinstance(part, FathomedPart) else (part.bound, part)
-            if not search.is_shared and passed():
+            if not search.is_shared and is_time_over():
                 # the remaining parts have at least the bound of the box
                 yield bound, box
                 return

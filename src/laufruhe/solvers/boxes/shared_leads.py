@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
@@ -39,7 +39,7 @@ SHARE = 0.5
 def solve_shared_leads(problem: Problem) -> Result:
     """Return the best leads, with a bound by boxes of leads."""
     started, initial = time.perf_counter(), evaluate(problem)
-    lower, upper = sides_of(problem.decisions)
+    lower, upper = real_bounds(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
     value, room, known = math.inf, 0.0, None
     if best is not None and best.violation <= KEPT:
@@ -68,7 +68,7 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
         return math.inf if at is None else at.value * (1.0 + 1e3 * max(at.violation, 0.0))
 
     ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
-    best = design(np.array([d.start_number for d in problem.decisions]))
+    best = design(np.array([d.real_start for d in problem.decisions]))
     for end in ends:
         best = best if end is None else better(end, best)
     return best

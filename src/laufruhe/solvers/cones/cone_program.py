@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import left
+from laufruhe.numerics.budget import seconds_left
 from laufruhe.numerics.norms import Cones
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
@@ -184,8 +184,8 @@ def build_program(
         rows.add(0, np.arange(columns)[block.heads], block.cones.value, np.array([maximum / block.unit]))
         rows.cones.append(clarabel.NonnegativeConeT(1))
     for block in blocks:
-        if block.cones.under is not None:
-            row, heads, factors = block.cones.under
+        if block.cones.linear_rows is not None:
+            row, heads, factors = block.cones.linear_rows
             rows.add(row, block.first + heads, factors, np.zeros(int(row.max()) + 1))
             rows.cones.append(clarabel.NonnegativeConeT(int(row.max()) + 1))
         if block.cones.squares is not None:
@@ -254,9 +254,9 @@ def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
     slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
     constant = norm.constant / block.unit * cones.factors[:, None]
     # rows of the program in the order of its cones: the head, then the numbers that it bounds
-    width = k * d + 1 if cones.whole else d + 1
+    width = k * d + 1 if cones.is_single else d + 1
     heads = np.arange(len(cones.head)) * width
-    body = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
+    body = (1 + np.arange(k * d).reshape(k, d)) if cones.is_single else heads[:, None] + 1 + np.arange(d)
     right = np.zeros(width * len(heads))
     right[body] = constant
     positions = np.broadcast_to(body[:, :, None], slope.shape)
@@ -296,7 +296,7 @@ def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadra
     settings.verbose = False
     for name, value in options.items():
         setattr(settings, name, value)
-    settings.time_limit = max(left(), MINIMUM_SECONDS)
+    settings.time_limit = max(seconds_left(), MINIMUM_SECONDS)
     hessian = np.zeros((0, 0)) if quadratic is None else quadratic
     row, column = np.nonzero(hessian)
     matrix = SparseMatrix.from_entries(row, column, hessian[row, column], (rows.columns, rows.columns))
@@ -325,7 +325,7 @@ def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[i
     for block, start in zip(blocks, starts, strict=True):
         # mu Z of the rows (P2), in the unit of the objective
         k, d = block.norm.constant.shape
-        if block.cones.whole:
+        if block.cones.is_single:
             z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
         else:
             z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]

@@ -11,9 +11,9 @@ import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.norms import MEAN, Grid
-from laufruhe.problem.decision import Domain, columns_of, vector_of
+from laufruhe.problem.decision import Domain, decision_vector, projected_vector
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
@@ -63,10 +63,10 @@ def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     limits = [x for x in (*problem.limits, limit) if depends(x.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(limits))
     has_numbers = any(_has_no_cones(x.measure) for x in limits)
-    if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or passed():
+    if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or is_time_over():
         return ()
     model = AffineModel(problem)
-    x = vector_of(model.domains, unbalances_of(result.problem, result))
+    x = decision_vector(model.domains, unbalances_of(result.problem, result))
     rows = _widen_limits(model.at(min(model.full_samples, COARSE)), x)
     ranges = []
     for domain in model.domains:
@@ -97,10 +97,10 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
     problem = replace(result.problem, phasing=None)
     is_plain = not problem.extras and not problem.ranks and not any(map(_has_no_cones, problem.measures))
     is_affine = all(decision.is_affine for decision in problem.decisions)
-    if not (is_plain and is_affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():
+    if not (is_plain and is_affine and 0 < len(problem.decisions) <= MOST_OPEN) or is_time_over():
         return None
     model = AffineModel(problem)
-    x = columns_of(model.domains, unbalances_of(problem, result))
+    x = projected_vector(model.domains, unbalances_of(problem, result))
     rows = _widen_limits(model.at(min(model.full_samples, COARSEST)), x)
     ends = [] if rows.groups else _ends(rows, x, FAINT)
     if not ends:

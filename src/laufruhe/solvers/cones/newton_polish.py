@@ -92,7 +92,7 @@ def _is_smooth(problem: AffineProblem) -> bool:
         return False
     if REFINEMENT // 2 * sum(norm.slope.size for _, norm in problem.terms) > MOST_NUMBERS:
         return False
-    has_curvature = all(norm.norm.across(norm.grid, norm.constant) is not None for _, norm in problem.terms)
+    has_curvature = all(norm.norm.second_derivative(norm.grid, norm.constant) is not None for _, norm in problem.terms)
     return has_curvature and all(len(norm.grid.weights) <= FEW_ROWS for _, norm in problem.limits)
 
 
@@ -118,7 +118,7 @@ def derivatives(problem: AffineProblem, x: Array) -> tuple[Array, Array]:
     """Return gradient and curvature of the objective at x, shapes (n,) and (n, n) (P10)."""
     gradient, curvature = np.zeros(problem.size), np.zeros((problem.size, problem.size))
     for weight, norm in problem.terms:
-        duals, curvatures = norm.subgradient(x), norm.norm.across(norm.grid, norm.rows(x))
+        duals, curvatures = norm.subgradient(x), norm.norm.second_derivative(norm.grid, norm.rows(x))
         assert curvatures is not None
         gradient += weight * np.einsum("kd,kdn->n", duals, norm.slope)
         directions = duals / norm.grid.weights[:, None]

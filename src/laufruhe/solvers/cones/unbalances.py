@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
-from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.budget import until_time_limit
 from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import FINE_SAMPLES, evaluate, with_fine_sampling
@@ -159,7 +159,7 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     samples, best = max(first, start_samples), None
     # a limit close to the smallest possible mean needs many samples
     maximum = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
-    for k in in_time(range(maximum + 1)):
+    for k in until_time_limit(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
             if best is not None and best.violation <= KEPT and _keeps_limits_with_fine_sampling(problem, best):
@@ -208,7 +208,7 @@ def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_lev
     """
     optimum = _attempt(problem, model, samples, zero_level, 0.0)
     margin = 0.0
-    for _ in in_time(range(MOST_MARGINS)):
+    for _ in until_time_limit(range(MOST_MARGINS)):
         if optimum is None or optimum.violation <= FEASIBLE:
             break
         margin += 1.05 * optimum.violation

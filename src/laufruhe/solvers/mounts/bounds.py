@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.budget import is_time_over, until_time_limit
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
@@ -45,7 +45,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
     divided = BoxResult(0.0, 0)
     if search.moves is not None or not problem.search.proves or (among and not divides(problem)):
         return divided
-    for _ in in_time(range(MOST_DIVISIONS)):
+    for _ in until_time_limit(range(MOST_DIVISIONS)):
         design = search.chosen.design if search.chosen is not None else None
         value, known = math.inf, None
         if design is not None and design.violation <= KEPT:
@@ -59,7 +59,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
         question, count = Question(problem, value, room, near, known), len(problem.mount_decisions)
         divided = proven(question)
         places = [(place[:count].tolist(), place[count:] if len(place) > count else None) for place in divided.places]
-        if not places or passed() or not search.again(places):
+        if not places or is_time_over() or not search.again(places):
             break
         # the bound also serves a value that differs by less than the gap tolerance
         if search.best is not None and search.best.design.value > question.value - room:

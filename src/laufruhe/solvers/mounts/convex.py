@@ -16,7 +16,7 @@ from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import STIFFNESS, Decision, sides_of
+from laufruhe.problem.decision import STIFFNESS, Decision, real_bounds
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -70,8 +70,8 @@ def _is_convex_limit(limit: Limit) -> bool:
 def convex_program(problem: Problem) -> ConvexProgram:
     """Return the convex program of a problem that `is_convex`."""
     decisions = problem.decisions
-    lower, upper = sides_of(decisions)
-    start = np.array([d.start_number for d in decisions])
+    lower, upper = real_bounds(decisions)
+    start = np.array([d.real_start for d in decisions])
     mounting = mounting_in(problem.design(start.tolist()))
     root = mass_root(mounting.block)
     slopes = np.array([root @ _slope(mounting, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
@@ -98,11 +98,11 @@ def _function(
     if quantity.channel is channels.SAG:
         weight = weight_wrench(mounting.block)
         return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
-    if quantity.channel.of_axis is not None:
-        return Residual(matrices, quantity.channel.of_axis(mounting.block, quantity.frequency))
+    if quantity.channel.axis_residual is not None:
+        return Residual(matrices, quantity.channel.axis_residual(mounting.block, quantity.frequency))
     gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
     start = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
-    return LinearFunction(start - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
+    return LinearFunction(start - float(gradient @ [d.real_start for d in problem.decisions]), gradient)
 
 
 def _limits(

@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import speculation, worker_pool
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -143,7 +143,7 @@ def _share(design: Design) -> tuple[Problem, Sequence[float]]:
 def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
     """Return the best unbalances on fixed mounts and their proven gap, or None if that is not convex."""
     problem, mounts = share
-    if not problem.unbalances or not problem.load_terms or problem.mount_terms or passed():
+    if not problem.unbalances or not problem.load_terms or problem.mount_terms or is_time_over():
         return None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
@@ -182,7 +182,7 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     if conflict or not problem.unbalances:
         return conflict
     # numbers without loads are the same for all unbalances
-    limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.of_loads)
+    limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.depends_on_loads)
     alone = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
     return conflict_of(alone) if divides(alone) and excludes(alone, limits) else ()
 

@@ -11,9 +11,9 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.simulated import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed, rounds
+from laufruhe.numerics.budget import is_time_over, timed_rounds
 from laufruhe.numerics.progress import report_progress
-from laufruhe.problem.decision import sides_of
+from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -122,13 +122,13 @@ class MountSearch:
 
         If the time budget is over, the first start is the result if it is feasible.
         """
-        start = started_at(self.problem, self._points[0]) if passed() and self.moves is None else None
+        start = started_at(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
         if start is not None and start.violation <= SLACK:
             self._keep_best(SearchResult(start, self.joint))
             return
         zero_level = numerical_zero(self.problem)
         self._repeat_with_active_limits(lambda: self._search(self._points))
-        for _ in rounds(MOST_SIZES):
+        for _ in timed_rounds(MOST_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= zero_level:
                 break
             # the solver's tolerance is relative to the unit of the objective
@@ -196,8 +196,8 @@ class MountSearch:
         ]
         optima = self._solve(starts, self._is_explored)
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
-        if around and len(points) > 1 and not self._is_explored(optima) and not passed():
-            low, high = sides_of(problem.mount_decisions)
+        if around and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
+            low, high = real_bounds(problem.mount_decisions)
             starts = []
             for k in range(max(len(points) // 2, 1)):
                 x = around[k % len(around)].x
@@ -220,12 +220,12 @@ class MountSearch:
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
         for place in self._points[:CHECKED_STARTS] if limits else ():
             design = started_at(self.problem, place)
-            limits = [x for x in limits if design is not None and design.evaluation.standing(x).violation < -ROOM]
+            limits = [x for x in limits if design is not None and design.evaluation.check_limit(x).violation < -ROOM]
         return set(limits)
 
     def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
         search()
-        while self._active_again and not (passed() and self._is_feasible):
+        while self._active_again and not (is_time_over() and self._is_feasible):
             self._ignored = self._ignored - self._active_again
             self._active_again, self.optima, self._nearly_feasible = set(), (), []
             self.joint = self._program()
@@ -267,7 +267,7 @@ class MountSearch:
         if self.best is not None and self._is_feasible and design.value > self.best.design.value:
             return False
         limits = [other for other in self.problem.limits if other not in self._ignored]
-        return design.evaluation.standing(limit).violation > -CLOSE and design.evaluation.violation(limits) <= NEAR
+        return design.evaluation.check_limit(limit).violation > -CLOSE and design.evaluation.violation(limits) <= NEAR
 
     def _keep_best(self, result: SearchResult) -> None:
         if self.best is None or result.rank < self.best.rank:
@@ -308,7 +308,7 @@ class MountSearch:
 
     def _search_with_margin(self, near: SearchResult) -> None:
         margin = 0.0
-        for _ in rounds(MOST_MARGINS):
+        for _ in timed_rounds(MOST_MARGINS):
             if near.optimum is None or not FEASIBLE < near.design.violation <= NEAR:
                 break
             margin += 1.001 * near.design.violation

@@ -17,9 +17,9 @@ from typing import TypeAlias
 
 from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.norms import RMS
-from laufruhe.numerics.progress import report_progress, within
+from laufruhe.numerics.progress import report_progress, search_scope
 from laufruhe.numerics.workers import executor_for, ordered_map, working_on
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
@@ -104,7 +104,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     if phasing.throw_bounds is not None:
         return [], 0
     # firing orders of shared throws are listed later
-    by_firing = problem.feels_order and not phasing.shares_throws
+    by_firing = problem.depends_on_firing_order and not phasing.shares_throws
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MOST_LISTED:
         raise ModelError(f"more than {MOST_LISTED} stars are open together with mounts; fix the firing order")
@@ -154,15 +154,15 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
     problems = [_problem_of(problem, phasing, candidate, starts) for candidate, _ in stars[:1]]
     problems += [_problem_of(problem, phasing, candidate, min(starts, BESIDE)) for candidate, _ in stars[1:]]
     results = list[Result]()
-    with limited(phasing.time_limit):
+    with limit_time(phasing.time_limit):
         for first in problems[:1]:
-            with within(f"first of {counted(len(stars), 'star')}"):
+            with search_scope(f"first of {counted(len(stars), 'star')}"):
                 results.append(solve_mounts(first, among=True))
         known = [result for result in results if result.decisions and starts > BESIDE]
         near = place_of(known[0].problem, known[0])[0] if known else None
         # one process for each star
         work = partial(solve_mounts, workers=1, among=True, near=near)
-        results += ordered_map(work, problems[1:], "stars on their mounts") if not passed() else []
+        results += ordered_map(work, problems[1:], "stars on their mounts") if not is_time_over() else []
     found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
     return sorted(found, key=_rank)
 
@@ -171,7 +171,7 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
     """Solve the best few stars again with all starts."""
     out = list(found)
     starts = problem.search.starts
-    for k, each in enumerate(() if passed() else found[:MOST_SEARCHED]):
+    for k, each in enumerate(() if is_time_over() else found[:MOST_SEARCHED]):
         star_problem = each.result.problem
         # a star that is proven to be no better than the best needs no more starts
         if star_problem.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
@@ -179,7 +179,7 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
         whole = min(len(found), MOST_SEARCHED)
         report_progress("best stars once more", k, whole, value=_minimum(out))
         more = replace(star_problem, search=replace(star_problem.search, starts=starts))
-        with within(f"best star {k + 1} of {whole}"):
+        with search_scope(f"best star {k + 1} of {whole}"):
             again = replace(each, result=solve_mounts(more, among=True))
         out[k] = min(again, each, key=_rank)
     return sorted(out, key=_rank)
@@ -213,7 +213,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
     ]
     starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
     out: list[StarDesign] = []
-    for k, (candidate, even) in enumerate(() if found and passed() else starts):
+    for k, (candidate, even) in enumerate(() if found and is_time_over() else starts):
         report_progress("throws that leave their star", k, len(starts), value=_minimum([*found, *out]))
         star_problem = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
@@ -257,7 +257,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
 
 
 def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxResult:
-    if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
+    if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or is_time_over():
         return BoxResult(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
     design = evaluate_design(realised, values_of(realised, best.result))

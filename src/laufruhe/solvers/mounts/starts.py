@@ -12,10 +12,10 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.simulated import COARSER, Peaks, peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, left, limited
+from laufruhe.numerics.budget import limit_time, seconds_left, until_time_limit
 from laufruhe.numerics.workers import SERIAL, current_executor, speculation, worker_count
-from laufruhe.problem.decision import columns_of, domains_of, sides_of
-from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
+from laufruhe.problem.decision import domains_of, projected_vector, real_bounds
+from laufruhe.problem.evaluation import Evaluation, objective_value, with_mounts
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import unbalances_of
@@ -61,7 +61,7 @@ def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
     """Return mounts and columns of unbalances of a result."""
     found = {decision.name: decision.value for decision in result.decisions}
     mounts = [found[decision.name] for decision in problem.mount_decisions]
-    return mounts, columns_of(domains_of(problem.unbalances), unbalances_of(problem, result))
+    return mounts, projected_vector(domains_of(problem.unbalances), unbalances_of(problem, result))
 
 
 def _balance_on_baseline(problem: Problem) -> list[complex] | None:
@@ -85,8 +85,8 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     with _evaluating(problem, initial, pool) as scores:
         balanced = _balance_on_baseline(problem)
         scored = scores()
-    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
-    starts = [] if initial.resonance else [([d.start_number for d in decisions], best)]
+    best = projected_vector(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    starts = [] if initial.resonance else [([d.real_start for d in decisions], best)]
     if not wanted:
         return starts, objective_value(problem, initial) or 1.0
     rows, unit = _promising(problem, initial, pool, scored, wanted)
@@ -102,7 +102,7 @@ def _spread_over(problem: Problem) -> Array:
     # shape (points, mounts and columns of unbalances)
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
-    low, high = sides_of(decisions)
+    low, high = real_bounds(decisions)
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
     ends = np.concatenate([low_log, -wide]), np.concatenate([high_log, wide])
@@ -136,11 +136,11 @@ def _evaluating(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
     shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
     with speculation(_scores, math.inf) as ahead:
-        with limited(LOOKING * left()):
+        with limit_time(LOOKING * seconds_left()):
             ahead.prefetch(enumerate(shares))
 
         def scores() -> Array:
-            with limited(LOOKING * left()):
+            with limit_time(LOOKING * seconds_left()):
                 return np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
 
         yield scores
@@ -158,13 +158,13 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
     limits = tuple(limit for limit in limits if not limit.measure.channel.simulation)
     peaks = peaks_of(problem, COARSER, roughly=True)
     out = np.full((len(points), 2), math.inf)
-    for k, row in in_time(enumerate(points)):
+    for k, row in until_time_limit(enumerate(points)):
         try:
-            design = remounted(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
+            design = with_mounts(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
         missed, value = (
-            sum(max(design.standing(limit).violation, 0.0) for limit in limits),
+            sum(max(design.check_limit(limit).violation, 0.0) for limit in limits),
             objective_value(plain, design),
         )
         if peaks is not None and peaks.is_known:

@@ -51,7 +51,7 @@ class StaticCases:
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
         """Return a variable constrained to be at least every length of a measure, scaled by the initial one (E22)."""
-        part, selected = measure.channel.of_cases, measure.places([mount.name for mount in engine.mounts])
+        part, selected = measure.channel.case_vectors, measure.places([mount.name for mount in engine.mounts])
         assert part is not None
         cases, weights = counted_cases(measure, engine), ca.DM(list(measure.direction_weights or (1.0, 1.0, 1.0)))
         initial = [np.linalg.norm(part(settled(self._mounting, case)), axis=1).max() for case in cases]

@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, left, passed
+from laufruhe.numerics.budget import is_time_over, seconds_left, until_time_limit
 from laufruhe.numerics.progress import report_progress, with_progress
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
@@ -104,7 +104,7 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
         return []
     report_progress("derivatives of the smooth program")
     program = _compile_task(task)
-    return [_from_start(task, program, k, point) for k, point in in_time(with_progress("starts", points))]
+    return [_from_start(task, program, k, point) for k, point in until_time_limit(with_progress("starts", points))]
 
 
 class _Clock(ca.Callback):
@@ -238,7 +238,7 @@ def _from_start(task: Task, program: _Program, k: int, point: Array) -> LocalOpt
     y, iterations, ending, stages_run = point / task.scales, 0, Ending.FAILED, 0
     m = b = np.zeros(0)
     for number, stage in enumerate(task.stages):
-        if number and passed():
+        if number and is_time_over():
             ending = Ending.UNFINISHED
             break
         stage_end, stages_run = _run_stage(task, program, y, stage), number + 1
@@ -294,7 +294,7 @@ def _compile_task(task: Task, stay_near: bool = False) -> _Program:
 
 def _run_stage(task: Task, program: _Program, y: Array, stage: Sequence[float]) -> _End:
     # run one stage from a point
-    program.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
+    program.clock.start(min(task.max_seconds, max(seconds_left(), SHORTEST)))
     solution = program.solver(
         x0=y, p=list(stage), lbx=task.lower, ubx=task.upper, lbg=task.constraint_lower, ubg=task.constraint_upper
     )
@@ -309,7 +309,7 @@ def _is_worse_than_start(task: Task, program: _Program, start: Array, stage_end:
 
     Programs with an external model are not checked, because its evaluation is slow.
     """
-    if task.external_model is not None or passed():
+    if task.external_model is not None or is_time_over():
         return False
     end_value, start_value, g, *_ = program.value(stage_end.y, stage), *program.slopes(start, stage)
     violation = max(

@@ -12,8 +12,8 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time, passed
-from laufruhe.problem.decision import Domain, domains_of, ends_of, vector_of
+from laufruhe.numerics.budget import is_time_over, until_time_limit
+from laufruhe.problem.decision import Domain, column_bounds, decision_vector, domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -45,7 +45,7 @@ class LocalProgram:
     @classmethod
     def of(cls, problem: Problem) -> Self:
         """Return the program of all open numbers of a problem."""
-        return cls(problem, *ends_of(domains_of(problem.decisions)))
+        return cls(problem, *column_bounds(domains_of(problem.decisions)))
 
     @cached_property
     def domains(self) -> tuple[Domain, ...]:
@@ -54,7 +54,7 @@ class LocalProgram:
 
     def shares(self, values: Sequence[Value] | Array) -> Array:
         """Return decision values as shares, shape (n,)."""
-        columns = vector_of(self.domains, values)
+        columns = decision_vector(self.domains, values)
         return np.asarray(np.clip((columns - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
     def columns(self, shares: Array) -> Array:
@@ -75,7 +75,7 @@ class LocalProgram:
         edges = self.edges(shares)
         try:
             evaluation = evaluate(self.problem.fixed_at(self.values(shares)))
-            rooms = [-evaluation.standing(limit).violation for limit in self.problem.limits]
+            rooms = [-evaluation.check_limit(limit).violation for limit in self.problem.limits]
             return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
         except ModelError:
             return np.array([math.inf, *(-1.0 for _ in self.problem.limits), *edges])
@@ -129,10 +129,10 @@ def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) 
     starts
         Largest number of local searches.
     """
-    ranked = sorted(in_time(places), key=program.rank)
+    ranked = sorted(until_time_limit(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, LOOKS))]:
-        if passed():
+        if is_time_over():
             break
         best = min(best, _local_optimum(program, place), key=program.rank)
     return best
@@ -151,7 +151,7 @@ def _local_optimum(program: LocalProgram, place: Array) -> Array:
         nonlocal best
         point = np.clip(x, 0.0, 1.0)
         if point.tobytes() not in cache:
-            if passed():
+            if is_time_over():
                 raise _TimeOverError
             result = program.numbers(point)
             best = min(best, (point, _rank(result)), key=lambda pair: pair[1])
@@ -159,7 +159,7 @@ def _local_optimum(program: LocalProgram, place: Array) -> Array:
         return cache[point.tobytes()]
 
     def slopes(x: Array) -> Array:
-        if passed():
+        if is_time_over():
             raise _TimeOverError
         result = program.slopes(np.clip(x, 0.0, 1.0))
         result[0] /= unit
@@ -224,7 +224,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
     problem = program.problem
     result = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
     for _ in range(TRIES):
-        if passed():
+        if is_time_over():
             break
         value, room = math.inf, 0.0
         if result.design.violation <= KEPT:
@@ -275,7 +275,7 @@ def proof_data(program: LocalProgram, design: Design, bound: float, reach: Proof
             continue
         limit = problem.limits[k]
         largest = float(np.abs(slopes[1 + k]).max()) or 1.0
-        _, edge, side = limit.room(design.evaluation.standing(limit).value)
+        _, edge, side = limit.slack(design.evaluation.check_limit(limit).value)
         # margins are relative to the limit
         sides.append((k, (limit, side), abs(edge) or 1.0))
         prices[limit, side] = Price.both(float(share) * scale / (largest * (abs(edge) or 1.0)))

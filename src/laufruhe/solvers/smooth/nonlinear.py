@@ -31,7 +31,7 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import (
     WORTH_PROCESSES,
@@ -195,7 +195,7 @@ def _run_first_stage(
     spent = sum(o.seconds for o in optima)
     pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - started - spent)
     run_starts: RunStarts = ready_workers or (_SharedStarts(stack, count) if count > 1 and pays else run)
-    while rest and not passed() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
+    while rest and not is_time_over() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
         batch, rest = (rest[:ROUND], rest[ROUND:]) if stop_when is not None else (rest, [])
         optima += run_starts((task, batch))
     return optima, run_starts
@@ -267,7 +267,7 @@ def _run_later_stages(task: Task, groups: Sequence[LocalOptimum], run_starts: Ru
     """Run the later stages from the ends of the first; at the time limit an end stays as it is."""
     if len(task.stages) < 2:
         return list(groups)
-    if passed():
+    if is_time_over():
         return [replace(optimum, ending=Ending.UNFINISHED) if optimum.usable else optimum for optimum in groups]
     minimum = min((optimum.value for optimum in groups if optimum.usable), default=math.inf)
     # an unconverged end that is worse than the best converged one goes no further
@@ -285,7 +285,7 @@ def _run_later_stages(task: Task, groups: Sequence[LocalOptimum], run_starts: Ru
             totals = (optimum.iterations + end.iterations, optimum.seconds + end.seconds)
             results.append(replace(end, starts=optimum.starts, iterations=totals[0], seconds=totals[1]))
         else:
-            results.append(replace(optimum, ending=Ending.UNFINISHED) if optimum.usable and passed() else optimum)
+            results.append(replace(optimum, ending=Ending.UNFINISHED) if optimum.usable and is_time_over() else optimum)
     return results
 
 

@@ -233,7 +233,7 @@ class SmoothProgram:
         rows, grid = self._rows(measure)
         unit = limit.maximum * factor or self.unit
         collector = self._constraints.named(limit.name)
-        value, maximum, slope = measure.norm.limited(
+        value, maximum, slope = measure.norm.smooth_limit(
             collector, grid, rows / unit, limit.maximum * factor / unit, self._softest
         )
         self._constraints.add(value, -np.inf, maximum, limit.name, maximum=((limit, "at most"), slope / unit))
@@ -260,9 +260,9 @@ class SmoothProgram:
             load = ca.DM(self._root @ weight)
             deflection, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
             return ca.dot(load, deflection) / -weight[2]
-        if quantity.channel.of_axis is not None:
-            return self._residual(quantity.channel.of_axis(self._mounting.block, quantity.frequency))
-        if quantity.channel.of_cases is not None:
+        if quantity.channel.axis_residual is not None:
+            return self._residual(quantity.channel.axis_residual(self._mounting.block, quantity.frequency))
+        if quantity.channel.case_vectors is not None:
             return self._cases.largest(quantity, self.problem.engine)
         if quantity.channel is channels.DECOUPLING_SHORTFALL:
             return self._modes.shortfall(quantity)

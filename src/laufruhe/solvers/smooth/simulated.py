@@ -12,7 +12,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.simulated import peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import domains_of, vector_of
+from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
@@ -42,8 +42,8 @@ class SimulatedVariables:
             raise ModelError("a simulation of so many turns is checked, not designed for; make it shorter")
         self.symbols = ca.MX.sym("simulated", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
-        columns = vector_of(domains_of(problem.unbalances))
-        initial = self.at([d.start_number for d in problem.mount_decisions], columns)
+        columns = decision_vector(domains_of(problem.unbalances))
+        initial = self.at([d.real_start for d in problem.mount_decisions], columns)
         for measure, end, count in zip(measures, ends.tolist(), self._peaks.counts, strict=True):
             self._symbols_of[measure] = self.symbols[end - count : end]
             maximum = float(np.max(initial[end - count : end]))

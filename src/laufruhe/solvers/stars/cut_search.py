@@ -15,7 +15,7 @@ import numpy as np
 
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.prove.certificate import gap_tolerance_of
@@ -97,7 +97,7 @@ def search_designs(
             complete = True
             break
         has_tried = bool(solved or infeasible)
-        if time.perf_counter() - started > time_limit or (passed() and has_tried):
+        if time.perf_counter() - started > time_limit or (is_time_over() and has_tried):
             break
         best = min((one.value for one in solved), default=float("inf"))
         report_progress("stars and sets of shafts", len(solved) + infeasible, bounds.size, best, lower_bound)

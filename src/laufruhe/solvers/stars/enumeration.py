@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
 
@@ -110,11 +110,11 @@ def enumerate_orders(
     stars = np.zeros((1, cylinders), dtype=np.uint8)
     squares = np.array([[table.constant + table.placed(stars, stars[:, 0], 0)[0] for table in objective.tables]])
     waiting: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
-    with limited(time_limit):
+    with limit_time(time_limit):
         while waiting and not ended:
             report_progress("partial firing orders", seen, value=float(best.values.min(initial=np.inf)))
             placed, stars, squares = waiting.pop()
-            ended = passed()
+            ended = is_time_over()
             if placed == cylinders:
                 values = objective.values(squares)
                 allowed = np.isfinite(values)

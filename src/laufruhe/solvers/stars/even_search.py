@@ -94,7 +94,7 @@ def is_long(problem: Problem) -> bool:
     phasing = problem.phasing
     if phasing is None or phasing.throws is not None or phasing.throw_bounds is not None:
         return False
-    return not can_list(problem, families_of(phasing, problem.feels_order)[0])
+    return not can_list(problem, families_of(phasing, problem.depends_on_firing_order)[0])
 
 
 def refuse_long(problem: Problem) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine.firing import MOST_ORDERS
-from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
@@ -82,13 +82,13 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
         result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
         return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
     one_by_one = is_unlike or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
-    if (problem.feels_order or is_unlike) and is_even and one_by_one:
+    if (problem.depends_on_firing_order or is_unlike) and is_even and one_by_one:
         stars = even_stars(phasing)
         result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:
             return result
         return _solve_uneven(problem, phasing, None if result.objective is None else result)
-    families = families_of(phasing, problem.feels_order)[0] if is_even else ()
+    families = families_of(phasing, problem.depends_on_firing_order)[0] if is_even else ()
     if not families:
         if phasing.continuous:
             return _solve_uneven(problem, phasing, None)
@@ -103,7 +103,7 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
             limits = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
             why = f"no star keeps {limits}, whatever else is decided ({counted(answer.infeasible, 'design')} tried)"
             return no_star(problem, why, conflict=names)
-        cause = "the time limit" if passed() else f"phasing.time_limit = {phasing.time_limit:g} s"
+        cause = "the time limit" if is_time_over() else f"phasing.time_limit = {phasing.time_limit:g} s"
         why = f"no feasible design was found in {cause}; raise it"
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
@@ -121,7 +121,7 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
     """Search again at more angles, while these are all that keeps a gap open (P7)."""
     for _ in range(ROUNDS):
         gap = result.certificate.gap if result.certificate else 0.0
-        if gap <= problem.tolerance or passed():
+        if gap <= problem.tolerance or is_time_over():
             break
         # averages about angles fall short of means by the square of their step
         times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MOST_TIMES)
@@ -163,7 +163,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: EvenStarResult) -> Resu
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
-    count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])
+    count = sum(family.size for family in families_of(phasing, problem.depends_on_firing_order)[0])
     details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
     return with_star(problem, phasing, result, candidate, certificate, details)
 
@@ -224,7 +224,7 @@ def solve_every_order(
     for k, candidate in enumerate(designs):
         minimum = min((one.value for one in every), default=math.inf)
         report_progress("firing orders and sets of shafts", k, len(designs), minimum)
-        if every and (passed() or time.perf_counter() - started > phasing.time_limit):
+        if every and (is_time_over() or time.perf_counter() - started > phasing.time_limit):
             break
         every.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), minimum)))
     complete = len(every) == whole
@@ -268,5 +268,5 @@ def solve_every_order(
 def _solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
     from laufruhe.solvers.throws.uneven_throws import solve_uneven
 
-    with limited(phasing.time_limit):
+    with limit_time(phasing.time_limit):
         return solve_uneven(problem, phasing, even)

@@ -212,9 +212,9 @@ def distinct_orders(
     Each of them twists the crankshaft in a way of its own (V6).
     """
     orders = ranked_orders(phasing, candidate, steps)
-    if problem.feels_order:
+    if problem.depends_on_firing_order:
         return orders
-    return orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
+    return orders if problem.depends_on_gas and not all(order.is_even for order in orders) else orders[:1]
 
 
 def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, counted
-from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import with_progress, within
+from laufruhe.numerics.budget import until_time_limit
+from laufruhe.numerics.progress import search_scope, with_progress
 from laufruhe.problem.decision import AddressDrive, Decision
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Path, Phasing, Problem
@@ -64,17 +64,17 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
     search
         A local search over numbers.
     """
-    starts = starts_of(phasing, None, problem.feels_gas)[:MOST_STARTS]
+    starts = starts_of(phasing, None, problem.depends_on_gas)[:MOST_STARTS]
     if not starts:
         return no_star(problem, why_none_fires(phasing)[0])
     results: list[tuple[Candidate, Result]] = []
-    for start in in_time(with_progress("cranks that throws leave", starts)):
+    for start in until_time_limit(with_progress("cranks that throws leave", starts)):
         crank, realised = _MovedCrank(phasing, start), phasing.realise(start)
         angles = tuple(_angle_decisions(phasing, start))
         options = replace(realised.search, starts=min(realised.search.starts, MOST_SEARCHES))
         decisions = (*realised.decisions, *angles)
         moved = replace(realised, phasing=None, rebuild=crank, decisions=decisions, search=options)
-        with within("a crank that throws leave"):
+        with search_scope("a crank that throws leave"):
             result = search(moved)
         values = {entry.name: entry.value for entry in result.decisions}
         changes = {drive.path: values[d.name] for d in angles for drive in d.address_drives if d.name in values}

@@ -58,7 +58,7 @@ def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
     ]
     slopes: dict[tuple[Measure, str], float] = {}
     for term in problem.objective:
-        for name in _points(problem, term.measure) if term.measure.channel.of_torque else ():
+        for name in _points(problem, term.measure) if term.measure.channel.depends_on_torque else ():
             maximum = sum(_stored(one, name) for one in alone)
             if value < math.inf and term.weight > 0.0:
                 maximum = min(maximum, bounds[name].work(value / term.weight))
@@ -92,14 +92,14 @@ def _exchange(
     limits: list[Limit] = []
     for term in problem.objective:
         measure = term.measure
-        if measure.channel.of_torque:
+        if measure.channel.depends_on_torque:
             sizes = {name: size(measure, name) for name in _points(problem, measure)}
             name = max(sizes, key=sizes.__getitem__)
             term = Term(_work(name), term.weight * slope(measure, name))
         terms.append(term)
     for limit in problem.limits:
         measure = limit.measure
-        if not measure.channel.of_torque:
+        if not measure.channel.depends_on_torque:
             limits.append(limit)
             continue
         limits += [
@@ -109,7 +109,7 @@ def _exchange(
 
 
 def _has_degree(problem: Problem) -> bool:
-    return any(measure.channel.of_torque for measure in problem.measures)
+    return any(measure.channel.depends_on_torque for measure in problem.measures)
 
 
 def _work(name: str) -> Measure:
@@ -121,7 +121,7 @@ def _stored(evaluation: Evaluation, name: str) -> float:
 
 
 def _points(problem: Problem, measure: Measure) -> Sequence[str]:
-    return [point.name for point in problem.points if measure.counts_point(point)]
+    return [point.name for point in problem.points if measure.includes_point(point)]
 
 
 def _bounds(problem: Problem) -> dict[str, StoredWorkBound]:

@@ -17,8 +17,8 @@ from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.numerics.witness import EXCESS
-from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import Measure, load_rows, selected
+from laufruhe.problem.evaluation import with_common_base
+from laufruhe.problem.measure import Measure, load_rows, narrow_signal
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
@@ -155,8 +155,8 @@ class Stage:
 def missed_peak(measure: Measure, best: Result, samples: int) -> float:
     """Return how much a peak of a design may be over its samples, wherever these stand (F7) [SI]."""
     signals = best.final.signals(measure.load)
-    rebased = over(common_base([signal.repeats() for signal in signals]), signals)
-    counted = [selected(measure, signal, best.final.engine) for signal in rebased]
+    rebased = with_common_base(common_base([signal.repeat_order() for signal in signals]), signals)
+    counted = [narrow_signal(measure, signal, best.final.engine) for signal in rebased]
     steps = max(samples // measure.norm.refinement, 1)
     return measure.norm.sampling_bound(counted, measure.shares(best.problem.points), steps, 2 * samples)
 
@@ -205,7 +205,7 @@ def search_throws(
     zero_level = numerical_zero(problem)
     is_proven = best is not None and best.value - floor <= gap_tolerance_of(best.value, problem.tolerance, zero_level)
     # gas beside a shaft of a ratio that is no whole number does not repeat after a working cycle
-    repeats = not problem.feels_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
+    repeats = not problem.depends_on_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
     if is_proven or not repeats or not problem.objective:
         return None
     windows = windows_of(problem, phasing)
@@ -273,7 +273,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         lost = 0.0
         for term in self._problem.objective:
             if averages(problem, term.measure):
-                signals = over(problem.engine.cycle.base_order, final.signals(term.measure.load))
+                signals = with_common_base(problem.engine.cycle.base_order, final.signals(term.measure.load))
                 short = [averaged(problem, term.measure, signal, samples) for signal in signals]
                 # of a mean the rows between are as good, of a peak they are not there
                 steps = 4 * samples if term.measure.norm.averages else samples

@@ -28,7 +28,7 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     firing = firing_bounds(phasing)
     is_free = allowed.minimum <= 0.0 and allowed.maximum >= phasing.cycle.angle
-    if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.feels_gas:
+    if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.depends_on_gas:
         # in which order they fire makes no difference
         return [firing.anywhere]
     # of four images one stays
@@ -47,7 +47,7 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
             )
         ]
     if len(windows) > MOST_WINDOWS:
-        return [firing.anywhere] if phasing.throw_bounds is not None and not problem.feels_gas else None
+        return [firing.anywhere] if phasing.throw_bounds is not None and not problem.depends_on_gas else None
     return windows
 
 

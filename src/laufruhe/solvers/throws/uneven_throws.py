@@ -17,9 +17,9 @@ from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import in_time
+from laufruhe.numerics.budget import until_time_limit
 from laufruhe.numerics.progress import report_progress
-from laufruhe.problem.decision import columns_of
+from laufruhe.problem.decision import projected_vector
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -64,7 +64,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         Result of the even stars, ranked; None where none exists or throws have bounds of
         their own.
     """
-    starts = starts_of(phasing, even, problem.feels_gas)
+    starts = starts_of(phasing, even, problem.depends_on_gas)
     if not starts:
         why, proven = why_none_fires(phasing)
         if proven:
@@ -72,14 +72,18 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     shares = TRADE_STEPS if phasing.thorough and even is not None and phasing.intervals.maximum < math.inf else (1.0,)
     designs: list[StarDesign] = []
     trade: list[TradePoint] = []
-    for k, share in enumerate(in_time(shares)):
+    for k, share in enumerate(until_time_limit(shares)):
         report_progress("shares of the deviation allowed", k, len(shares), designs[0].value if designs else math.inf)
         mean, allowed = phasing.even_interval, phasing.intervals
         allowed = Intervals(mean - share * (mean - allowed.minimum), mean + share * (allowed.maximum - mean))
         # what is best with less freedom is a start, so that more of it is never worse
         chosen = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]
         cranks = dict.fromkeys([*(design.candidate for design in designs[:1]), *chosen])
-        optima = [answer for crank in in_time(cranks) if (answer := local_optimum(phasing, crank, allowed)) is not None]
+        optima = [
+            answer
+            for crank in until_time_limit(cranks)
+            if (answer := local_optimum(phasing, crank, allowed)) is not None
+        ]
         designs = sorted(optima, key=lambda answer: answer.value)
         if designs and len(shares) > 1:
             trade.append(_trade_point(problem, phasing, allowed, designs[0]))
@@ -240,7 +244,7 @@ def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]
     # a star that is its own mirror image may be a saddle
     columns = np.zeros(smooth.columns)
     if best is not None and smooth.columns:
-        columns = columns_of(smooth.domains, unbalances_of(smooth.problem, best.result))
+        columns = projected_vector(smooth.domains, unbalances_of(smooth.problem, best.result))
     turns = np.zeros(0 if smooth.moves is None else smooth.moves.size)
     nudges = np.random.default_rng(1964).standard_normal((2, len(turns) + len(columns)))
     nudges *= 0.02 * np.concatenate([np.full(len(turns), TURN), *(np.full(d.width, d.scale) for d in smooth.domains)])

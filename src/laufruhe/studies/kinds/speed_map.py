@@ -22,7 +22,7 @@ from laufruhe.physics.elastic_mounts import ResonanceError
 from laufruhe.present import picture as p
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, selected
+from laufruhe.problem.measure import Measure, narrow_signal
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
@@ -223,7 +223,7 @@ def _speed_curves(
             continue
         values[:, k] = [evaluation.value(measure) for measure in measures]
         if by_order and isinstance(channel, LoadChannel):
-            signal = selected(measures[0], channel.signal(evaluation.loads[0]), evaluation.engine)
+            signal = narrow_signal(measures[0], channel.signal(evaluation.loads[0]), evaluation.engine)
             amplitudes = order_amplitude(signal.coefficients).max(axis=1)
             for order, size in zip(signal.orders, amplitudes, strict=True):
                 sizes.setdefault(float(order), np.zeros(len(speeds)))[k] = size
@@ -236,7 +236,7 @@ def _speed_curves(
 def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Array, own: float) -> list[float]:
     lowest = np.full(len(speeds), own)
     for limit in problem.limits:
-        if replace(limit.measure, points=None) == measure and limit.measure.counts_point(load):
+        if replace(limit.measure, points=None) == measure and limit.measure.includes_point(load):
             there = (speeds == load.speed) | (limit.measure.points is None)
             lowest[there] = np.minimum(lowest[there], limit.maximum)
     return [float(value) if math.isfinite(value) else math.nan for value in lowest]
