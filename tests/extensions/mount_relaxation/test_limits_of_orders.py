@@ -122,7 +122,7 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
         sizes = []
         for each in (order, replace(order, omega=0.0)):
             line, _ = box._state(each, UNBOUNDED)
-            v = np.concatenate([[1.0], boxes.basis.near, np.zeros(line.size - 1 - line.columns)])
+            v = np.concatenate([[1.0], boxes.basis.reference, np.zeros(line.size - 1 - line.columns)])
             sizes.append(float(np.linalg.norm(line.forces @ v) * line.unit))
         found.append(sizes[0] / sizes[1])
     assert max(found) == pytest.approx(value, rel=1e-7)

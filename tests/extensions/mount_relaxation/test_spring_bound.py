@@ -406,7 +406,7 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
     # about the best of them, its place held
     held = [*("position" in d.name for d in problem.mount_decisions), False, False, False]
     width = np.where(held, 0.0, 1e-3 * (high - low))
-    near = np.clip(boxes.near, low + width, high - width)
+    near = np.clip(boxes.reference, low + width, high - width)
     bound = boxes.relax(near - width, near + width)[0]
     # the unbalances may cancel the one order that others than root mean squares are shown by
     assert (0.3 * minimum if norm == "rms" else 0.0) <= bound <= minimum
@@ -502,7 +502,7 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
             # chords are over what they cover by what is told of them, and by nothing at their ends
             over = high.looseness(numbers)
             assert np.all(over >= 0.0)
-            assert over.sum() <= sum(chord.bound(numbers).near for chord in high.chords)
+            assert over.sum() <= sum(chord.bound(numbers).at_reference for chord in high.chords)
             tight = max(tight, felt / line.largest)
     assert tight > 0.3
 
@@ -613,7 +613,7 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
             told = linear_sum(whole, weights, near)
             true = float(np.sum(weights * mounting.springs))
             assert told.constant + told.slopes @ near == pytest.approx(true, rel=1e-9)
-            assert told.near == pytest.approx(true, rel=1e-9)
+            assert told.at_reference == pytest.approx(true, rel=1e-9)
         load = generator.normal(size=(6, 2)) @ [1.0, 1.0j]
         for m, (motion, spring) in enumerate(zip(mounting.motions, mounting.springs, strict=True)):
             travel = motion @ whole.root.T @ load

@@ -123,7 +123,7 @@ def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
                 assert evaluation.value(measure) >= cut.bound * (1.0 - 1e-9)
                 assert np.all(cut.lower <= x)
                 assert np.all(x <= cut.upper)
-        known = cut.known if cut is not None else known
+        known = cut.multipliers if cut is not None else known
     assert kept > 5
 
 

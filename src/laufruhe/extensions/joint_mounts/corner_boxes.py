@@ -201,50 +201,54 @@ class DesignBoxes:
 
     def _mixed(self, loop: _BalancedLoop, violations: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
         """Return the bound by multipliers of all vertices, and the index of the side to halve."""
-        near = np.mean([corner.columns for corner in corners], axis=0)
-        loaded_loop = self._loaded(loop, near)
+        centre = np.mean([corner.columns for corner in corners], axis=0)
+        loaded_loop = self._loaded(loop, centre)
         ends = np.array([domain.ends for domain in self.loads.domains for _ in range(domain.width)]).reshape(-1, 2)
-        reach = np.append(1.0, np.abs(ends - near[:, None]).max(axis=1))
-        quadratics, rests = zip(*(self._expanded(corner.pairing, loaded_loop, near) for corner in corners), strict=True)
-        rest = np.array(rests) @ reach
-        if not (np.isfinite(rest).all() and np.isfinite(quadratics).all()):
+        reach = np.append(1.0, np.abs(ends - centre[:, None]).max(axis=1))
+        quadratics, rests = zip(
+            *(self._expanded(corner.pairing, loaded_loop, centre) for corner in corners), strict=True
+        )
+        remainder = np.array(rests) @ reach
+        if not (np.isfinite(remainder).all() and np.isfinite(quadratics).all()):
             return 0.0, int(np.argmax(loop.scores(np.ones_like(self._counted))))
         mixes = np.einsum("vkp,kcp->vc", mixed(loop.count), np.array(quadratics), optimize=True)
-        minimum = np.array([line[0] + self.minimum(line[1:], near) for line in mixes])
+        minimum = np.array([line[0] + self.minimum(line[1:], centre) for line in mixes])
         # weights of vertices add up to one, so the remainder is at most that of the worst vertex
-        minimum = priced(minimum, violations) - rest.sum(axis=1).max()
-        scores = _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ rest[rest.sum(axis=1).argmax()]
+        minimum = priced(minimum, violations) - remainder.sum(axis=1).max()
+        scores = (
+            _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ remainder[remainder.sum(axis=1).argmax()]
+        )
         return max(float(minimum.min()), 0.0), int(np.argmax(scores))
 
     def expanded(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
         """Return the unbalances at the lower vertex of a box, and the bound about these as `_expanded` does."""
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
-        near = self.corner(lower).columns
-        return near, *self._expanded(pairing, self._loaded(_BalancedLoop.from_loop(loop, len(lower)), near), near)
+        centre = self.corner(lower).columns
+        return centre, *self._expanded(pairing, self._loaded(_BalancedLoop.from_loop(loop, len(lower)), centre), centre)
 
-    def _loaded(self, loop: _BalancedLoop, near: Array) -> _LoadedLoop:
+    def _loaded(self, loop: _BalancedLoop, centre: Array) -> _LoadedLoop:
         loads = self.loads.orders.loads
-        fixed = loads[:, :1] + np.einsum("q,wqi->wi", near, loads[:, 1:])[:, None]
+        fixed = loads[:, :1] + np.einsum("q,wqi->wi", centre, loads[:, 1:])[:, None]
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
-    def _expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, near: Array) -> tuple[Array, Array]:
+    def _expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, centre: Array) -> tuple[Array, Array]:
         # bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)
-        powers, rest = (
-            np.zeros((1 + len(near), 1 + loaded_loop.count + loaded_loop.count**2)),
+        powers, remainder = (
+            np.zeros((1 + len(centre), 1 + loaded_loop.count + loaded_loop.count**2)),
             np.zeros(loaded_loop.loads.shape[:2]),
         )
         if pairing is None:
-            return powers, rest
-        powers[0, 0], powers[1:, 0] = pairing.constant + pairing.slopes @ near, pairing.slopes
+            return powers, remainder
+        powers[0, 0], powers[1:, 0] = pairing.constant + pairing.slopes @ centre, pairing.slopes
         for duals, maps in ((pairing.forces, loaded_loop.loop.forces), (pairing.travels, loaded_loop.loop.travels)):
             if duals.any():
                 added_powers, added_rest = loaded_loop.paired(duals.conj(), maps)
-                powers, rest = powers + added_powers, rest + added_rest
-        return powers, rest
+                powers, remainder = powers + added_powers, remainder + added_rest
+        return powers, remainder
 
-    def minimum(self, slopes: Array, near: Array) -> float:
-        """Return min g . (u - near) over the sets of unbalances."""
-        return float(sum(domain.minimum(slopes) for domain in self.loads.domains) - slopes @ near)
+    def minimum(self, slopes: Array, centre: Array) -> float:
+        """Return min g . (u - centre) over the sets of unbalances."""
+        return float(sum(domain.minimum(slopes) for domain in self.loads.domains) - slopes @ centre)
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,8 +309,8 @@ class _LoadedLoop:
         self._inputs = np.einsum("wmi,wci->wcm", self.loop.inputs, loads, optimize=True)
         size = np.abs(self._inputs) * self._balance[:, None]
         # a column without loads has no motion
-        rest = rest_of(balanced_loop.gain[:, None], balanced_loop.maximum[:, None], size)
-        self._rest = np.where(size.any(axis=-1), rest, 0.0)
+        remainder = rest_of(balanced_loop.gain[:, None], balanced_loop.maximum[:, None], size)
+        self._rest = np.where(size.any(axis=-1), remainder, 0.0)
 
     def paired(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
         """Return sums over orders of Z* f by columns and (1, s, s s'), and remainders, shape (w, 1 + columns)."""
@@ -317,8 +321,8 @@ class _LoadedLoop:
         pairs = -np.einsum("wm,wmk,wck->cmk", weights, self.loop.gain, self._inputs, optimize=True).real
         second = np.einsum("cmk,mi,kj->cij", pairs, self._incidence, self._incidence, optimize=True)
         size = np.linalg.norm(weights / self._balance, axis=-1)[:, None]
-        rest = np.where(size > 0.0, size * self._rest, 0.0)
-        return np.column_stack([constant, first, second.reshape(len(constant), -1)]), np.asarray(rest)
+        remainder = np.where(size > 0.0, size * self._rest, 0.0)
+        return np.column_stack([constant, first, second.reshape(len(constant), -1)]), np.asarray(remainder)
 
 
 def _adjacent(places: Sequence[Array], corners: Sequence[Corner | None], k: int) -> Corner:
@@ -340,8 +344,8 @@ def _concavity(values: Array) -> Array:
 class _VertexBranching(BatchBisection):
     """Branch and bound with designs at vertices as incumbents."""
 
-    def __init__(self, search: DesignBoxes, gap_tolerance: float, known: Witness | None = None) -> None:
-        super().__init__(search, search.value, gap_tolerance, known)
+    def __init__(self, search: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> None:
+        super().__init__(search, search.value, gap_tolerance, witness)
         self._boxes = search
 
     def propose(self, _: Box) -> None:
@@ -349,15 +353,15 @@ class _VertexBranching(BatchBisection):
         self.value = min(self.value, self._boxes.value)
 
 
-def designed_bound(boxes: DesignBoxes, gap_tolerance: float, known: Witness | None = None) -> BoxResult:
+def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> BoxResult:
     """Return the bound of a problem that `mixes_corners`, by boxes until the gap tolerance or the budget is reached."""
-    branching = _VertexBranching(boxes, gap_tolerance, known)
+    branching = _VertexBranching(boxes, gap_tolerance, witness)
     maximum = boxes.max_boxes
     if not maximum:
         return BoxResult(0.0, 0)
     result = branching.run(branching.bound_boxes([(boxes.lower, boxes.upper)])[0], maximum)
-    if known is not None:
-        check_near_witness(ThinBoxBounder(boxes, boxes.lower, boxes.upper), known.place, known)
+    if witness is not None:
+        check_near_witness(ThinBoxBounder(boxes, boxes.lower, boxes.upper), witness.place, witness)
     return result
 
 

@@ -71,7 +71,7 @@ def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
 
 
 def load_bounds(
-    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], known: Witness | None = None,
+    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None,
     throws: OpenThrows | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
     """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance`.
@@ -82,7 +82,7 @@ def load_bounds(
         Objective of the incumbent, and absolute gap tolerance [SI].
     shares
         Shares of the box budget, one bound after each.
-    known
+    witness
         Incumbent by numbers of mounts, columns of unbalances and open throws, to check bounds.
     throws
         Open throws.
@@ -93,7 +93,7 @@ def load_bounds(
     maximum = boxes.max_boxes
     if maximum and boxes.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
-        yield from bisect_in_stages(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, known)
+        yield from bisect_in_stages(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, witness)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
@@ -200,16 +200,16 @@ class LoadBoxes:
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         box = self._box(lower, upper)
-        near = self._nearest(box)
+        points = self._nearest(box)
         lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
         scores, size = np.zeros_like(lower), np.zeros(len(lower))
         for weight, measure in self._terms:
-            bound = self._under(box, measure, near, False)
+            bound = self._under(box, measure, points, False)
             lines.add(weight, bound, self._left_out.get(measure, 0.0))
             scores, size = scores + weight * box.scores(bound), size + weight * np.abs(bound.value)
         scores = scores / np.where(size > 0.0, size, 1.0)[:, None]
         for maximum, measure in self._limits:
-            bound = self._under(box, measure, near, True)
+            bound = self._under(box, measure, points, True)
             lines.add_limit(bound, self._left_out.get(measure, 0.0), maximum)
             scores = scores + LIMITS * box.scores(bound) / (maximum or 1.0)
         widths = (upper - lower) / np.maximum(self.upper - self.lower, 1e-300)
@@ -246,12 +246,12 @@ class LoadBoxes:
             gradient = gradient + np.matmul(slopes.conj().swapaxes(1, 2), value[..., None])[..., 0].real
         return _least_squares(gram, gradient)
 
-    def _under(self, box: _Boxes, measure: Measure, near: Array, averaged: bool) -> LinearBound:
+    def _under(self, box: _Boxes, measure: Measure, points: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a measure at a point of each box, shape (boxes, numbers), as a lower bound."""
         if _is_affine(measure, self.problem):
-            return box.affine_under(measure, near, averaged and measure.norm.averages)
+            return box.affine_under(measure, points, averaged and measure.norm.averages)
         if is_ratio(measure):
-            running, resting = (box.response(FORCE, still) for still in (False, True))
+            running, resting = (box.response(FORCE, at_rest) for at_rest in (False, True))
             groups = groups_of(measure, self.problem.points, self._orders)
             ratio, scores = ratio_under(running, resting, groups)
             return LinearBound(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
@@ -266,9 +266,9 @@ class LoadBoxes:
                 response.rest * factors,
                 response.bends * row_factors,
             )
-        value = response.value + np.einsum("bwkr,bk->bwr", response.slopes, near)
+        value = response.value + np.einsum("bwkr,bk->bwr", response.slopes, points)
         bound = norm_under(self.problem, measure, replace(response, value=value), self._orders)
-        return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, near))
+        return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, points))
 
 
 class _Boxes:
@@ -294,12 +294,16 @@ class _Boxes:
         centres, halves = np.split(np.array([self._centres, self._halves[:, numbers:]]), [unbalances], axis=2)
         columns, throws = np.split(orders.loads[:, 1:], [unbalances], axis=1)
         fixed = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", centres[0], columns)[:, :, None]
-        moved = centres[1][:, None, :, None] * columns
+        column_loads = centres[1][:, None, :, None] * columns
         middles, half_angles = halves[0], halves[1]
-        turned = throws * np.exp(1j * orders.orders[:, None] * middles[:, None])[..., None]
-        middle, slope, rest = (part[..., None] for part in along_arcs(orders.orders[:, None] * half_angles[:, None]))
-        fixed = fixed + (middle * turned).sum(axis=2, keepdims=True)
-        self._columns: ComplexArray = np.concatenate([fixed, moved, 1j * slope * turned, rest * turned], axis=2)
+        throw_loads = throws * np.exp(1j * orders.orders[:, None] * middles[:, None])[..., None]
+        middle, slope, remainder = (
+            part[..., None] for part in along_arcs(orders.orders[:, None] * half_angles[:, None])
+        )
+        fixed = fixed + (middle * throw_loads).sum(axis=2, keepdims=True)
+        self._columns: ComplexArray = np.concatenate(
+            [fixed, column_loads, 1j * slope * throw_loads, remainder * throw_loads], axis=2
+        )
         sides = list(zip(lower[:, :numbers], upper[:, :numbers], strict=True))
         self._running = self._expanded([mount_loop(loads.problem, orders.omegas, *box) for box in sides])
         zero_speeds = np.zeros_like(orders.omegas)
@@ -314,23 +318,25 @@ class _Boxes:
         balance, balanced_gain, maximum = balanced(gain)
         numbers = loops[0].numbers
         sides = Sides(np.zeros((6, len(numbers))), numbers, self._numbers)
-        still = np.zeros((*gain.shape[:2], 6, len(numbers)), dtype=complex)
+        zero_response = np.zeros((*gain.shape[:2], 6, len(numbers)), dtype=complex)
         expansions = []
         for column in np.moveaxis(self._columns, 2, 0):
             channels_in = np.einsum("bwmi,bwi->bwm", inputs, column)
             size = np.abs(channels_in) * balance
             # a column without loads has no motion
-            rest = np.where(size.any(axis=-1), rest_of(balanced_gain, maximum, size), 0.0)
+            remainder = np.where(size.any(axis=-1), rest_of(balanced_gain, maximum, size), 0.0)
             ones = np.ones((len(gain), self._numbers))
-            expansions.append(Expansion(ones, ones, sides, column, still, gain, channels_in, balance, rest))
+            expansions.append(
+                Expansion(ones, ones, sides, column, zero_response, gain, channels_in, balance, remainder)
+            )
         return loops, expansions
 
-    def response(self, measure: Measure, still: bool = False) -> LinearResponse:
-        """Return forces or travel of a measure times its direction weights; static forces if `still`."""
+    def response(self, measure: Measure, at_rest: bool = False) -> LinearResponse:
+        """Return forces or travel of a measure times its direction weights; static forces if `at_rest`."""
         rows, factors = counted_rows(self._loads.problem, measure)
-        key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), still)
+        key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), at_rest)
         if key not in self._cache:
-            loops, expansions = self._static if still and self._static is not None else self._running
+            loops, expansions = self._static if at_rest and self._static is not None else self._running
             parts = ((loop.travels if key[0] else loop.forces) for loop in loops)
             value, slope_maps = (
                 np.array(matrices)[:, :, rows] * factors[:, None] for matrices in zip(*parts, strict=True)
@@ -342,15 +348,21 @@ class _Boxes:
 
     def _together(self, responses: list[LinearResponse]) -> LinearResponse:
         """Return the sum of responses to fixed loads, columns, and remainders of throws, as one linear function."""
-        fixed, moved, throw_remainders = responses[0], responses[1 : 1 + self.columns], responses[1 + self.columns :]
+        fixed, column_responses, throw_remainders = (
+            responses[0],
+            responses[1 : 1 + self.columns],
+            responses[1 + self.columns :],
+        )
         value, (boxes, orders, rows) = fixed.value, fixed.value.shape
-        by_column = np.array([response.value for response in moved]).reshape(self.columns, boxes, orders, rows)
-        products = [response.slopes for response in moved]
+        by_column = np.array([response.value for response in column_responses]).reshape(
+            self.columns, boxes, orders, rows
+        )
+        products = [response.slopes for response in column_responses]
         slopes = np.concatenate([fixed.slopes, np.moveaxis(by_column, 0, 2), *products], axis=2)
-        rests = np.array([response.rest for response in moved]).reshape(self.columns, boxes, orders)
+        rests = np.array([response.rest for response in column_responses]).reshape(self.columns, boxes, orders)
         for k, response in enumerate(throw_remainders):
             rests[self._unbalances + k] += response.maximum
-        bends = fixed.bends + sum((response.bends for response in moved), np.zeros_like(fixed.bends))
+        bends = fixed.bends + sum((response.bends for response in column_responses), np.zeros_like(fixed.bends))
         # halving unbalances cannot make a diverging series converge
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)
         return LinearResponse(value, slopes, fixed.rest + rests.sum(axis=0), bends)
@@ -363,17 +375,17 @@ class _Boxes:
         shared = np.concatenate([products.sum(axis=1), products.sum(axis=2)], axis=1)
         return np.asarray(np.nan_to_num(bound.bends, posinf=1e300) + 0.5 * shared)
 
-    def affine_under(self, measure: Measure, near: Array, averaged: bool) -> LinearBound:
+    def affine_under(self, measure: Measure, points: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
         norm, columns = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self._unbalances)
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]
-        value, slopes = np.zeros(len(near)), np.zeros((len(near), self.count))
-        for k, t in enumerate(near[:, columns]):
+        value, slopes = np.zeros(len(points)), np.zeros((len(points), self.count))
+        for k, t in enumerate(points[:, columns]):
             z = norm.dual_feasible(norm.subgradient(centres[k] + halves[k] * t))
             gradient = norm.pullback(z)
             value[k] = float(np.vdot(z, norm.constant)) + gradient @ centres[k]
             slopes[k, columns] = gradient * halves[k]
-        return LinearBound(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))
+        return LinearBound(value, slopes, np.zeros(len(points)), np.abs(slopes[:, : self.lower.shape[1]]))
 
 
 def _shared(expansion: Expansion, response: LinearResponse) -> LinearResponse:

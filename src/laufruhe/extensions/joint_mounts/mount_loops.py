@@ -233,8 +233,8 @@ class _Spring:
         # for every open direction of the position: its number, the axes across, and their arms
         directions = []
         for axis, j, h in self._open(POSITION):
-            across = np.delete(np.eye(3), axis, axis=0)
-            directions.append((j, across, h * np.cross(across, np.eye(3)[axis])))
+            axes_across = np.delete(np.eye(3), axis, axis=0)
+            directions.append((j, axes_across, h * np.cross(axes_across, np.eye(3)[axis])))
         return directions
 
     def _motion(self, centre: Array) -> Array:
@@ -243,23 +243,23 @@ class _Spring:
     def travel(self, signals: _Signals, root: Array, centre: Array) -> ComplexArray:
         """Return the travel of the mount, shape (w, 3, 6 + channels)."""
         travel = signals.motion(self._motion(centre) @ root.T)
-        for j, across, arms in self._across():
-            travel = travel + arms.T @ signals.channel(signals.motion(across @ root.T[3:]), j)
+        for j, axes_across, arms in self._across():
+            travel = travel + arms.T @ signals.channel(signals.motion(axes_across @ root.T[3:]), j)
         return travel
 
     def force(self, signals: _Signals, travel: ComplexArray) -> ComplexArray:
         """Return the force of the spring, shape (w, 3, 6 + channels)."""
-        along = self._turned(signals, travel, -1.0)
+        own_travel = self._turned(signals, travel, -1.0)
         moving, omegas = (self._omegas > 0.0)[:, None, None], self._omegas[:, None, None]
-        elastic = self._numbers[STIFFNESS, None] * along
+        elastic = self._numbers[STIFFNESS, None] * own_travel
         for axis, j, h in self._open(STIFFNESS):
-            elastic[:, [axis]] += signals.channel(h * along[:, [axis]], j)
+            elastic[:, [axis]] += signals.channel(h * own_travel[:, [axis]], j)
         loss = moving * self._numbers[LOSS] + omegas * self._numbers[LAG]
         force = (1.0 + 1j * loss) * elastic + (
             self._static[:, None] + 1j * omegas * self._numbers[DAMPING, None]
-        ) * along
+        ) * own_travel
         for axis, j, h in self._open(DAMPING):
-            force[:, [axis]] += 1j * omegas * signals.channel(h * along[:, [axis]], j)
+            force[:, [axis]] += 1j * omegas * signals.channel(h * own_travel[:, [axis]], j)
         for _, j, h in self._open(slice(LOSS, LOSS + 1)):
             force = force + 1j * moving * signals.channel(h * elastic, j)
         return self._turned(signals, force, 1.0)
@@ -284,6 +284,6 @@ class _Spring:
     def wrench_on_body(self, signals: _Signals, force: ComplexArray, root: Array, centre: Array) -> ComplexArray:
         """Return the wrench of a force in coordinates with unit mass, shape (w, 6, 6 + channels)."""
         moment = self._motion(centre)[:, 3:].T @ force
-        for j, across, arms in self._across():
-            moment = moment + across.T @ signals.channel(arms @ force, j)
+        for j, axes_across, arms in self._across():
+            moment = moment + axes_across.T @ signals.channel(arms @ force, j)
         return np.asarray(root[:, :3] @ force + root[:, 3:] @ moment)

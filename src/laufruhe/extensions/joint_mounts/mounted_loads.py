@@ -62,12 +62,12 @@ class MountedLoads:
 
     def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
         self.problem, self._throws = problem, throws
-        known = off_resonance(problem)
-        self._model = AffineModel(known, keep_all=True)
-        samples = problem.fidelity.samples * known.engine.cycle.base_order
+        bounded_problem = off_resonance(problem)
+        self._model = AffineModel(bounded_problem, keep_all=True)
+        samples = problem.fidelity.samples * bounded_problem.engine.cycle.base_order
         if throws or self._model.full_samples * self._model.base != samples:
             # rows have the samples of the exact model
-            self._model = AffineModel(known, keep_all=True, whole_cycle=True)
+            self._model = AffineModel(bounded_problem, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
         self.root = mass_root(mounting_in(problem.engine).block)
         self._still: dict[tuple[Measure, bool], AffineNorm] = {}
@@ -75,14 +75,14 @@ class MountedLoads:
     @cached_property
     def orders(self) -> LoadedOrders:
         """Orders with loads: wrenches of fixed loads, of each unit column, and of each open throw at angle zero."""
-        moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
+        wrench_map = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
         angles = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (constant, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
             base, series = stacked_coefficients(
                 [constant, *slopes, *(self._throws.wrenches(p) if self._throws else ())]
             )
-            loads = series @ moved
+            loads = series @ wrench_map
             waves = np.exp(1j * float(base) * np.outer(angles, np.arange(loads.shape[1])))
             loads[0] -= np.einsum("pk,pki->ki", waves, loads[1 + len(slopes) :])
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)

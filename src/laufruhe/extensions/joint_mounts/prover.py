@@ -46,10 +46,10 @@ def load_answers(question: Question) -> Iterator[BoxResult]:
     """Yield bounds by boxes of mounts and unbalances; stop early if another prover has the better bound."""
     if question.of_many:
         return
-    problem, known = question.problem, _known(question)
+    problem, witness = question.problem, _witness(question)
     # a problem of one number needs few boxes
     shares = (1.0,) if len(problem.decisions) == 1 else (EARLY, 1.0)
-    for result in load_bounds(problem, question.value, question.room, shares, known):
+    for result in load_bounds(problem, question.value, question.room, shares, witness):
         yield replace(result, places=())
         if result.bound < question.bound:
             return
@@ -59,22 +59,22 @@ def throw_answers(question: Question) -> Iterator[BoxResult]:
     """Yield one bound by boxes of throws, mounts and unbalances, for any firing order (E72)."""
     throws = None if question.moves is None else throws_at(question.problem, *question.moves)
     if throws is not None:
-        known = _known(question)
-        if known is not None:
-            known = replace(known, place=np.append(known.place, throws.given[throws.open]))
-        yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), known, throws)
+        witness = _witness(question)
+        if witness is not None:
+            witness = replace(witness, place=np.append(witness.place, throws.given[throws.open]))
+        yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), witness, throws)
 
 
-def _known(question: Question) -> Witness | None:
+def _witness(question: Question) -> Witness | None:
     # place of the known design: numbers of mounts, then columns of unbalances
-    known, problem = question.known, question.problem
-    if known is None:
+    witness, problem = question.known, question.problem
+    if witness is None:
         return None
     pairs = zip(question.near, problem.decisions, strict=True)
     columns = decision_vector(
         domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine]
     )
-    return replace(known, place=np.append(known.place, columns))
+    return replace(witness, place=np.append(witness.place, columns))
 
 
 CORNERS = Prover("boxes of mounts, with unbalances", mixes_corners, corner_answers, "boxes of stiffness")

@@ -63,28 +63,28 @@ class _Rest:
         return np.asarray(np.linalg.eigh(0.5 * (self.at.middle + self.at.middle.T))[1], dtype=np.float64)
 
 
-def _sag(limit: Limit, rest: _Rest) -> list[Array]:
-    maximum = limit.maximum * rest.weight * (1.0 + SLACK)
+def _sag(limit: Limit, block: _Rest) -> list[Array]:
+    maximum = limit.maximum * block.weight * (1.0 + SLACK)
     if not 0.0 < maximum < math.inf:
         return []
-    y = np.asarray(np.linalg.solve(rest.at.middle, rest.pull), dtype=np.float64)
-    form, remainder = rest.form(y)
-    return [(2.0 * float(rest.pull @ y) - form - remainder - maximum) / maximum]
+    y = np.asarray(np.linalg.solve(block.at.middle, block.pull), dtype=np.float64)
+    form, remainder = block.form(y)
+    return [(2.0 * float(block.pull @ y) - form - remainder - maximum) / maximum]
 
 
-def _frequencies(limit: Limit, rest: _Rest) -> list[Array]:
+def _frequencies(limit: Limit, block: _Rest) -> list[Array]:
     violations = []
     if limit.minimum > 0.0:
-        minimum, (form, remainder) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
+        minimum, (form, remainder) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, block.form(block.motions[:, 0])
         violations.append((minimum - form - remainder) / minimum)
     if limit.maximum < math.inf:
-        maximum, (form, remainder) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
+        maximum, (form, remainder) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, block.form(block.motions[:, -1])
         violations.append((form - remainder - maximum) / maximum)
     return violations
 
 
-def _stiffness(limit: Limit, rest: _Rest) -> list[Array]:
-    total, edges = coefficients(rest.count) @ rest.stiffness, ((1.0, limit.maximum), (-1.0, limit.minimum))
+def _stiffness(limit: Limit, block: _Rest) -> list[Array]:
+    total, edges = coefficients(block.count) @ block.stiffness, ((1.0, limit.maximum), (-1.0, limit.minimum))
     return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
 
 
@@ -117,9 +117,9 @@ class RestLimits:
         total = [float(ends[:, STIFFNESS].sum()) for ends in number_ranges(self._problem, lower, upper)]
         stiffness = [[0.5 * sum(total)], 0.5 * (upper - lower) * self._stiffness_slopes, np.zeros(len(lower) ** 2)]
         stiffness_matrix = open_stiffness(self._problem, lower, upper)
-        rest = _Rest(len(lower), stiffness_matrix, self._pull, self._weight, np.concatenate(stiffness))
+        block = _Rest(len(lower), stiffness_matrix, self._pull, self._weight, np.concatenate(stiffness))
         return [
             coefficients_of_limit
             for limit in self._limits
-            for coefficients_of_limit in OVER[limit.measure.channel](limit, rest)
+            for coefficients_of_limit in OVER[limit.measure.channel](limit, block)
         ]

@@ -78,7 +78,7 @@ class BoxRelaxation:
         self.parts = search.parts(lower, upper)
         self.mounts = self.parts[0]
         self._solution_s = np.zeros(self.mounts.numbers)
-        self._near = search.near_numbers(self.mounts, lower, upper)
+        self._reference = search.reference_numbers(self.mounts, lower, upper)
         self._stated: dict[int, tuple[Response, list[MomentConstraint]]] = {}
         self._multiple_bounds: dict[tuple[int, ...], list[list[LinearUpperBound]]] = {}
         self.modes = tuple(
@@ -174,7 +174,7 @@ class BoxRelaxation:
         return float(mean.prices.sum()) + mean.constant < (1.0 - LARGE) * size
 
     def _high_order(self, order: Order) -> HighOrder | None:
-        result = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._near)
+        result = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._reference)
         return None if self.query.is_travel or np.any(order.loads[1:]) or not result.is_above else result
 
     def _bounds_of(self, variable: EpigraphVariable) -> list[LinearUpperBound]:
@@ -185,7 +185,7 @@ class BoxRelaxation:
             upper = min(self.query.largest_sum(order, self.parts), len(self.query.mounts) * amplitude)
             bound = None if high_order is None else high_order.bound
             if bound is None:
-                bound = constant_bound(upper, self._near)
+                bound = constant_bound(upper, self._reference)
             else:
                 bound = bound.times(float(self.query.factors.max()))
                 bound = replace(bound, upper=min(upper, bound.largest))

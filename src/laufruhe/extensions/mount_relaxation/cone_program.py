@@ -259,9 +259,9 @@ class ConeProgram:
             matrix_of(part, tensor.shape[1])
             for part, tensor in zip(parts["matrices", number], mode.matrices, strict=True)
         ]
-        above, under = ([matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0))
+        upper_parts, lower_parts = ([matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0))
         (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
-        return ModeMultipliers(matrices, sides, -equal, corners, [*zip(above, under, strict=True)])
+        return ModeMultipliers(matrices, sides, -equal, corners, [*zip(upper_parts, lower_parts, strict=True)])
 
     def _cost(self, program: SdpProgram) -> Array:
         cost = np.zeros(int(self.modes[-1]))

@@ -118,17 +118,20 @@ class Limits:
         state
             Return the response to an order, and the constraints on its moments.
         """
-        terms, known = LimitTerms(), {_key(o): k for k, o in enumerate(o for v in variables for o in v.orders)}
+        terms, numbers_of_orders = (
+            LimitTerms(),
+            {_key(o): k for k, o in enumerate(o for v in variables for o in v.orders)},
+        )
         all_responses = list(responses)
 
         def number(order: Order, bound: ResponseBound) -> int:
-            if _key(order) not in known:
+            if _key(order) not in numbers_of_orders:
                 response, constraints = state(order, bound)
-                known[_key(order)] = len(all_responses)
+                numbers_of_orders[_key(order)] = len(all_responses)
                 terms.constraints += [replace(constraint, order=len(all_responses)) for constraint in constraints]
                 terms.responses.append(response)
                 all_responses.append(response)
-            return known[_key(order)]
+            return numbers_of_orders[_key(order)]
 
         for limit in self.norms:
             for variable in limit.variables:
@@ -154,14 +157,14 @@ def _key(order: Order) -> tuple[int, int, int, bool]:
 
 
 def limits_of(
-    problem: Problem, known: Evaluation, in_parts: Callable[[Measure], MeasureOrders],
+    problem: Problem, evaluation: Evaluation, in_parts: Callable[[Measure], MeasureOrders],
     of_all_motions: Callable[[Measure], MeasureOrders],
 ) -> Limits:  # fmt: skip
     """Return the limits that the best design comes near.
 
     Parameters
     ----------
-    known
+    evaluation
         The best design.
     in_parts
         Return the orders of a measure, each in the symmetric parts of the motions if there are such (E57).
@@ -170,14 +173,14 @@ def limits_of(
     """
     norms: list[NormLimit] = []
     for limit in problem.limits:
-        if limit.measure.on_mounts and NEAR_LIMIT * limit.maximum <= known.value(limit.measure) < math.inf:
+        if limit.measure.on_mounts and NEAR_LIMIT * limit.maximum <= evaluation.value(limit.measure) < math.inf:
             query = in_parts(limit.measure)
             if query.orders and query.is_sampled_fully:
                 norms.append(NormLimit(query, (), limit.maximum * (1.0 + SLACK)))
     ratios: list[RatioLimit] = []
     for limit in problem.mount_limits:
         measure = limit.measure
-        if not measure.channel.depends_on_loads or known.value(measure) < NEAR_LIMIT * limit.maximum:
+        if not measure.channel.depends_on_loads or evaluation.value(measure) < NEAR_LIMIT * limit.maximum:
             continue
         query = of_all_motions(Measure(channels.MOUNT_FORCE, RMS, points=measure.points, orders=measure.orders))
         for point in query.points:

@@ -65,10 +65,10 @@ def mode_basis(root: Array, motion: int, share: float) -> Array:
     length = float(momentum @ momentum)
     middle = displacement / (2.0 * share) + momentum * (1.0 - 0.5 / share) / length
     squared_radius = float(displacement @ displacement) / (4.0 * share**2) - (1.0 - 0.5 / share) ** 2 / length
-    across = np.linalg.svd(momentum[None])[2][1:].T
+    null_space = np.linalg.svd(momentum[None])[2][1:].T
     # a radius of zero would make V singular
     radius = math.sqrt(max(squared_radius, NO_SIZE * float(middle @ middle)))
-    return np.column_stack([middle, radius * across])
+    return np.column_stack([middle, radius * null_space])
 
 
 def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Array) -> ModeConstraints:

@@ -31,19 +31,22 @@ class LinearUpperBound:
         Coefficients of s, slopes of shape (numbers,).
     upper
         Upper bound over better designs.
-    near
+    at_reference
         Linear bound at the design of the box nearest to the best.
     """
 
     constant: float
     slopes: Array
     upper: float = math.inf
-    near: float = 0.0
+    at_reference: float = 0.0
 
     def __add__(self, other: LinearUpperBound) -> LinearUpperBound:
         """Return the bound of the sum of two numbers."""
         return LinearUpperBound(
-            self.constant + other.constant, self.slopes + other.slopes, self.upper + other.upper, self.near + other.near
+            self.constant + other.constant,
+            self.slopes + other.slopes,
+            self.upper + other.upper,
+            self.at_reference + other.at_reference,
         )
 
     @property
@@ -54,12 +57,12 @@ class LinearUpperBound:
     @property
     def tighter(self) -> LinearUpperBound:
         """The linear bound, or the constant one if it is smaller at the best design."""
-        return self if self.near < self.upper else constant_bound(self.upper, self.slopes)
+        return self if self.at_reference < self.upper else constant_bound(self.upper, self.slopes)
 
     def times(self, factor: float) -> LinearUpperBound:
         """Return the bound of a multiple; `factor` is not negative."""
         upper = factor * self.upper if factor else 0.0
-        return LinearUpperBound(factor * self.constant, factor * self.slopes, upper, factor * self.near)
+        return LinearUpperBound(factor * self.constant, factor * self.slopes, upper, factor * self.at_reference)
 
 
 def constant_bound(upper: float, slopes: Array) -> LinearUpperBound:
@@ -77,14 +80,14 @@ class HighOrder:
         r, shape (k,).
     omega
         Angular frequency [rad/s].
-    near
+    reference
         s of a design at which the bounds are tight, shape (numbers,).
     """
 
     mounts: OpenMounts
     load: ComplexArray
     omega: float
-    near: Array
+    reference: Array
 
     @property
     def is_above(self) -> bool:
@@ -105,20 +108,22 @@ class HighOrder:
     def bound(self) -> LinearUpperBound | None:
         """Upper bound of the sum of force amplitudes over all mounts of the problem [N]; None without one."""
         counts = (self.mounts.times**2)[self.mounts.spring_mounts]
-        traces = linear_sum(self.mounts, counts[:, None, None] * np.eye(3), self.near)
+        traces = linear_sum(self.mounts, counts[:, None, None] * np.eye(3), self.reference)
         weights = np.array([work_weight(self.mounts, m, self.load) for m in range(len(self.mounts.motions))])
-        work = linear_sum(self.mounts, weights, self.near)
+        work = linear_sum(self.mounts, weights, self.reference)
         # the root of traces times work is at most their weighted mean
-        sizes = [max(bound.near, 1e-9 * bound.largest) for bound in (traces, work)]
+        sizes = [max(bound.at_reference, 1e-9 * bound.largest) for bound in (traces, work)]
         if min(sizes) <= 0.0:
             return None
         ratio = math.sqrt(sizes[1] / sizes[0])
         by_work = traces.times(0.5 * ratio) + work.times(0.5 / ratio)
         spring_change = by_work.times(self._turning**2 * self.mounts.highest / self._distance / self.omega**2)
         zero = LinearUpperBound(0.0, np.zeros(self.mounts.numbers), 0.0)
-        free_mass = sum((chord.bound(self.near) for chord in self.chords), zero)
+        free_mass = sum((chord.bound(self.reference) for chord in self.chords), zero)
         return min(
-            by_work.times(self._turning / self._distance), free_mass + spring_change, key=lambda bound: bound.near
+            by_work.times(self._turning / self._distance),
+            free_mass + spring_change,
+            key=lambda bound: bound.at_reference,
         )
 
     @cached_property
@@ -158,18 +163,18 @@ class Chord:
     constant: float
     slopes: Array
 
-    def bound(self, near: Array) -> LinearUpperBound:
-        """Return the chord; `near` are the numbers s of a design, shape (numbers,)."""
+    def bound(self, reference: Array) -> LinearUpperBound:
+        """Return the chord; `reference` are the numbers s of a design, shape (numbers,)."""
         reach = float(np.abs(self.slopes).sum())
         low, high = self.constant - reach, self.constant + reach
         factor = (abs(high) - abs(low)) / (high - low) if high > low else 0.0
         constant, slopes = abs(low) + factor * (self.constant - low), factor * self.slopes
-        return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ near))
+        return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ reference))
 
     def looseness(self, s: Array) -> Array:
         """Return the excess of the chord at s, shared in proportion to the slopes, shape (numbers,)."""
         reach = np.abs(self.slopes)
-        excess = self.bound(s).near - abs(self.constant + float(self.slopes @ s))
+        excess = self.bound(s).at_reference - abs(self.constant + float(self.slopes @ s))
         return np.asarray(max(excess, 0.0) * reach / max(float(reach.sum()), 1e-300))
 
 
@@ -180,14 +185,14 @@ def _place_deflections(mounts: OpenMounts, m: int, load: ComplexArray) -> list[C
     ]  # fmt: skip
 
 
-def linear_sum(mounts: OpenMounts, weights: Array, near: Array) -> LinearUpperBound:
+def linear_sum(mounts: OpenMounts, weights: Array, reference: Array) -> LinearUpperBound:
     """Return the bound of sum <W, K> over springs, which is exact; `weights` W of shape (springs, 3, 3)."""
     slopes = np.zeros(mounts.numbers)
     for spring in mounts.springs:
         for j, matrix in spring.terms:
             slopes[j] += float(np.sum(weights[spring.mount] * (spring.axes @ matrix @ spring.axes.T)))
     constant = float(np.sum(weights * mounts.middles))
-    return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ near))
+    return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ reference))
 
 
 def work_weight(mounts: OpenMounts, number: int, load: ComplexArray) -> Array:
@@ -276,7 +281,7 @@ def mean_bound(
     )
     # the option with the largest bound at the best design
     chosen = [
-        max(choices, key=lambda option: option[0] * unit - option[1].near)
+        max(choices, key=lambda option: option[0] * unit - option[1].at_reference)
         for choices, unit in zip(options, units, strict=True)
     ]
     ratios = np.array([ratio for ratio, _, _ in chosen])

@@ -193,12 +193,12 @@ def is_lifted(problem: Problem) -> bool:
     if not mounts or unsupported:
         return False
     low, high = number_ranges(problem)
-    moved, turned = (np.any(low[:, part] < high[:, part], axis=1) for part in (POSITION, TURNED))
+    moves, turns = (np.any(low[:, part] < high[:, part], axis=1) for part in (POSITION, TURNED))
     are_fixed = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
     springs = every_spring(mounting_in(problem.engine).mounts)
     dynamic = np.array([bool(spring.dynamic) for _, spring in springs])
     # springs that depend on frequency must neither move nor turn
-    nonlinear = dynamic & (moved | turned)
+    nonlinear = dynamic & (moves | turns)
     return are_fixed and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
@@ -214,11 +214,11 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, frames: PlaneFrame
     # bounds by the ranges of numbers
     low, high, loss_floor, lag_floor, damping = (np.zeros((6, 6)) for _ in range(5))
     for m, motion in enumerate(motions):
-        moved = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
+        reach_of_places = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
         minimum, maximum = maps.bounds(m, STIFFNESS)
-        high += (1.0 + STRETCH * (moved > 0.0)) * carried(motion, maximum)
-        if moved > 0.0:
-            size = float(np.linalg.norm(maximum, 2)) * moved**2
+        high += (1.0 + STRETCH * (reach_of_places > 0.0)) * carried(motion, maximum)
+        if reach_of_places > 0.0:
+            size = float(np.linalg.norm(maximum, 2)) * reach_of_places**2
             high += (1.0 + 1.0 / STRETCH) * size * (root[:, 3:] @ root[:, 3:].T)
         else:
             stiffness = carried(motion, minimum)

@@ -142,31 +142,31 @@ class MeasureOrders:
 
 
 def measure_orders(
-    problem: Problem, measure: Measure, model: AffineModel, near: Evaluation, basis: tuple[UnbalanceBasis, Array],
+    problem: Problem, measure: Measure, model: AffineModel, reference: Evaluation, basis: tuple[UnbalanceBasis, Array],
     parts: Sequence[OpenMounts],
 ) -> MeasureOrders:  # fmt: skip
     """Return the orders of a measure, sorted by their size in the best design.
 
     Parameters
     ----------
-    near
+    reference
         The best design.
     basis
         Basis of the unbalances, and the middles of their columns.
     parts
         Mounts for all motions, then for each symmetry if there is one.
     """
-    moved = moved_wrench(NUMBERS, mounting_in(problem.engine).block.centre_of_gravity)
+    wrench_map = moved_wrench(NUMBERS, mounting_in(problem.engine).block.centre_of_gravity)
     base = problem.engine.cycle.base_order
-    signals = with_common_base(base, near.signals(measure.load))
+    signals = with_common_base(base, reference.signals(measure.load))
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     shares, points = measure.shares(problem.points), []
     for p, (point, (constant, slopes)) in enumerate(zip(problem.points, model.wrenches(), strict=True)):
         if shares[p] == 0.0:
             continue
-        coefficients = narrow_signal(measure, signals[p], near.engine).coefficients
+        coefficients = narrow_signal(measure, signals[p], reference.engine).coefficients
         step, series = stacked_coefficients([constant, *slopes], base)
-        loads = series @ moved.T
+        loads = series @ wrench_map.T
         loads[0] += np.einsum("q,qki->ki", basis[1], loads[1:])
         loads[1:] = np.einsum("cq,qki->cki", basis[0].domain_map, loads[1:])
         size = np.abs(loads @ parts[0].root.T).sum(axis=0).max(axis=1)
@@ -184,7 +184,7 @@ def measure_orders(
     has_one_base = all(signal.base == base for signal in signals)
     return MeasureOrders(
         measure, tuple(orders), tuple(chosen), np.array(measure.direction_weights or (1.0, 1.0, 1.0)), shares,
-        near.samples if has_one_base else 0,
+        reference.samples if has_one_base else 0,
         measure.norm.refinement > 1 and any(len(signal.kink_angles) for signal in signals),
     )  # fmt: skip
 
@@ -341,24 +341,34 @@ def _strongest(query: MeasureOrders, point: int, parts: Sequence[OpenMounts]) ->
     """
     order, *other_orders = [order for order in query.orders if order.point == point]
     norm, lengths = query.measure.norm, np.linalg.norm(order.signal, axis=1)
-    odd_multiples = [other for other in other_orders if other.index % (2 * order.index) == order.index]
+    odd_multiples = [
+        other_order for other_order in other_orders if other_order.index % (2 * order.index) == order.index
+    ]
     phases = query.samples // math.gcd(query.samples, order.index) if query.samples else 0
     is_square_wave = bool(phases) and query.samples % (2 * order.index) == 0 and not query.has_kinks
     if norm.sums_lengths:
         # by a sampled square wave, less odd multiples; otherwise by the cosine
         size = float(lengths.mean())
         factor = 2.0 / phases / math.tan(math.pi / phases) if is_square_wave else COSINE
-        multiples = tuple((other, other.index // order.index) for other in odd_multiples) if is_square_wave else ()
+        multiples = (
+            tuple((other_order, other_order.index // order.index) for other_order in odd_multiples)
+            if is_square_wave
+            else ()
+        )
         share = float(query.shares[point])
         return EpigraphVariable(
             (order,), share, factor * size or 1.0, 0.0, False, factor, multiples, phases if is_square_wave else 0
         )
     mean, swing = norm.is_largest_mean, 2.0 if norm.is_diameter else 1.0
     loss = sum(
-        query.largest_sum(other, parts)
+        query.largest_sum(other_order, parts)
         # weight in the sampled square wave
-        * (2.0 / phases / math.sin(math.pi * (other.index // order.index) / phases) if mean and is_square_wave else 1.0)
-        for other in odd_multiples
+        * (
+            2.0 / phases / math.sin(math.pi * (other_order.index // order.index) / phases)
+            if mean and is_square_wave
+            else 1.0
+        )
+        for other_order in odd_multiples
     )
     loss /= len(query.mounts) if mean else 1
     if mean:

@@ -216,15 +216,15 @@ class ParameterMaps:
 
     def _turning(self, m: int) -> tuple[Array, list[int]]:
         """Return the axes of a mount, shape (3, 3), and the indices of those that turn."""
-        middle, turned = self.middle(m), self.reach(m)[TURNED] > 0.0
-        if np.count_nonzero(turned) == 1:
+        middle, is_turned = self.middle(m), self.reach(m)[TURNED] > 0.0
+        if np.count_nonzero(is_turned) == 1:
             middle[TURNED] = self._frames[m, TURNED]
         axes = mount_axes(middle[TURNED])
-        if not turned.any():
+        if not is_turned.any():
             return axes, []
-        turned_test_axes = mount_axes(middle[TURNED] + TEST_ANGLE * turned)
+        turned_test_axes = mount_axes(middle[TURNED] + TEST_ANGLE * is_turned)
         fixed_axes = [i for i in range(3) if np.abs(turned_test_axes[i] - axes[i]).max() < AXIS_TOL]
-        if np.count_nonzero(turned) > 1 or len(fixed_axes) != 1:
+        if np.count_nonzero(is_turned) > 1 or len(fixed_axes) != 1:
             return np.eye(3), [0, 1, 2]
         return axes, [i for i in range(3) if i not in fixed_axes]
 
@@ -306,7 +306,7 @@ class ParameterMaps:
         turns = [(k, j, gain) for k in range(TURNED.start, TURNED.stop) for j, gain in self.drives[m].get(k, [])]
         axis, _, gain = turns[0]
         # mounts share a plane only if a single number turns it
-        turned = tuple((k, j, abs(gain)) for k, j, gain in turns) if len(turns) == 1 else (m, *turns)
+        turn_key = tuple((k, j, abs(gain)) for k, j, gain in turns) if len(turns) == 1 else (m, *turns)
         drives = [drive for k in number for drive in self.drives[m].get(int(k), [])]
         side = math.copysign(1.0, gain)
         angles = sorted(
@@ -316,7 +316,7 @@ class ParameterMaps:
         turned_angles[axis - TURNED.start] += side * TEST_ANGLE
         sign = math.copysign(1.0, float(mount_axes(turned_angles)[pair[0]] @ axes[pair[1]]))
         start = (*self.start[m, number], side * (self.start[m, axis] - self._frames[m, axis]))
-        key = (kind.start, tuple(drives), turned, tuple(round(float(entry), 9) for entry in start))
+        key = (kind.start, tuple(drives), turn_key, tuple(round(float(entry), 9) for entry in start))
         near_stiffness = self._frames[m, number]
         plane = PlaneStiffness(self.low[m, number], self.high[m, number], (angles[0], angles[1]), near_stiffness)
         return key, plane, sign
@@ -356,8 +356,8 @@ class ParameterMaps:
         places = []
         for (j, axis, *_), mounts in groups.items():
             is_damped = any(bool(np.any(self.low[m, DAMPING])) for m, _ in mounts)
-            number, across = self.numbers.index(("one", j), [j]), np.delete(np.eye(3), axis, axis=0)
-            places.append(PlaceTerm(number, np.eye(3)[axis], tuple(mounts), across, is_damped))
+            number, turn_axes = self.numbers.index(("one", j), [j]), np.delete(np.eye(3), axis, axis=0)
+            places.append(PlaceTerm(number, np.eye(3)[axis], tuple(mounts), turn_axes, is_damped))
         return tuple(places)
 
 
@@ -376,14 +376,14 @@ class PlaneStiffness:
         Ranges of k1 and k2 [N/m], shape (2,) each.
     angles
         Smallest and largest b [rad].
-    near
+    reference
         k1 and k2 of the design that defines the fixed axes [N/m].
     """
 
     low: Array
     high: Array
     angles: tuple[float, float]
-    near: Array
+    reference: Array
 
     @property
     def full_box(self) -> Array:
@@ -394,37 +394,38 @@ class PlaneStiffness:
         shares = [0.5 * (1.0 + cosine) for cosine in cosines]
         first = [(low1 * c + low2 * (1.0 - c), high1 * c + high2 * (1.0 - c)) for c in shares]
         second = [(low2 * c + low1 * (1.0 - c), high2 * c + high1 * (1.0 - c)) for c in shares]
-        across = [d * s for d in (0.5 * (low1 - high2), 0.5 * (high1 - low2)) for s in _sine_range(*doubled)]
+        off_diagonal = [d * s for d in (0.5 * (low1 - high2), 0.5 * (high1 - low2)) for s in _sine_range(*doubled)]
         ends = [(min(a for a, _ in values), max(b for _, b in values)) for values in (first, second)]
-        return np.array([*ends, (min(across), max(across))])
+        return np.array([*ends, (min(off_diagonal), max(off_diagonal))])
 
     def stiffness_range(self, box: Array) -> tuple[float, float]:
         """Return the smallest and the largest principal stiffness on a box, shape (3, 2) [N/m]."""
         (low1, low2), (high1, high2) = self.low, self.high
-        near, _, steep = self._polar(box)
+        along_range, _, slope = self._polar(box)
         # k1 - k2 has one sign on the whole box
-        if steep < math.inf and near[0] > 0.0:
+        if slope < math.inf and along_range[0] > 0.0:
             return low2, high1
-        if steep < math.inf and near[1] < 0.0:
+        if slope < math.inf and along_range[1] < 0.0:
             return low1, high2
         return min(low1, low2), max(high1, high2)
 
     def _polar(self, box: Array) -> tuple[tuple[float, float], tuple[float, float], float]:
-        half, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
-        along = 0.5 * (box[0] - box[1][::-1])
+        """Return ranges of (K11 - K22) / 2 and K12 along and across the middle angle 2b, and their largest ratio."""
+        half_width, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
+        differences = 0.5 * (box[0] - box[1][::-1])
         cosine, sine = math.cos(middle), math.sin(middle)
-        near = np.sort(np.outer([cosine, 0.0], along)[0]) + np.sort(sine * box[2])
-        aside = np.sort(-sine * along) + np.sort(cosine * box[2])
-        steep = math.tan(half) if half < 0.5 * math.pi - 1e-6 else math.inf
-        return (float(near[0]), float(near[1])), (float(aside[0]), float(aside[1])), steep
+        along_range = np.sort(np.outer([cosine, 0.0], differences)[0]) + np.sort(sine * box[2])
+        across_range = np.sort(-sine * differences) + np.sort(cosine * box[2])
+        slope = math.tan(half_width) if half_width < 0.5 * math.pi - 1e-6 else math.inf
+        return (float(along_range[0]), float(along_range[1])), (float(across_range[0]), float(across_range[1])), slope
 
     def contracted(self, box: Array) -> Array | None:
         """Return the part of a box, shape (3, 2), that holds all possible matrices in it; None if none is possible."""
         part, rounding = box.copy(), ROUNDING * float(self.high.max())
         for _ in range(ROUNDS):
-            near, aside, steep = self._polar(part)
-            minimum = max(aside[0], -aside[1], 0.0)
-            if minimum - rounding > steep * max(-near[0], near[1], 0.0):
+            along_range, across_range, slope = self._polar(part)
+            minimum = max(across_range[0], -across_range[1], 0.0)
+            if minimum - rounding > slope * max(-along_range[0], along_range[1], 0.0):
                 return None
             low, high = self.stiffness_range(part)
             part = _contract_by_trace(part, float(self.low.sum()) - rounding, float(self.high.sum()) + rounding)
@@ -437,8 +438,8 @@ class PlaneStiffness:
 
 def _contract_by_trace(box: Array, low: float, high: float) -> Array:
     part = box.copy()
-    for k, other in ((0, 1), (1, 0)):
-        part[k] = max(box[k, 0], low - box[other, 1]), min(box[k, 1], high - box[other, 0])
+    for k, partner in ((0, 1), (1, 0)):
+        part[k] = max(box[k, 0], low - box[partner, 1]), min(box[k, 1], high - box[partner, 0])
     return part
 
 
@@ -450,9 +451,9 @@ def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
     if min(above_low.min(), below_high.min()) < 0.0:
         part[0] = 1.0, -1.0
         return np.asarray(part * high)
-    for k, other in ((0, 1), (1, 0)):
-        minimum = low + (off_diagonal**2 / above_low[other] if above_low[other] > 0.0 else 0.0)
-        maximum = high - (off_diagonal**2 / below_high[other] if below_high[other] > 0.0 else 0.0)
+    for k, partner in ((0, 1), (1, 0)):
+        minimum = low + (off_diagonal**2 / above_low[partner] if above_low[partner] > 0.0 else 0.0)
+        maximum = high - (off_diagonal**2 / below_high[partner] if below_high[partner] > 0.0 else 0.0)
         part[k] = max(box[k, 0], minimum), min(box[k, 1], maximum)
     reach = math.sqrt(min(above_low[0] * above_low[1], below_high[0] * below_high[1]))
     part[2] = max(box[2, 0], -reach), min(box[2, 1], reach)
@@ -460,7 +461,7 @@ def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
 
 
 def _sine_range(low: float, high: float) -> tuple[float, float]:
-    turn, ends = 2.0 * math.pi, (math.sin(low), math.sin(high))
-    top = math.ceil((low - 0.5 * math.pi) / turn) * turn + 0.5 * math.pi <= high
-    bottom = math.ceil((low + 0.5 * math.pi) / turn) * turn - 0.5 * math.pi <= high
-    return (-1.0 if bottom else min(ends), 1.0 if top else max(ends))
+    full_turn, ends = 2.0 * math.pi, (math.sin(low), math.sin(high))
+    has_maximum = math.ceil((low - 0.5 * math.pi) / full_turn) * full_turn + 0.5 * math.pi <= high
+    has_minimum = math.ceil((low + 0.5 * math.pi) / full_turn) * full_turn - 0.5 * math.pi <= high
+    return (-1.0 if has_minimum else min(ends), 1.0 if has_maximum else max(ends))

@@ -280,11 +280,11 @@ def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
 
 def _split_price(price: float, chord: float, vectors: Sequence[Array]) -> tuple[float, list[Array]]:
     chord = max(chord, 0.0)
-    longest = max((float(np.linalg.norm(each, axis=1).max()) for each in vectors), default=0.0)
+    longest = max((float(np.linalg.norm(length_vectors, axis=1).max()) for length_vectors in vectors), default=0.0)
     if chord + longest <= 0.0:
-        return price, [np.zeros_like(each) for each in vectors]
+        return price, [np.zeros_like(length_vectors) for length_vectors in vectors]
     factor = price / (chord + longest)
-    return factor * chord, [factor * each for each in vectors]
+    return factor * chord, [factor * length_vectors for length_vectors in vectors]
 
 
 def _mode_bound(mode: ModeConstraints, multipliers: ModeMultipliers, slope: Array) -> float:

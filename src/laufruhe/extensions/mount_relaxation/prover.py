@@ -45,7 +45,7 @@ IN_BATCH = 0.04
 # smallest score of a side to narrow, over the largest score; smallest gain of a round, over the missing bound
 MIN_SCORE, PROGRESS = 0.1, 0.1
 # share of a side: a point of the relaxation this near to the end leaves little to cut off
-NEAR_END = 0.3
+END_SHARE = 0.3
 
 
 def applies(problem: Problem) -> bool:
@@ -76,8 +76,8 @@ SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds,
 
 
 def spring_bound(
-    problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], in_batch: bool = False,
-    root_only: bool = False, known: Witness | None = None,
+    problem: Problem, value: float, gap_tolerance: float, reference: Sequence[Value], in_batch: bool = False,
+    root_only: bool = False, witness: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
     """Return the bound of branch and bound, stopped at the gap tolerance or at the budget of relaxations.
 
@@ -87,13 +87,13 @@ def spring_bound(
         Objective of the best design known [SI]; without a positive finite value the bound is 0.
     gap_tolerance
         Absolute difference of objectives that counts as none [SI].
-    near
+    reference
         Values of the decisions of a good design; units of the relaxation follow it.
     in_batch
         True if the bounds of several problems count together: a slightly weaker bound comes first.
     root_only
         True to bound the root box alone.
-    known
+    witness
         The best design, as a witness that no bound may exceed.
     """
     problem = named_part(problem)
@@ -101,7 +101,7 @@ def spring_bound(
         return BoxResult(0.0, 0)
     try:
         with bounds_ahead() as ahead:
-            relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, near, ahead)
+            relaxation = SdpRelaxation(with_default_sampling(problem), value, gap_tolerance, reference, ahead)
             if not relaxation.max_boxes or not relaxation.is_sampled_fully:
                 return BoxResult(0.0, 0)
             # prove the tolerance at once, unless a box bounds little of the value
@@ -113,7 +113,7 @@ def spring_bound(
             else:
                 shares, maximum = (IN_BATCH, 0.0) if in_batch else (0.0,), relaxation.max_boxes
             maximum = 1 if root_only else problem.search.boxes_or(maximum)
-            return _prove_levels(relaxation, gap_tolerance, shares, maximum, known)
+            return _prove_levels(relaxation, gap_tolerance, shares, maximum, witness)
     except np.linalg.LinAlgError:
         # the middle of a box stands on an undamped resonance
         return BoxResult(0.0, 0)
@@ -124,7 +124,7 @@ class _Around:
     """Bounds of thin boxes around the best design, all mode shapes in them, to check the relaxation."""
 
     relaxation: SdpRelaxation
-    known: Witness
+    witness: Witness
     what: str = "spring forces"
 
     def around(self, place: Array) -> tuple[Array, Array]:
@@ -136,11 +136,11 @@ class _Around:
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the lower bound over designs of a box that are not worse than the best by more than rounding."""
-        return self.relaxation.up_to(self.known.upper_value * (1.0 + EXCESS)).bound(*box)[0]
+        return self.relaxation.up_to(self.witness.upper_value * (1.0 + EXCESS)).bound(*box)[0]
 
 
 def _prove_levels(
-    relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, known: Witness | None
+    relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, witness: Witness | None
 ) -> BoxResult:
     """Prove lower bounds of the objective that rise level by level towards the best design (E59)."""
 
@@ -150,14 +150,14 @@ def _prove_levels(
     def under(share: float) -> SdpRelaxation:
         # the last level includes the best design itself
         search = relaxation.under(level_of(share))
-        return search if share or known is None else search.up_to(known.upper_value * (1.0 + EXCESS))
+        return search if share or witness is None else search.up_to(witness.upper_value * (1.0 + EXCESS))
 
     # the first level near the best design bounds the root box
     root_share = next(share for share in shares if share <= LEVELS[0])
     root_search = under(root_share)
     root_bound = root_search.bound(relaxation.lower, relaxation.upper)
-    if known is not None and root_search.value > known.upper_value:
-        known.check(_Narrowing.what, root_bound[0])
+    if witness is not None and root_search.value > witness.upper_value:
+        witness.check(_Narrowing.what, root_bound[0])
     # a bound holds only for designs up to the level
     bound, spent, places = min(root_bound[0], root_search.value), 1, tuple[Array, ...]()
     for share in shares:
@@ -168,7 +168,7 @@ def _prove_levels(
             break
         is_root = share == root_share
         narrowing = _Narrowing(
-            root_search if is_root else under(share), remaining, known, root_bound if is_root else None
+            root_search if is_root else under(share), remaining, witness, root_bound if is_root else None
         )
         result = narrowing.run(narrowing.narrow(relaxation.lower, relaxation.upper), remaining)
         spent += narrowing.spent
@@ -176,9 +176,9 @@ def _prove_levels(
         if result.bound < level:
             places = result.places
             break
-    if known is not None and 0.0 < bound < relaxation.cutoff:
+    if witness is not None and 0.0 < bound < relaxation.cutoff:
         # at the last level the best design checked the bounds of its boxes
-        check_near_witness(_Around(root_search, known), known.place, known)
+        check_near_witness(_Around(root_search, witness), witness.place, witness)
     count = relaxation.mount_numbers
     candidates = (*relaxation.candidates, *places) if bound < relaxation.cutoff else ()
     return BoxResult(bound, spent, tuple(place[:count] for place in candidates))
@@ -196,9 +196,11 @@ class _Narrowing(BoxBisection):
     what = "boxes of mounts and modes, by spring forces"
 
     def __init__(
-        self, search: SdpRelaxation, maximum: int, known: Witness | None, root_bound: tuple[float, Array] | None
+        self, search: SdpRelaxation, maximum: int, witness: Witness | None, root_bound: tuple[float, Array] | None
     ) -> None:
-        super().__init__(search.value, 0.0, known if known is not None and search.value > known.upper_value else None)
+        super().__init__(
+            search.value, 0.0, witness if witness is not None and search.value > witness.upper_value else None
+        )
         self._search, self._maximum, self._root_bound, self.spent = search, maximum, root_bound, 0
 
     @property
@@ -282,7 +284,7 @@ def narrowed(
     signs = (1.0, -1.0)
 
     def pays(side: int, k: int) -> bool:
-        is_near = nearest[k, side] - ends[k, side] < NEAR_END * (upper[side] - lower[side])
+        is_near = nearest[k, side] - ends[k, side] < END_SHARE * (upper[side] - lower[side])
         return not is_near and not search.is_at_end(lower, upper, side, signs[k])
 
     for first, (number, side, k) in enumerate(candidates):
@@ -294,6 +296,6 @@ def narrowed(
         new_ends[k, side] = max(new_ends[k, side], signs[k] * centre[side] + half[side] * minimum)
         if new_ends[:, side].sum() > 0.0:
             return None, solved
-        reached = centre[side_indices] + half[side_indices] * point[variables]
-        nearest[:, side_indices] = np.minimum(nearest[:, side_indices], [reached, -reached])
+        end_point = centre[side_indices] + half[side_indices] * point[variables]
+        nearest[:, side_indices] = np.minimum(nearest[:, side_indices], [end_point, -end_point])
     return (new_ends[0], -new_ends[1]), solved

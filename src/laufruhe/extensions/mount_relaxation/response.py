@@ -92,7 +92,7 @@ class ResponseBound:
 
 
 def response_of(
-    mounts: OpenMounts, loads: ComplexArray, omega: float, near: ComplexArray, bound: ResponseBound
+    mounts: OpenMounts, loads: ComplexArray, omega: float, reference_motions: ComplexArray, bound: ResponseBound
 ) -> Response:
     """Return the response to one order (E42, E52).
 
@@ -102,13 +102,13 @@ def response_of(
         r, and its change per unit of each unbalance column, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
-    near
+    reference_motions
         Motions of a design, which set the units, shape (k, n).
     bound
         Bound of force or travel over better designs.
     """
-    unit, columns = float(np.linalg.norm(near)) or 1.0, len(loads) - 1
-    sizes = _units(mounts, near / unit)
+    unit, columns = float(np.linalg.norm(reference_motions)) or 1.0, len(loads) - 1
+    sizes = _units(mounts, reference_motions / unit)
     # columns of v: unbalances, then real and imaginary parts of the products, each in its unit
     count = len(sizes)
     variables = np.zeros((count, 1 + columns + 2 * count), dtype=complex)
@@ -269,9 +269,9 @@ def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> floa
         # all of A has at least the smallest loss factor of its springs
         loss = max(loss, uniform_loss + omega * mounts.damping, key=lambda matrix: float(np.linalg.eigvalsh(matrix)[0]))
     dynamic_stiffness = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
-    top = mounts.highest + max(float(np.linalg.eigvalsh(dynamic_stiffness)[-1]), 0.0)
+    highest = mounts.highest + max(float(np.linalg.eigvalsh(dynamic_stiffness)[-1]), 0.0)
     # at rest, stiffness carries the load
-    moving_resistance = max(float(np.linalg.eigvalsh(loss)[0]), omega**2 - top)
+    moving_resistance = max(float(np.linalg.eigvalsh(loss)[0]), omega**2 - highest)
     resistance = moving_resistance if omega > 0.0 else mounts.lowest
     return float(np.linalg.norm(loads, axis=1).sum()) / resistance if resistance > 0.0 else math.inf
 

@@ -62,7 +62,7 @@ class SdpRelaxation:
         Bound from which a box is fathomed [SI].
     lower, upper
         Root box, shape (n,): open numbers of mounts, stiffness entries of planes (E63), and coordinates of modes.
-    near
+    reference
         The best design in these coordinates without those of modes.
     modes, mode_sides
         Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
@@ -75,14 +75,23 @@ class SdpRelaxation:
     """
 
     def __init__(
-        self, problem: Problem, value: float, gap_tolerance: float, near: Sequence[Value], ahead: Ahead | None = None
+        self,
+        problem: Problem,
+        value: float,
+        gap_tolerance: float,
+        reference: Sequence[Value],
+        ahead: Ahead | None = None,
     ) -> None:
         self.problem, self.value, self.cutoff, self.ahead = problem, value, value - GAP_SAFETY * gap_tolerance, ahead
         lower, upper = real_bounds(problem.mount_decisions)
-        self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
-        self._frames = number_ranges(problem, self._near, self._near)[0]
+        self._reference = np.array(
+            [v for v, d in zip(reference, problem.decisions, strict=True) if not d.is_affine], dtype=float
+        )
+        self._frames = number_ranges(problem, self._reference, self._reference)[0]
         self._planes = open_mounts(problem, lower, upper, PlaneFrames(self._frames)).planes
-        self.near = np.concatenate([self._near, *(np.append(plane.near, 0.0) for _, plane in self._planes.values())])
+        self.reference = np.concatenate(
+            [self._reference, *(np.append(plane.reference, 0.0) for _, plane in self._planes.values())]
+        )
         plane_ranges = np.concatenate([np.zeros((0, 2)), *(plane.full_box for _, plane in self._planes.values())])
         lower, upper = np.append(lower, plane_ranges[:, 0]), np.append(upper, plane_ranges[:, 1])
         self._parts = self.parts(lower, upper)
@@ -93,20 +102,20 @@ class SdpRelaxation:
         self.candidates: list[Array] = []
         self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if divides(problem) else None
         self._model = AffineModel(off_resonance(problem))
-        unbalances = [v for v, d in zip(near, problem.decisions, strict=True) if d.is_affine]
+        unbalances = [v for v, d in zip(reference, problem.decisions, strict=True) if d.is_affine]
         basis = unbalance_basis(self._model.domains, unbalances)
-        known = evaluate(problem, problem.design(list(near)))
+        evaluation = evaluate(problem, problem.design(list(reference)))
         mount_terms = [term for term in problem.load_terms if term.measure.on_mounts]
         # terms that no open number changes are constants
         kinds = {d.kind for d in problem.decisions}
         fixed_terms = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
-        self._constant = sum(term.weight * known.value(term.measure) for term in fixed_terms)
+        self._constant = sum(term.weight * evaluation.value(term.measure) for term in fixed_terms)
 
         def orders_of(measure: Measure, parts: Sequence[OpenMounts] = self._parts) -> MeasureOrders:
-            return measure_orders(problem, measure, self._model, known, basis, parts)
+            return measure_orders(problem, measure, self._model, evaluation, basis, parts)
 
         queries = [(term.weight, orders_of(term.measure)) for term in mount_terms]
-        limits = limits_of(problem, known, orders_of, lambda measure: orders_of(measure, self._parts[:1]))
+        limits = limits_of(problem, evaluation, orders_of, lambda measure: orders_of(measure, self._parts[:1]))
         loads = [order.loads[1:] for _, query in queries for order in query.orders]
         self.basis, reduction = basis[0].reduced([*loads, *limits.loads])
         self._terms = [(weight, query.in_basis(reduction)) for weight, query in queries]
@@ -140,19 +149,19 @@ class SdpRelaxation:
             lower[sides], upper[sides] = part.T
         return lower, upper
 
-    def near_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
+    def reference_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
         """Return s of the design of the box nearest to the best, shape (numbers,); zero for entries of matrices."""
         s = np.zeros(mounts.numbers)
         for j, side in enumerate(mounts.single_decisions):
             if side is not None and upper[side] > lower[side]:
-                s[j] = (2.0 * self.near[side] - lower[side] - upper[side]) / (upper[side] - lower[side])
+                s[j] = (2.0 * self.reference[side] - lower[side] - upper[side]) / (upper[side] - lower[side])
         return np.clip(s, -1.0, 1.0)
 
     def is_at_end(self, lower: Array, upper: Array, side: int, sign: float) -> bool:
         """Return True if the best design lies near the lower (sign 1) or upper (sign -1) end of a side."""
-        if side >= len(self.near):
+        if side >= len(self.reference):
             return False
-        distance = self.near[side] - lower[side] if sign > 0.0 else upper[side] - self.near[side]
+        distance = self.reference[side] - lower[side] if sign > 0.0 else upper[side] - self.reference[side]
         return bool(abs(distance) < AT_END * (upper[side] - lower[side]))
 
     @property
@@ -192,7 +201,7 @@ class SdpRelaxation:
             return math.inf, np.zeros(len(lower))
         lower, upper = contracted_box
         if self._stiffness_boxes is not None:
-            count = len(self._near)
+            count = len(self._reference)
             stiffness_bound = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
         bound, scores = (
             (stiffness_bound, np.zeros(len(lower))) if stiffness_bound >= self.cutoff else self.relax(lower, upper)
@@ -257,13 +266,13 @@ class SdpRelaxation:
 
     def response(self, mounts: OpenMounts, order: Order, bound: ResponseBound, lower: Array, upper: Array) -> Response:
         """Return the response to an order over a box; units follow the design of the box nearest to the best."""
-        count = len(self._near)
-        design = [float(v) for v in np.clip(self._near, lower[:count], upper[:count])]
+        count = len(self._reference)
+        design = [float(v) for v in np.clip(self._reference, lower[:count], upper[:count])]
         mounting = mounting_in(self.problem.design(design, self.problem.mount_decisions))
         moving = order.omega > 0.0
         parts = (mounting.springs, mounting.losses * moving, mounting.dampers * order.omega)
         k, h, c = (mounts.root @ mounting.total(part) @ mounts.root.T for part in parts)
-        load = order.loads[0] + self.basis.near @ order.loads[1:]
+        load = order.loads[0] + self.basis.reference @ order.loads[1:]
         loads = np.column_stack([load, WIDE * order.loads[1:].T])
-        near = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(mounts.size), loads)
-        return response_of(mounts, order.loads, order.omega, near, bound)
+        reference_motions = np.linalg.solve(k + 1j * (h + c) - order.omega**2 * np.eye(mounts.size), loads)
+        return response_of(mounts, order.loads, order.omega, reference_motions, bound)

@@ -24,7 +24,7 @@ class UnbalanceBasis:
     ----------
     domain_map
         Map from u to the columns of the domains, less their middles, shape (columns, domain columns).
-    near
+    reference
         u of the best design, shape (columns,).
     sets
         Matrices C with <C, (1, u)(1, u)'> <= 0 for all allowed unbalances.
@@ -33,14 +33,14 @@ class UnbalanceBasis:
     """
 
     domain_map: Array
-    near: Array
+    reference: Array
     sets: tuple[Array, ...]
     domains: int
 
     @property
     def count(self) -> int:
         """Count of entries of u."""
-        return len(self.near)
+        return len(self.reference)
 
     def reduced(self, loads: Sequence[ComplexArray]) -> tuple[UnbalanceBasis, Array]:
         """Return the basis reduced to what loads distinguish, and the map to it, shape (fewer, columns).
@@ -67,7 +67,7 @@ class UnbalanceBasis:
         ball = np.diag(np.concatenate([[-1.0], np.ones(rank)]))
         retained = directions[:, :rank].T
         return UnbalanceBasis(
-            radius * retained @ self.domain_map, retained @ self.near / radius, (ball,), 1
+            radius * retained @ self.domain_map, retained @ self.reference / radius, (ball,), 1
         ), radius * retained
 
 
@@ -75,11 +75,11 @@ def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> tuple
     """Return the basis of all columns of domains, with a design's unbalances in it, and the columns' middles."""
     low, high = column_bounds(domains)
     middles, reaches = 0.5 * (low + high), 0.5 * (high - low)
-    near = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
-    sets, size = [], 1 + len(near)
+    reference = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
+    sets, size = [], 1 + len(reference)
     for domain in domains:
         # an interval or a disc, and the sides of a sector
-        columns = np.arange(len(near))[domain.columns] + 1
+        columns = np.arange(len(reference))[domain.columns] + 1
         matrix = np.zeros((size, size))
         matrix[0, 0], matrix[columns, columns] = -1.0, 1.0
         sets.append(matrix)
@@ -90,4 +90,4 @@ def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> tuple
                 # unbalances lie to the left of the first side and to the right of the second
                 side[0, columns] = side[columns, 0] = 0.5 * sign * np.array([edge[1], -edge[0]])
                 sets.append(side)
-    return UnbalanceBasis(np.diag(reaches), near, tuple(sets), len(domains)), middles
+    return UnbalanceBasis(np.diag(reaches), reference, tuple(sets), len(domains)), middles

@@ -116,7 +116,7 @@ def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
     for k, (lot, parts) in enumerate(zip(lots, chosen, strict=True)):
         for i, part in itertools.product(range(len(parts)), range(len(lot.masses))):
             if part not in parts[: i + 1]:
-                exchanged = [parts[i] if other == part else other for other in parts]
+                exchanged = [parts[i] if current == part else current for current in parts]
                 exchanged[i] = part
                 yield (*chosen[:k], tuple(exchanged), *chosen[k + 1 :])
 
@@ -150,8 +150,8 @@ def _terms(problem: Problem) -> Terms:
         for part in parts
     ]
     unit = Tolerance("a part", "kg", PER_KILOGRAM, tuple(errors))
-    built = BuiltEngines(problem, (), problem.fidelity.samples, Tolerances((unit,)))
-    return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in built.terms)
+    engines = BuiltEngines(problem, (), problem.fidelity.samples, Tolerances((unit,)))
+    return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in engines.terms)
 
 
 class _Search(BranchAndBound[Chosen]):

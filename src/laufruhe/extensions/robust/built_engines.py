@@ -47,17 +47,19 @@ class BuiltEngines:
         self, problem: Problem, values: Sequence[Value], samples: int, tolerances: Tolerances | None = None
     ) -> None:
         self.problem, self.samples = problem, samples
-        own = tolerances_of(problem) if tolerances is None else tolerances
-        units = np.concatenate([np.zeros((1, own.count)), np.eye(own.count)])
-        self._built = [evaluate_built(with_errors(problem, unit, own), values, samples) for unit in units]
+        applied_tolerances = tolerances_of(problem) if tolerances is None else tolerances
+        units = np.concatenate([np.zeros((1, applied_tolerances.count)), np.eye(applied_tolerances.count)])
+        self._built = [
+            evaluate_built(with_errors(problem, unit, applied_tolerances), values, samples) for unit in units
+        ]
 
     def norm(self, measure: Measure) -> AffineNorm:
         """Return the norm of a measure as a function of the errors."""
-        drawn, refinement = self._built[0], measure.norm.refinement
+        drawing, refinement = self._built[0], measure.norm.refinement
         kinks = None
         if measure.is_load:
-            signals = with_common_base(drawn.engine.cycle.base_order, drawn.signals(measure.load))
-            kinks = kinks_of(measure, signals, drawn.engine)
+            signals = with_common_base(drawing.engine.cycle.base_order, drawing.signals(measure.load))
+            kinks = kinks_of(measure, signals, drawing.engine)
         rows = [evaluation.rows(measure, refinement * self.samples, kinks) for evaluation in self._built]
         constant = rows[0].vectors
         slope = (

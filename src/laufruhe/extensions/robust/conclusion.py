@@ -94,10 +94,10 @@ def compare_designs(
     """
     from scipy.stats import beta
 
-    over = robust_of(problem).over
-    sample = _Sample.of(problem, over, adversary.samples)
+    population = robust_of(problem).over
+    sample = _Sample.of(problem, population, adversary.samples)
     values = sample.values(problem, robust)
-    share = SHARE if over.share is None else over.share
+    share = SHARE if population.share is None else population.share
     nominal_worst = adversary.at(nominal, proven=True)
     designs = (
         _design("best drawing", problem, nominal, nominal_worst, sample.values(problem, nominal), share),
@@ -108,7 +108,7 @@ def compare_designs(
     # Clopper and Pearson (R10)
     at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, len(values) - exceeding)) if exceeding < len(values) else 1.0
     return RobustResult(
-        over=over, exact=over.share is None and tolerances_of(problem).is_affine, share=share,
+        over=population, exact=population.share is None and tolerances_of(problem).is_affine, share=share,
         nominal=designs[0], robust=designs[1], tolerances=_price_tolerances(problem, robust, active, sample, share),
         scenarios=scenarios, divisions=robust_worst.divisions, engines=len(values), seed=sample.seed,
         worst_engine=worst, exceeding=exceeding, exceeding_at_most=at_most,
@@ -124,10 +124,10 @@ class _Sample:
     samples: int
 
     @classmethod
-    def of(cls, problem: Problem, over: Population, samples: int) -> _Sample:
-        count = CHECKED if tolerances_of(problem).is_affine else min(over.engines, CHECKED_CURVED)
-        random = np.random.default_rng([over.seed, 1])
-        return cls(tolerances_of(problem).draw(random, count), over.seed, samples)
+    def of(cls, problem: Problem, population: Population, samples: int) -> _Sample:
+        count = CHECKED if tolerances_of(problem).is_affine else min(population.engines, CHECKED_CURVED)
+        random = np.random.default_rng([population.seed, 1])
+        return cls(tolerances_of(problem).draw(random, count), population.seed, samples)
 
     def values(self, problem: Problem, values: Sequence[Value]) -> Array:
         """Return the objective of each engine of a design, shape (engines,); affine loads are evaluated together."""
@@ -165,10 +165,10 @@ def _price_tolerances(
     """Return the priced tolerances, the most expensive first."""
     priced = []
     for tolerance in tolerances_of(problem).tolerances:
-        wide, narrow = (
+        upper, lower = (
             _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + step) for step in (STEP, -STEP)
         )
-        saving = (wide - narrow) / (2.0 * STEP)
+        saving = (upper - lower) / (2.0 * STEP)
         priced.append(PricedTolerance(
             tolerance.name, tolerance.size, tolerance.unit, str(tolerance.law), str(tolerance.scope),
             len(tolerance.errors), saving / tolerance.size, saving,

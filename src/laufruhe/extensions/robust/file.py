@@ -250,12 +250,12 @@ def _pistons(mark: Mark, engine: Engine) -> _Errors:
 
 
 def _pins(mark: Mark, engine: Engine) -> _Errors:
-    size, errors, seen = _mass(mark), [], set()
+    size, errors, pin_places = _mass(mark), [], set()
     for part in engine.slider_cranks:
         place = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
-        if place in seen:
+        if place in pin_places:
             continue
-        seen.add(place)
+        pin_places.add(place)
         pin = Rotor("pin", part.x, part.crank_radius * complex(math.cos(part.throw), math.sin(part.throw)), part.shaft)
         errors.append(
             Error(

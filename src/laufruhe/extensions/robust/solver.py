@@ -121,7 +121,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         if result.objective is None or initial is None:
             return result
         return replace(result, objective=replace(result.objective, initial=initial.value))
-    over = robust_of(problem).over
+    population = robust_of(problem).over
     started = time.perf_counter()
     with search_scope("drawing"):
         drawing = solve(problem.drawing)
@@ -132,7 +132,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalances_of(problem, drawing))
     report_progress("worst errors of the drawing")
-    adversary, robust = _decide(problem, over, start, drawing)
+    adversary, robust = _decide(problem, population, start, drawing)
     adversary = replace(adversary, samples=robust.samples)
     initial_worst = adversary.at(problem.start, proven=False)
     if robust.conflict:
@@ -140,7 +140,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
             problem, initial_worst, robust.conflict, {"solve": time.perf_counter() - started}
         )
     solved = time.perf_counter()
-    strength = ProofStrength.EXACT if over.share is None else ProofStrength.RELAXED
+    strength = ProofStrength.EXACT if population.share is None else ProofStrength.RELAXED
     design = evaluate_design(problem, robust.values, robust.samples)
     proof = ProofData(robust.bound, strength, robust.active.residual, _method(problem, robust))
     details = compare_designs(problem, adversary, start, robust.values, robust.worst, robust.active, robust.scenarios)
@@ -149,19 +149,19 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
 
 
 def _decide(
-    problem: Problem, over: Population, start: tuple[Value, ...], drawing: Result
+    problem: Problem, population: Population, start: tuple[Value, ...], drawing: Result
 ) -> tuple[Adversary, RobustDesign]:
     """Return the adversary for the tolerances, and the best design against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
-    zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
-    if over.share is None and tolerances.is_affine:
+    zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(population.seed)
+    if population.share is None and tolerances.is_affine:
         adversary = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
         return adversary, _minimise_worst_case(problem, adversary, start, zero_level)
-    if over.share is None:
-        sampled = SampledEngines(problem, tolerances.draw(random, over.engines), samples)
+    if population.share is None:
+        sampled = SampledEngines(problem, tolerances.draw(random, population.engines), samples)
         return sampled, _minimise_worst_case(problem, sampled, start, zero_level)
-    sampled = SampledEngines(problem, tolerances.draw_mirrored(random, over.engines), samples)
-    robust = _minimise_share(problem, sampled, start, over.share, zero_level)
+    sampled = SampledEngines(problem, tolerances.draw_mirrored(random, population.engines), samples)
+    robust = _minimise_share(problem, sampled, start, population.share, zero_level)
     # with symmetric errors at least half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     robust = replace(robust, bound=bound if problem.decisions else robust.worst.bound)
@@ -169,7 +169,7 @@ def _decide(
         if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
         sampled = replace(sampled, samples=fine_samples(robust.samples))
-        level = _quantile(sampled, robust.values, over.share)
+        level = _quantile(sampled, robust.values, population.share)
         robust = replace(robust, worst=replace(robust.worst, value=level, bound=level), samples=sampled.samples)
     return sampled, robust
 
@@ -200,14 +200,14 @@ def refuse(problem: Problem) -> None:
 
 
 def _method(problem: Problem, robust: RobustDesign) -> str:
-    over, sampling = robust_of(problem).over, f"at {robust.angles} angles; " if robust.angles else ""
+    population, sampling = robust_of(problem).over, f"at {robust.angles} angles; " if robust.angles else ""
     cones = f"second-order cones over {robust.scenarios} sets of errors {sampling}" if sampling else ""
-    if over.share is not None:
+    if population.share is not None:
         bound = "bounded by the drawing" if tolerances_of(problem).is_affine else "without a bound"
-        return f"{cones}{over.engines} drawn engines, {bound}"
+        return f"{cones}{population.engines} drawn engines, {bound}"
     if tolerances_of(problem).is_affine:
         return f"{cones}every error bounded by branch and bound"
-    return f"{cones}the worst of {over.engines} drawn engines, not of all"
+    return f"{cones}the worst of {population.engines} drawn engines, not of all"
 
 
 class _Program:
@@ -224,23 +224,23 @@ class _Program:
 
     def add(self, errors: Sequence[Array]) -> bool:
         """Add error sets that it lacks; return True if there are any. The least active sets leave a full program."""
-        new = [
+        added = [
             error_set
             for error_set in errors
             if all(np.abs(error_set - entries).max(initial=0.0) > SAME for entries in self.errors)
         ]
-        while self.errors and len(self.errors) + len(new) > MOST_SCENARIOS:
+        while self.errors and len(self.errors) + len(added) > MOST_SCENARIOS:
             index = int(np.argmin(self.shares)) if self.shares else 0
             for entries in (self.errors, self.models, self.shares):
                 del entries[index]
-        for error_set in new:
+        for error_set in added:
             self.errors.append(error_set)
             self.models.append(AffineModel(with_errors(self.problem, error_set)))
             self.shares.append(1.0)
         base = common_base([model.base for model in self.models])
         for model in self.models:
             model.base = base
-        return bool(new)
+        return bool(added)
 
     def lower(self, violation: float) -> None:
         """Lower limits by slightly more than a relative violation."""
@@ -279,8 +279,8 @@ class _Program:
         shares = solution.shares
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
         active_multipliers = replace(solution.multipliers, terms=terms)
-        fine, _ = self.at(2 * max(self.angles, samples), averaged=True)
-        weighted = fine.shared(shares)
+        fine_problem, _ = self.at(2 * max(self.angles, samples), averaged=True)
+        weighted = fine_problem.shared(shares)
         bound = best_bound(weighted, solution.x, active_multipliers)
         self.shares = [float(share) for share in shares]
         prices = bound.multipliers.shadow_prices(weighted)

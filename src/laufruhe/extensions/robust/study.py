@@ -99,8 +99,8 @@ def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array
     engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
     # an engine without errors may have a shorter period, so use that of the cycle
     loads = with_common_base(engine.cycle.base_order, [shaking_loads(variant, point) for variant in engines])
-    drawn, *unit_errors = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
-    return np.array([forces - drawn for forces in unit_errors]).reshape(tolerances.count, steps, 2)
+    drawing, *unit_errors = (spectrum.sample(steps)[:, 1:3] for spectrum in loads)
+    return np.array([forces - drawing for forces in unit_errors]).reshape(tolerances.count, steps, 2)
 
 
 def worst_parts(engine: Engine, speed: float, tolerances: StudyTolerancesTable) -> dict[str, float]:
@@ -142,9 +142,9 @@ def mean_mount_forces(
 ) -> tuple[float, Array]:
     """Return the mean mount force [N] of the drawing, and of random engines, shape (builds,)."""
     random = np.random.default_rng(seed)
-    drawn = evaluate(problem).value(MEAN_MOUNT_FORCE)
+    drawing = evaluate(problem).value(MEAN_MOUNT_FORCE)
     engines = (built(problem.engine, tolerances, random) for _ in range(builds))
-    return drawn, np.array([evaluate(problem, engine).value(MEAN_MOUNT_FORCE) for engine in engines])
+    return drawing, np.array([evaluate(problem, engine).value(MEAN_MOUNT_FORCE) for engine in engines])
 
 
 def spread(problem: Problem, tolerances: StudyTolerancesTable, builds: int = 10_000, seed: int = 1964) -> Record:
@@ -155,7 +155,7 @@ def spread(problem: Problem, tolerances: StudyTolerancesTable, builds: int = 10_
     engines (`mount`, `mount_random`); NaN without mounts.
     """
     engine, point = problem.engine, problem.points[0]
-    drawn = random_forces(engine, point.speed, tolerances, builds, seed)
+    added_forces = random_forces(engine, point.speed, tolerances, builds, seed)
     mount, forces = math.nan, np.full(1, math.nan)
     if engine.mounts:
         mount, forces = mean_mount_forces(problem, tolerances, min(builds, MOUNTED), seed)
@@ -163,8 +163,8 @@ def spread(problem: Problem, tolerances: StudyTolerancesTable, builds: int = 10_
     return {
         "nominal": float(np.hypot(*free.T).max()),
         "causes": worst_parts(engine, point.speed, tolerances),
-        "mean": float(drawn.mean()),
-        "random": np.quantile(drawn, SHARES).tolist(),
+        "mean": float(added_forces.mean()),
+        "random": np.quantile(added_forces, SHARES).tolist(),
         "mount": mount,
         "mount_random": np.quantile(forces, SHARES).tolist(),
         "speed": point.speed,
@@ -315,13 +315,13 @@ def _label(row: xr.Dataset) -> str:
 def _row(row: xr.Dataset, k: int) -> list[p.Mark]:
     places, density = _density(row["random"].values / GRAVITY, row["share"].values)
     worst, nominal = float(row["worst"]) / GRAVITY, float(row["nominal"]) / GRAVITY
-    at = max(nominal, LEAST)
+    marker = max(nominal, LEAST)
     return [
         p.Area(places, np.full(len(places), k), k - TALL * density),
         p.Line([worst], [k - 0.3], "after", marker="|", size=14.0, width=0.0),
         p.Words(worst * 1.08, k - 0.3, f"{worst:.0f}", "after"),
-        p.Line([at], [k - 0.3], marker="D", width=0.0),
-        p.Words(at * 1.12, k - 0.3, number(nominal, 3)),
+        p.Line([marker], [k - 0.3], marker="D", width=0.0),
+        p.Words(marker * 1.12, k - 0.3, number(nominal, 3)),
     ]
 
 

@@ -365,8 +365,8 @@ def with_errors(problem: Problem, errors: Array, tolerances: Tolerances | None =
     """Return the problem of the engine with errors, shape (columns,), and without tolerances (R2)."""
     applied = tolerances_of(problem) if tolerances is None else tolerances
     drawing = Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
-    built = applied.with_errors(drawing, errors, problem.rebuild)
+    built_drawing = applied.with_errors(drawing, errors, problem.rebuild)
     return replace(
-        problem, engine=built.engine, points=built.points, decisions=built.decisions,
-        mount_numbers=built.mount_numbers, extras=(),
+        problem, engine=built_drawing.engine, points=built_drawing.points, decisions=built_drawing.decisions,
+        mount_numbers=built_drawing.mount_numbers, extras=(),
     )  # fmt: skip

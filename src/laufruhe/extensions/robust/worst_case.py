@@ -144,7 +144,7 @@ class _ErrorSearch(BranchAndBound[_Node]):
 
     def improve(self, point: tuple[float, Array]) -> None:
         """Store a value and its errors if they are worse than the worst so far."""
-        self.best = max(self.best, point, key=lambda each: each[0])
+        self.best = max(self.best, point, key=lambda pair: pair[0])
 
     def is_fathomed(self, node: OpenNode[_Node]) -> bool:
         """Return True if no errors of a node are worse by the tolerance."""
@@ -269,11 +269,11 @@ def bound_node(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff
         bound, point = _over_majorants(parts, majorants, blocks)
         if bound < best:
             best, best_point = bound, point
-        reached = [lengths(part.rows + part.moves @ point) for part in parts]
-        value = sum(part.value(sizes) for part, sizes in zip(parts, reached, strict=True))
+        row_lengths = [lengths(part.rows + part.moves @ point) for part in parts]
+        value = sum(part.value(sizes) for part, sizes in zip(parts, row_lengths, strict=True))
         if best <= cutoff or best <= value * (1.0 + ROUNDING):
             break
-        touching_lengths = [(a * k + b) / (k + 1) for a, b in zip(touching_lengths, reached, strict=True)]
+        touching_lengths = [(a * k + b) / (k + 1) for a, b in zip(touching_lengths, row_lengths, strict=True)]
     errors, first = centre.copy(), 0
     for block in blocks:
         width = len(block.spans)

@@ -139,9 +139,9 @@ class _RunBounds:
         Maps from motion to the signal of a measure, and its rows for each place.
     """
 
-    def __init__(self, of: MotionEquations, run: RunMoments, maps: Maps, d: int) -> None:
-        self._equations, self._run, self._maps, self._d = of, run, maps, d
-        self._steps = Steps(of, run.step)
+    def __init__(self, box_equations: MotionEquations, run: RunMoments, maps: Maps, d: int) -> None:
+        self._equations, self._run, self._maps, self._d = box_equations, run, maps, d
+        self._steps = Steps(box_equations, run.step)
 
     def under(self) -> LinearBound:
         """Return the best bound over all times and places, with a step that ends at the peak of the middle."""
@@ -180,8 +180,8 @@ class _RunBounds:
         return rows.reshape(*rows.shape[:-2], -1, self._d, rows.shape[-1])
 
     def _lengths(self, z: Array) -> Array:
-        seen = self._rows(self._maps.position, self._maps.rate) @ z
-        return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
+        signal = self._rows(self._maps.position, self._maps.rate) @ z
+        return np.asarray(np.linalg.norm(self._places(signal), axis=-2))
 
     def _of_motion(self, motion: RunMotion) -> LinearBound:
         maps, pairs = self._maps, self._steps.pairs
@@ -197,30 +197,30 @@ class _RunBounds:
         rows = self._places(value)
         size = np.linalg.norm(rows, axis=-2)
         directions = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
-        rest = self._gains(directions) * motion.left[:, None] + self._further(motion, slopes_of_maps)
+        remainder = self._gains(directions) * motion.left[:, None] + self._further(motion, slopes_of_maps)
         slopes, second_terms = (
             np.einsum("bpdt,bspdt->bspt", directions, self._places(order)) for order in (first, second)
         )
         is_square = np.array([j == k for j, k in pairs])[:, None, None]
         # squares are not negative
         second_terms = np.where(is_square, np.maximum(-second_terms, 0.0), np.abs(second_terms))
-        return self._best(size, slopes, second_terms, rest)
+        return self._best(size, slopes, second_terms, remainder)
 
-    def _best(self, size: Array, slopes: Array, second_order: Array, rest: Array) -> LinearBound:
+    def _best(self, size: Array, slopes: Array, second_order: Array, remainder: Array) -> LinearBound:
         """Return the largest bound over all places and times."""
-        bound = size - np.abs(slopes).sum(axis=1) - second_order.sum(axis=1) - rest
-        known = np.nan_to_num(bound, nan=-np.inf)
+        bound = size - np.abs(slopes).sum(axis=1) - second_order.sum(axis=1) - remainder
+        finite_bound = np.nan_to_num(bound, nan=-np.inf)
         boxes = np.arange(len(size))
-        place, time = np.unravel_index(known.reshape(len(size), -1).argmax(axis=1), bound.shape[1:])
-        size, rest = (array[boxes, place, time] for array in (size, rest))
+        place, time = np.unravel_index(finite_bound.reshape(len(size), -1).argmax(axis=1), bound.shape[1:])
+        size, remainder = (array[boxes, place, time] for array in (size, remainder))
         slopes, second_order = (array[boxes, :, place, time] for array in (slopes, second_order))
         changes = np.linalg.norm(self._equations.first, axis=(-2, -1))
         share = changes / np.maximum(changes.sum(axis=1), 1e-300)[:, None]
-        scores = np.abs(slopes) + share * np.minimum(rest, size)[:, None]
+        scores = np.abs(slopes) + share * np.minimum(remainder, size)[:, None]
         for number, (j, k) in enumerate(self._steps.pairs):
             for side in {j, k}:
                 scores[:, side] += second_order[:, number]
-        return LinearBound(size, slopes, rest + second_order.sum(axis=1), scores)
+        return LinearBound(size, slopes, remainder + second_order.sum(axis=1), scores)
 
     def _gains(self, directions: Array) -> Array:
         # largest signal of a motion with energy 1 along directions (boxes, places, d, times), as (boxes, places, times)

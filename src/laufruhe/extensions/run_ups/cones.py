@@ -67,11 +67,13 @@ class _Steps:
     @property
     def problem(self) -> Problem:
         """Problem with rows of these steps; limits without such steps are omitted."""
-        known = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
+        rows_of_steps = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
         limits = (
-            limit for limit in self._problem.limits if not limit.measure.channel.simulation or limit.measure in known
+            limit
+            for limit in self._problem.limits
+            if not limit.measure.channel.simulation or limit.measure in rows_of_steps
         )
-        return replace(self._problem, known_rows=known, limits=tuple(limits))
+        return replace(self._problem, known_rows=rows_of_steps, limits=tuple(limits))
 
     def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:
         """Return the program at up to `samples` samples; averaged means exclude no feasible design (P7)."""
@@ -83,10 +85,10 @@ class _Steps:
         heights = [(limit.measure, limit.maximum) for limit in self._limits]
         heights += [(term.measure, self._rows.worst(term.measure, x)) for term in self._terms]
         for measure, height in heights:
-            near = self._rows.near(measure, x, height)
-            if len(near):
-                known = self._places.get(measure, near)
-                self._places[measure] = np.union1d(known, near).astype(np.intp)
+            near_steps = self._rows.near(measure, x, height)
+            if len(near_steps):
+                places = self._places.get(measure, near_steps)
+                self._places[measure] = np.union1d(places, near_steps).astype(np.intp)
 
     def has_all(self, x: Array) -> bool:
         """Return True if a design satisfies the limits in all steps, and no step exceeds those in the program."""
@@ -94,8 +96,8 @@ class _Steps:
             self._rows.worst(limit.measure, x) <= limit.maximum * (1.0 + 0.1 * FEASIBLE) for limit in self._limits
         )
         for term in self._terms if satisfies_limits else ():
-            known = self._rows.known(term.measure, self._places[term.measure])
-            maximum = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
+            rows_in_program = self._rows.known(term.measure, self._places[term.measure])
+            maximum = np.linalg.norm(rows_in_program.constant + rows_in_program.slope @ x, axis=-1).max()
             if self._rows.worst(term.measure, x) > float(maximum) * (1.0 + 0.1 * self._problem.tolerance):
                 return False
         return satisfies_limits

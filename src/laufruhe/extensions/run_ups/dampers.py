@@ -168,8 +168,8 @@ def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots
 
     def in_modes(matrices: Array) -> Array:
         modes = turn if matrices.ndim == 3 else turn[:, None]
-        out = matrices @ modes
-        return np.asarray(np.swapaxes(modes, -1, -2) @ out if of_motion else out)
+        rows = matrices @ modes
+        return np.asarray(np.swapaxes(modes, -1, -2) @ rows if of_motion else rows)
 
     scale = halves[:, :, None, None]
     (position, position_slopes), (lossy, lossy_slopes), (drag, drag_slopes) = (
@@ -180,5 +180,5 @@ def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots
     for number, (j, k) in enumerate(pairs_of(halves.shape[1])):
         bend = lossy @ s.second[:, number] + lossy_slopes[:, j] @ s.first[:, k]
         bends.append(bend if j == k else bend + lossy_slopes[:, k] @ s.first[:, j])
-    rest = np.abs(lossy) @ s.after_second + np.abs(lossy_slopes).sum(axis=1) @ s.after_first
-    return Maps(position, position_slopes, lossy @ s.middle + drag, rate_slopes, np.stack(bends, axis=1), rest)
+    remainder = np.abs(lossy) @ s.after_second + np.abs(lossy_slopes).sum(axis=1) @ s.after_first
+    return Maps(position, position_slopes, lossy @ s.middle + drag, rate_slopes, np.stack(bends, axis=1), remainder)

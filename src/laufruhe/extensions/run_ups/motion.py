@@ -151,18 +151,22 @@ class RunMotion:
 class Steps:
     """Matrices of long steps on boxes: from motion, and from moments of the load, to the motion after a step."""
 
-    def __init__(self, of: MotionEquations, step: float, orders: bool = True) -> None:
-        self.of, self.step = of, step
-        self.pairs = pairs_of(of.halves.shape[1]) if orders else []
-        first, second = (of.first, of.second) if orders else (of.first[:, :0], of.second[:, :0])
-        identity = np.zeros_like(of.matrix) + np.eye(of.matrix.shape[-1])
+    def __init__(self, box_equations: MotionEquations, step: float, orders: bool = True) -> None:
+        self.of, self.step = box_equations, step
+        self.pairs = pairs_of(box_equations.halves.shape[1]) if orders else []
+        first, second = (
+            (box_equations.first, box_equations.second)
+            if orders
+            else (box_equations.first[:, :0], box_equations.second[:, :0])
+        )
+        identity = np.zeros_like(box_equations.matrix) + np.eye(box_equations.matrix.shape[-1])
         powers = [identity, np.zeros_like(first), np.zeros_like(second)]
         moves = [np.zeros_like(power) for power in powers]
         loads: tuple[list[Array], ...] = ([], [], [])
         for k in range(MOMENTS):
             for load_powers, sums, power in zip(loads, moves, powers, strict=True):
                 sums += power * (step**k / math.factorial(k))
-                load_powers.append(power @ (of.load if power.ndim == 3 else of.load[:, None]))
+                load_powers.append(power @ (box_equations.load if power.ndim == 3 else box_equations.load[:, None]))
             powers = self._next(powers, first, second)
         self.moves = moves
         # columns: components of the wrench for each moment

@@ -92,10 +92,13 @@ class RunPeaks:
         None if signals are not linear in the loads, as with bump stops.
         """
         designs = [] if self.has_stops else self._signals(points)
-        known = [both for both in designs if both is not None]
-        if not known or len(known) < len(points):
+        resolved = [run_signals for run_signals in designs if run_signals is not None]
+        if not resolved or len(resolved) < len(points):
             return None
-        pairs = [dict(zip(self.measures, zip(both[::2], both[1::2], strict=True), strict=True)) for both in known]
+        pairs = [
+            dict(zip(self.measures, zip(run_signals[::2], run_signals[1::2], strict=True), strict=True))
+            for run_signals in resolved
+        ]
         return [{measure: np.concatenate(runs) for measure, runs in pair.items()} for pair in pairs]
 
     @cached_property
@@ -121,14 +124,17 @@ class RunPeaks:
             ends += [low, high]
             widths.append(high[k] - low[k])
         base, *shifted = self._signals(ends)
-        if base is None or any(other is None for other in shifted):
+        if base is None or any(shifted_signals is None for shifted_signals in shifted):
             return self._unknown, np.full((sum(self.counts), len(point)), np.nan)
-        tops, interpolates = [top for _, top in _tops(base)], self._coarser > 1
+        peak_steps, interpolates = [steps_of_part for _, steps_of_part in _tops(base)], self._coarser > 1
         rows = [
             np.concatenate(
-                [_lengths(_squares(part), top, interpolates) for part, top in zip(other or [], tops, strict=True)]
+                [
+                    _lengths(_squares(part), steps_of_part, interpolates)
+                    for part, steps_of_part in zip(shifted_signals or [], peak_steps, strict=True)
+                ]
             )
-            for other in shifted
+            for shifted_signals in shifted
         ]
         pairs = zip(rows[::2], rows[1::2], widths, strict=True)
         return _peaks(base, interpolates), np.column_stack([(high - low) / width for low, high, width in pairs])
@@ -160,10 +166,11 @@ class RunPeaks:
         ]
         runs = [responses_to(models, sweep, loads) for sweep, loads in zip(self.sweeps, wrenches, strict=True)]
         return [
-            None if any(response is None for response in both) else [
-                signal_of(measure, response) for measure in self.measures for response in both if response is not None
+            None if any(response is None for response in responses) else [
+                signal_of(measure, response)
+                for measure in self.measures for response in responses if response is not None
             ]
-            for both in zip(*runs, strict=True)
+            for responses in zip(*runs, strict=True)
         ]  # fmt: skip
 
     def _model(self, numbers: Array) -> TimeModel | None:
@@ -182,9 +189,9 @@ class RunPeaks:
         run = self._problem.engine.extra(Run)
         if run is None:
             raise TypeError("there is no run-up")
-        ways = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
-        sweeps = [sweep_of(*way, self._coarser) for way in ways]
-        return tuple(way for way in sweeps if way is not None) if None not in sweeps else ()
+        arguments = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
+        sweeps = [sweep_of(*sweep, self._coarser) for sweep in arguments]
+        return tuple(sweep for sweep in sweeps if sweep is not None) if None not in sweeps else ()
 
     @property
     def wrenches(self) -> tuple[Array, ...]:
@@ -226,7 +233,7 @@ def signal_of(measure: Measure, response: RunResponse) -> Array:
 
 
 def _peaks(parts: Sequence[Array], between: bool) -> Array:
-    return np.concatenate([_lengths(squares, top, between) for squares, top in _tops(parts)])
+    return np.concatenate([_lengths(squares, peak_steps, between) for squares, peak_steps in _tops(parts)])
 
 
 def _squares(vectors: Array) -> Array:

@@ -13,9 +13,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel
 
 
-def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, roughly: bool) -> RunPeaks:
-    """Return the peaks of measures of run-ups; `roughly` omits bump stops, which cost most of the time."""
-    if roughly:
+def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, without_stops: bool) -> RunPeaks:
+    """Return the peaks of measures of run-ups; `without_stops` omits bump stops, which cost most of the time."""
+    if without_stops:
         mounts = (
             mount.mapped(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
             for mount in problem.engine.mounts

@@ -46,7 +46,7 @@ class SizeCut(NamedTuple):
     upper: Array
     bound: float
     side: int
-    known: tuple[CombinedMultipliers, ...]
+    multipliers: tuple[CombinedMultipliers, ...]
 
 
 class SizeBoxes:
@@ -145,10 +145,10 @@ class SizeBoxes:
 
     def with_limits(self, limits: Sequence[Limit]) -> SizeBoxes:
         """Return the boxes with some of the limits alone, and no objective."""
-        other = copy.copy(self)
-        other.terms, other.limits = [], [limit for limit in self.limits if limit[2] in limits]
-        other._combined = other._programs(self._ask)
-        return other
+        boxes = copy.copy(self)
+        boxes.terms, boxes.limits = [], [limit for limit in self.limits if limit[2] in limits]
+        boxes._combined = boxes._programs(self._ask)
+        return boxes
 
     def reach(self, lower: Array, upper: Array) -> SizeReach:
         """Return the ranges of masses and rod length on a box."""
@@ -183,15 +183,15 @@ class SizeBoxes:
         scaled.add_tangents(np.append(masses, self.model.start), length)
         return scaled.minimum(reach)
 
-    def objective(self, lower: Array, upper: Array, known: Sequence[CombinedMultipliers] = ()) -> float:
+    def objective(self, lower: Array, upper: Array, multipliers: Sequence[CombinedMultipliers] = ()) -> float:
         """Return a lower bound of the objective on a box; infinite if multipliers exclude the box."""
         reach = self.reach(lower, upper)
         # multipliers of the whole problem replace the bounds of single loads
-        numbers = [(w, number) for w, number in self.terms if not (known and number.pieces)]
+        numbers = [(w, number) for w, number in self.terms if not (multipliers and number.pieces)]
         bound = sum(weight * self.minimum(number, lower, upper, reach) for weight, number in numbers)
-        if self._combined is None or not known:
+        if self._combined is None or not multipliers:
             return bound
-        return bound + max(*(self._combined.minimum(rows, lower, upper, reach) for rows in known), 0.0)
+        return bound + max(*(self._combined.minimum(rows, lower, upper, reach) for rows in multipliers), 0.0)
 
     def violates_limit(self, lower: Array, upper: Array, k: int | None = None, sign: float = 0.0) -> bool:
         """Return True if a limit is violated in the whole box; with k, of limits with monotonicity `sign` in size k."""
@@ -203,64 +203,66 @@ class SizeBoxes:
         )
 
     def cut(
-        self, lower: Array, upper: Array, target: float, known: tuple[CombinedMultipliers, ...] = ()
+        self, lower: Array, upper: Array, target: float, multipliers: tuple[CombinedMultipliers, ...] = ()
     ) -> SizeCut | None:
         """Return a box without ends that have no better design; None if nothing remains."""
         self.add_tangents(lower, upper)
-        if self.violates_limit(lower, upper) or self.objective(lower, upper, known) >= target:
+        if self.violates_limit(lower, upper) or self.objective(lower, upper, multipliers) >= target:
             return None
         for _ in range(ROUNDS):
             previous_width = (upper - lower).sum()
-            known = self.multipliers_of(lower, upper, target, known)
-            if self.objective(lower, upper, known) >= target:
+            multipliers = self.multipliers_of(lower, upper, target, multipliers)
+            if self.objective(lower, upper, multipliers) >= target:
                 return None
             for k in range(len(lower)):
-                lower, upper = self._without_empty_ends(lower, upper, k, target, known)
+                lower, upper = self._without_empty_ends(lower, upper, k, target, multipliers)
             if (upper - lower).sum() > 0.9 * previous_width:
                 break
-        bound = self.objective(lower, upper, known)
+        bound = self.objective(lower, upper, multipliers)
         if bound >= target:
             return None
-        return SizeCut(lower, upper, bound, self._side(lower, upper, known, bound, target), known)
+        return SizeCut(lower, upper, bound, self._side(lower, upper, multipliers, bound, target), multipliers)
 
     def multipliers_of(
-        self, lower: Array, upper: Array, target: float, known: tuple[CombinedMultipliers, ...]
+        self, lower: Array, upper: Array, target: float, multipliers: tuple[CombinedMultipliers, ...]
     ) -> tuple[CombinedMultipliers, ...]:
         """Return multipliers of a box, then those of its parent; with all samples if the bound is near the target."""
         if self._combined is None:
             return ()
-        is_near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * target
+        is_near = bool(multipliers) and self.objective(lower, upper, multipliers) >= (1.0 - NEAR) * target
         rows = self._combined.multipliers_of(lower, upper, self.reach(lower, upper), is_near)
-        return known if rows is None else (rows, *known[: MOST_KNOWN - 1])
+        return multipliers if rows is None else (rows, *multipliers[: MOST_KNOWN - 1])
 
     def _side(
-        self, lower: Array, upper: Array, known: Sequence[CombinedMultipliers], bound: float, target: float
+        self, lower: Array, upper: Array, multipliers: Sequence[CombinedMultipliers], bound: float, target: float
     ) -> int:
         middle, gains = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, is_side in enumerate(np.eye(len(lower), dtype=bool) if known and target < math.inf else ()):
-            first = self.objective(lower, np.where(is_side, middle, upper), known)
-            second = self.objective(np.where(is_side, middle, lower), upper, known)
+        for k, is_side in enumerate(np.eye(len(lower), dtype=bool) if multipliers and target < math.inf else ()):
+            first = self.objective(lower, np.where(is_side, middle, upper), multipliers)
+            second = self.objective(np.where(is_side, middle, lower), upper, multipliers)
             gains[k] = min(first, target) + min(second, target) - 2.0 * bound
         if gains.max() > WORTH * (target - bound):
             return int(np.argmax(gains))
         return widest(lower, upper, self.model.upper - self.model.lower)
 
     def _without_empty_ends(
-        self, lower: Array, upper: Array, k: int, target: float, known: Sequence[CombinedMultipliers]
+        self, lower: Array, upper: Array, k: int, target: float, multipliers: Sequence[CombinedMultipliers]
     ) -> tuple[Array, Array]:
         """Return the box without the parts at both ends of side k that are proven to be empty."""
         is_side = np.arange(len(lower)) == k
 
         def low_empty(edge: float) -> bool:
             part = lower, np.where(is_side, edge, upper)
-            return self.violates_limit(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= target)
+            return self.violates_limit(*part, k, -1.0) or (
+                bool(multipliers) and self.objective(*part, multipliers) >= target
+            )
 
         first = _end_of_empty_range(low_empty, lower[k], upper[k])
         lower = np.where(is_side, first, lower)
 
         def high_empty(edge: float) -> bool:
             part = np.where(is_side, edge, lower), upper
-            return self.objective(*part, known) >= target or self.violates_limit(*part, k, 1.0)
+            return self.objective(*part, multipliers) >= target or self.violates_limit(*part, k, 1.0)
 
         return lower, np.where(is_side, _end_of_empty_range(high_empty, upper[k], lower[k]), upper)
 
@@ -282,7 +284,7 @@ def _end_of_empty_range(is_empty: Callable[[float], bool], start: float, end: fl
 class _SizeBox(Box):
     """Box with the multipliers of its bound."""
 
-    known: tuple[CombinedMultipliers, ...] = ()
+    multipliers: tuple[CombinedMultipliers, ...] = ()
 
 
 class _Sizes(BoxBisection):
@@ -290,8 +292,8 @@ class _Sizes(BoxBisection):
 
     what = "boxes of sizes"
 
-    def __init__(self, boxes: SizeBoxes, value: float, gap_tolerance: float, known: Witness | None = None) -> None:
-        super().__init__(value, gap_tolerance, known)
+    def __init__(self, boxes: SizeBoxes, value: float, gap_tolerance: float, witness: Witness | None = None) -> None:
+        super().__init__(value, gap_tolerance, witness)
         self._boxes = boxes
 
     @property
@@ -300,19 +302,19 @@ class _Sizes(BoxBisection):
         return self.cutoff
 
     def bound_box(
-        self, lower: Array, upper: Array, known: tuple[CombinedMultipliers, ...] = ()
+        self, lower: Array, upper: Array, multipliers: tuple[CombinedMultipliers, ...] = ()
     ) -> tuple[float, Box] | FathomedPart:
         """Return the bound of a box and its remainder after the cut."""
-        cut = self._boxes.cut(lower, upper, self.cutoff, known)
+        cut = self._boxes.cut(lower, upper, self.cutoff, multipliers)
         if cut is None:
             return FathomedPart(self.level)
         box = _SizeBox(cut.lower, cut.upper, cut.side)
-        box.known = cut.known
+        box.multipliers = cut.multipliers
         return cut.bound, box
 
     def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the bound and remainder of each half."""
-        return [self.bound_box(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
+        return [self.bound_box(*half, getattr(box, "multipliers", ())) for box in boxes for half in halves(box)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,7 +322,7 @@ class _Around:
     """Bounds of thin boxes around the best design, to check the proof."""
 
     boxes: SizeBoxes
-    known: Witness
+    witness: Witness
     what: str = _Sizes.what
 
     def around(self, place: Array) -> tuple[Array, Array]:
@@ -332,15 +334,15 @@ class _Around:
         self.boxes.add_tangents(*box)
         if self.boxes.violates_limit(*box):
             return math.inf
-        return self.boxes.objective(*box, self.boxes.multipliers_of(*box, self.known.value, ()))
+        return self.boxes.objective(*box, self.boxes.multipliers_of(*box, self.witness.value, ()))
 
 
 def divided_sizes(
-    boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MOST_BOXES, known: Witness | None = None
+    boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MOST_BOXES, witness: Witness | None = None
 ) -> BoxResult:  # fmt: skip
     """Return the bound by bisection, until no design is better than `value` by more than `gap_tolerance` (Z12)."""
-    bisection = _Sizes(boxes, value, gap_tolerance, known)
+    bisection = _Sizes(boxes, value, gap_tolerance, witness)
     result = bisection.run(bisection.bound_box(boxes.model.lower, boxes.model.upper), maximum)
-    if known is not None:
-        check_near_witness(_Around(boxes, known), known.place, known)
+    if witness is not None:
+        check_near_witness(_Around(boxes, witness), witness.place, witness)
     return result

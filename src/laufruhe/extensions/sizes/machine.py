@@ -209,10 +209,10 @@ class RunningGear(Extra):
         journal
             Diameter of the main bearings [m]; the part of a web around the journal has no unbalance.
         """
-        across, width = big_end or (0.0, 0.0)
-        total = ring_area(across, 0.0) * width * radius
+        pin_diameter, width = big_end or (0.0, 0.0)
+        total = ring_area(pin_diameter, 0.0) * width * radius
         if self.webs is not None:
-            total += self.webs.area * ((radius + 0.5 * across) ** 2 - 0.25 * journal**2)
+            total += self.webs.area * ((radius + 0.5 * pin_diameter) ** 2 - 0.25 * journal**2)
         return (self.density or 0.0) * total
 
 

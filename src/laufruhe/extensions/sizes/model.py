@@ -74,9 +74,9 @@ class SizeModel:
 
     def averaging(self) -> SizeModel:
         """Return the model with averaged rows of means, which never exceed the means over the cycle."""
-        other = copy(self)
-        other.averaged = True
-        return other
+        model = copy(self)
+        model.averaged = True
+        return model
 
     @property
     def moves_rod(self) -> bool:
@@ -155,11 +155,11 @@ class SizeModel:
         """Return a function from a rod length to the pieces of a measure, with the same rows at each length."""
         length = self._sizes_given[ROD_LENGTH]
         if not measure.is_load:
-            return lambda at: self._new_pieces(measure, at)
+            return lambda rod_length: self._new_pieces(measure, rod_length)
         base = self.problem.engine.cycle.base_order
         signals = with_common_base(base, self._unit_evaluations(length)[0].signals(measure.load))
         kinks = kinks_of(measure, signals, self.problem.engine)
-        return lambda at: self._new_pieces(measure, at, kinks)
+        return lambda rod_length: self._new_pieces(measure, rod_length, kinks)
 
     def fixed_rows(self, measure: Measure) -> list[Mask]:
         """Return masks of the rows of each piece whose samples no kink passes as the rod length changes.
@@ -272,8 +272,8 @@ class SizeModel:
             affine = replace(
                 affine_rows, constant=affine_rows.constant[signal], slope=affine_rows.slope[signal], grid=plain(count)
             )
-            at = ((k, place, count),)
-            piece = Piece(affine, at, tuple(_factors(measure, evaluations[0].engine, problem, at)))
+            position = ((k, place, count),)
+            piece = Piece(affine, position, tuple(_factors(measure, evaluations[0].engine, problem, position)))
             scalar = kinks_at is None and (not piece.given or piece.given[0].size == 1)
             if scalar:
                 ends = zip(self.mass_box, column_bounds(self.domains), strict=True)
@@ -327,13 +327,13 @@ def _affine(rows: Sequence[Rows]) -> AffineNorm:
 
 
 def _factors(
-    measure: Measure, engine: Engine, problem: Problem, at: Sequence[tuple[int, int | None, int]]
+    measure: Measure, engine: Engine, problem: Problem, positions: Sequence[tuple[int, int | None, int]]
 ) -> list[Array]:  # fmt: skip
     """Return factors by operating point, shape (places, 1 or d) each; [] for a measure without places."""
-    if not at:
+    if not positions:
         return []
     chosen_places, rows = measure.places(measure.load.places(engine)), []
-    for k, place, _ in at:
+    for k, place, _ in positions:
         factors = measure.load.factors_of(engine, problem.points[k])
         if factors is None:
             return []

@@ -96,9 +96,11 @@ def _bound(problem: Problem, design: Design) -> float:
     )
     if model.moves_rod or depends_on_sizes or design.violation > KEPT:
         return 0.0
-    relaxed, near = with_masses(problem, model, design.values)
+    relaxed, reference = with_masses(problem, model, design.values)
     gap_tolerance = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
-    return max(proven(Question(relaxed, design.value, gap_tolerance, near)).bound, mounts_bound(relaxed, near))
+    return max(
+        proven(Question(relaxed, design.value, gap_tolerance, reference)).bound, mounts_bound(relaxed, reference)
+    )
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:

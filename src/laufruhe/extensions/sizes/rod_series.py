@@ -77,7 +77,7 @@ class RodSeries:
     def terms(self, low: float, high: float) -> Array:
         """Return the matrix from values at the nodes to the series between two lengths, shape (n, n)."""
         count = len(self.constant)
-        return _terms(count) @ _shares(np.array([self._place(at) for at in _lengths(low, high, count)]), count)
+        return _terms(count) @ _shares(np.array([self._place(length) for length in _lengths(low, high, count)]), count)
 
     def _place(self, length: float) -> float:
         if self.low == self.high:

@@ -147,12 +147,12 @@ def _within(x: float, front: Bearing, rear: Bearing) -> bool:
     return rear.x < x < front.x
 
 
-def _on_one_throw(part: SliderCrank, other: SliderCrank) -> bool:
-    return abs(part.x - other.x) <= 1.5 * (part.big_end[1] if part.big_end else 0.0)
+def _on_one_throw(part: SliderCrank, neighbour: SliderCrank) -> bool:
+    return abs(part.x - neighbour.x) <= 1.5 * (part.big_end[1] if part.big_end else 0.0)
 
 
-def _lever(at: float, far: float, x: float) -> float:
-    share = (far - x) / (far - at)
+def _lever(loaded: float, unloaded: float, position: float) -> float:
+    share = (unloaded - position) / (unloaded - loaded)
     return share if 0.0 <= share <= 1.0 else 0.0
 
 
