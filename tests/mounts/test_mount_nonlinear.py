@@ -24,7 +24,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.mounts.bounds import divided_by
+from laufruhe.solvers.mounts.bounds import bound_search
 from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import start_points
@@ -181,13 +181,13 @@ class ScriptedSearch:
 
     def __init__(self, problem, stiffness):
         self.problem = problem
-        self.best = self.chosen = SearchResult(evaluate_design(problem, stiffness), None)
+        self.best = self.best_or_baseline = SearchResult(evaluate_design(problem, stiffness), None)
 
-    def again(self, places):
+    def search_from(self, places):
         found = SearchResult(evaluate_design(self.problem, places[0][0]), None)
         is_better = found.rank < self.best.rank
         if is_better:
-            self.best = self.chosen = found
+            self.best = self.best_or_baseline = found
         return is_better
 
 
@@ -209,7 +209,7 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
     monkeypatch.setattr("laufruhe.solvers.mounts.bounds.proven", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])
     given = search.best.design.value
-    found = divided_by(problem, search, False)
+    found = bound_search(problem, search, False)
     assert values[0] == pytest.approx(given, rel=1e-6)
     assert len(values) == asked
     assert values[-1] == pytest.approx(search.best.design.value, rel=1e-6)
@@ -354,7 +354,7 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
 
 def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path, monkeypatch):
     def found(maximum: float, room: float):
-        monkeypatch.setattr("laufruhe.solvers.mounts.search.ROOM", room)
+        monkeypatch.setattr("laufruhe.solvers.mounts.search.FAR_FROM_LIMIT", room)
         limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
 
@@ -426,7 +426,7 @@ def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypat
         return ()
 
     monkeypatch.setattr(search, "_solve", ended)
-    search.refined()
+    search.refine()
     assert [search.joint.split(start)[0] for start in begun] == [pytest.approx(places[chosen])]
 
 

@@ -15,7 +15,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import state
-from laufruhe.solvers.mounts.stars import _bounded, _method, _solved_fully, _stars
+from laufruhe.solvers.mounts.stars import _method, _solve_best_again, _stars, _with_bounds
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from laufruhe.solvers.stars.star_results import StarDesign
@@ -116,24 +116,24 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     """The first with what is worth proving of all, the others no further than it; none where one was left out."""
     asked = []
 
-    def bounded(result, value, cutoff=math.inf, of_many=False):
-        asked.append((value, cutoff, of_many))
+    def bounded(result, value, cutoff=math.inf, in_batch=False):
+        asked.append((value, cutoff, in_batch))
         bound = 0.9 * result.objective.value
         return replace(result, certificate=Certificate(Proof.GLOBAL, bound, 0.1, 0.0, "a bound"))
 
-    monkeypatch.setattr("laufruhe.solvers.mounts.stars.bounded_under", bounded)
+    monkeypatch.setattr("laufruhe.solvers.mounts.stars.with_mount_bounds", bounded)
     phasing = problem_of(tmp_path, *parts()).phasing
     found = [
         StarDesign(Candidate(tuple(map(math.radians, star))), state(problem_of(tmp_path, *parts(str(star)))))
         for star in STARS
     ]
     found.sort(key=lambda star: star.value)
-    out = _bounded(found, phasing, len(found))
+    out = _with_bounds(found, phasing, len(found))
     assert [star.candidate for star in out] == [star.candidate for star in found]
     assert [star.bound for star in out] == pytest.approx([0.9 * star.value for star in found])
     minimum = found[0].value
     assert asked == [(minimum, math.inf, True), *[(minimum, 0.9 * minimum, True)] * 2]
-    assert _bounded(found, phasing, len(found) + 1) is found
+    assert _with_bounds(found, phasing, len(found) + 1) is found
 
 
 @pytest.mark.parametrize(
@@ -156,12 +156,12 @@ def test_stars_that_may_still_be_the_best_are_searched_once_more(answer, names, 
     each = first, ruled_out, still_open, ("late", 12.0, 0.0, 2)
     found, searched = [StarDesign(Candidate((0.0,)), star(*one)) for one in each], []
 
-    def solved(own, among):
-        searched.append((own.title, own.search.starts, among))
+    def solved(own, defer_bounds):
+        searched.append((own.title, own.search.starts, defer_bounds))
         return star("again", answer, 0.0, 8)
 
     monkeypatch.setattr("laufruhe.solvers.mounts.stars.solve_mounts", solved)
-    again = _solved_fully(problem, found)
+    again = _solve_best_again(problem, found)
     assert searched == [("open", 8, True)]
     assert [one.result.problem.title for one in again] == names
 

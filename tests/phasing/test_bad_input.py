@@ -22,7 +22,7 @@ OPEN = 'throws = "open"\nfiring_order = "open"'
         (4, "four-stroke", 'throws = [0, 90, 270, 180]\nfiring_order = "open"', "", "inline",
          r"throws \[0, 90, 270, 180\] deg contradict the firing intervals allowed, 180 to 180 deg; the most even"),
         (3, "two-stroke", 'throws = [0, 120, 0]\nfiring_order = "open"', 'intervals = { min = "0 deg" }',
-         "inline", r"throws \[0, 120, 0\] deg let cylinders fire at once"),
+         "inline", r"throws \[0, 120, 0\] deg let several cylinders fire at once"),
         (6, "four-stroke", f"bank_angle = 90\n{OPEN}", "", "vee", "multiple of 120 deg, and they make 90 deg"),
         (6, "four-stroke", f"bank_angle = 90\nsplit_pin_angle = {{ between = [0, 20] }}\n{OPEN}", "", "vee",
          "no bank angle and split pin within the bounds let the firing be even"),

@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.solvers.throws.throw_search import Stage, missed_peak
+from laufruhe.solvers.throws.throw_search import Stage, peak_error
 from phasing import engines
 
 
@@ -60,7 +60,7 @@ def test_a_peak_misses_no_more_than_told(tmp_path):
     for samples in (48, 96, 192):
         sizes = np.linalg.norm(signal.sample(12 * samples), axis=-1).max(axis=1)
         worst = max(sizes.max() - sizes[shift::12].max() for shift in (0, 6))
-        told.append(missed_peak(measure, best, samples))
+        told.append(peak_error(measure, best, samples))
         assert worst <= told[-1]
     assert told[0] < 0.05 * sizes.max()
     assert told[2] < 0.4 * told[1] < 0.16 * told[0]

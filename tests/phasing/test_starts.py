@@ -11,7 +11,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, bounded_stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.throws.throw_starts import firing_intervals, turning_back
+from laufruhe.solvers.throws.throw_starts import firing_intervals, reverse_rotation
 from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'
@@ -33,7 +33,7 @@ def test_a_star_turned_back(tmp_path, layout):
     angles = (0.0, 4.1, 2.0) if vee else (0.0, 4.1, 2.0, 2.2, 4.3, 0.1)
     order = (1, 6, 3, 5, 2, 4) if vee else (1, 5, 3, 6, 2, 4)
     star = Candidate(tuple((first + angle) % math.tau for angle in angles), order, *geometry)
-    back = turning_back(phasing, star)
+    back = reverse_rotation(phasing, star)
 
     intervals, turned = firing_intervals(phasing, star), firing_intervals(phasing, back)
     assert min(intervals) > SOONEST
@@ -43,7 +43,7 @@ def test_a_star_turned_back(tmp_path, layout):
     values = [objective_value(problem, evaluate(problem)) for problem in problems]
     # the samples stand elsewhere in the cycle
     assert values[0] == pytest.approx(values[1], rel=1e-6)
-    twice = turning_back(phasing, back)
+    twice = reverse_rotation(phasing, back)
     assert twice.firing_order == order
     np.testing.assert_allclose(np.exp(1j * np.array(twice.throws)), np.exp(1j * np.array(star.throws)), atol=1e-12)
 

@@ -21,8 +21,8 @@ from laufruhe.prove.throws.arcs import ArcBox
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.stars.star_results import StarDesign, solve_fixed
 from laufruhe.solvers.throws.riding_weights import Riders
-from laufruhe.solvers.throws.throw_boxes import ThrowPrograms, compressed
-from laufruhe.solvers.throws.throw_windows import firing_bounds, nearest, windows_of
+from laufruhe.solvers.throws.throw_boxes import ThrowPrograms, compress
+from laufruhe.solvers.throws.throw_windows import firing_bounds, nearest_throws, windows_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
@@ -77,7 +77,7 @@ def scene(folder, name):
 
 def programs_of(problem, phasing, window, samples=64):
     """Programs of boxes, as the search makes them."""
-    throws = nearest(window, 0.5 * sum(window.box))
+    throws = nearest_throws(window, 0.5 * sum(window.box))
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     realised = replace(phasing.realise(candidate), phasing=None)
     rides = rides_of(phasing, candidate)
@@ -296,11 +296,11 @@ def test_rows_lose_only_components_that_nothing_loads():
     waves = np.zeros((1, 2, 5, 4), dtype=complex)
     constant[1, 0], slope[2, 1, 0], waves[0, 1, 3, 2] = 3.0, -4.0, 5.0j
     grid = Grid(np.full(5, 0.2), 5)
-    small = compressed(WaveNorm(AffineNorm(NORMS["maximum"], constant, slope, grid), waves, 0.5))
+    small = compress(WaveNorm(AffineNorm(NORMS["maximum"], constant, slope, grid), waves, 0.5))
     assert np.array_equal(small.fixed.constant, constant[:, :3])
     assert np.array_equal(small.fixed.slope, slope[:, :3])
     assert np.array_equal(small.waves, waves[..., :3])
     assert small.left_out == 0.5
     # a signal of nothing keeps a row to have a norm
-    none = compressed(WaveNorm(AffineNorm(NORMS["maximum"], 0.0 * constant, 0.0 * slope, grid), 0.0 * waves, 0.0))
+    none = compress(WaveNorm(AffineNorm(NORMS["maximum"], 0.0 * constant, 0.0 * slope, grid), 0.0 * waves, 0.0))
     assert none.fixed.constant.shape == (5, 1)

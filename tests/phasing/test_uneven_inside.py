@@ -29,8 +29,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.throws.irregularity_bound import StoredWorkBound
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.star_results import solve_fixed
-from laufruhe.solvers.throws.throw_starts import starts_of
-from laufruhe.solvers.throws.throw_windows import nearest, windows_of
+from laufruhe.solvers.throws.throw_starts import start_candidates
+from laufruhe.solvers.throws.throw_windows import nearest_throws, windows_of
 from problem_files import PROBLEMS
 from searched import searched
 
@@ -92,7 +92,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     engine, throws, told = SCENES[name]
     problem = problem_of(engine, "rms main-bearing force", throws, **told)
     phasing = problem.phasing
-    start = starts_of(phasing, None, True)[0]
+    start = start_candidates(phasing, None, True)[0]
     own = replace(phasing.realise(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
@@ -119,13 +119,13 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
                          phasing={"intervals": {"largest_deviation": "60 deg"}})) for load in LOADS]  # fmt: skip
     for problem in cases:
         phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
-        start = starts_of(phasing, None, True)[0]
+        start = start_candidates(phasing, None, True)[0]
         own = replace(phasing.realise(start), phasing=None)
         waves = ThrowWaves(own, phasing.layout_of(start), rides_of(phasing, start))
         measure = own.objective[0].measure
         norm = waves.norm(measure, waves.samples(measure, 192))
         window = windows[rng.integers(len(windows))]
-        throws = nearest(window, rng.uniform(*window.box))
+        throws = nearest_throws(window, rng.uniform(*window.box))
         told = tuple(float(angle) % math.tau for angle in throws)
         moved = replace(phasing.realise(replace(start, throws=told, firing_order=window.order)), phasing=None)
         rows = norm.fixed.constant.copy()
@@ -166,7 +166,7 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     bounds = [np.linspace(*pair, steps if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds]
     minimum = math.inf
     for throws in itertools.product(*bounds):
-        candidate = replace(starts_of(phasing, None, True)[0], throws=tuple(map(float, throws)))
+        candidate = replace(start_candidates(phasing, None, True)[0], throws=tuple(map(float, throws)))
         own = replace(phasing.realise(candidate), phasing=None)
         minimum = min(minimum, solve_fixed(own).objective.value if weights else objective_value(own, evaluate(own)))
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
@@ -182,7 +182,7 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
     problem = problem_of(TWIN, "mean main-bearing force", 1, counterweights=None,
                          phasing={"intervals": {"min": "100 deg", "max": "620 deg"}})  # fmt: skip
     result = laufruhe.solve(problem)
-    phasing, start = problem.phasing, starts_of(problem.phasing, None, True)[0]
+    phasing, start = problem.phasing, start_candidates(problem.phasing, None, True)[0]
     values = []
     for bank in np.radians(np.linspace(60, 120, 13)):
         throw = 0.5 * (bank - start.bank_angle) + start.throws[0]
@@ -208,7 +208,7 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
     )
     assert result.limits[0].value <= maximum * (1.0 + 1e-6)
     assert result.limits[0].value >= 0.95 * maximum
-    phasing, start, minimum = problem.phasing, starts_of(problem.phasing, None, True)[0], math.inf
+    phasing, start, minimum = problem.phasing, start_candidates(problem.phasing, None, True)[0], math.inf
     for throws in itertools.product(
         *(np.linspace(*pair, 6 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
     ):
@@ -237,7 +237,7 @@ def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
     problem = problem_of(BETWEEN, "degree of irregularity", counterweights=None, torsion=None,
                          flywheel={"inertia": f"{inertia} kg m^2"})  # fmt: skip
     phasing, rng = problem.phasing, np.random.default_rng(5)
-    start, shares = starts_of(phasing, None, True)[0], []
+    start, shares = start_candidates(phasing, None, True)[0], []
     for _ in range(12):
         throws = (0.0, *rng.uniform(1.0, 5.0, 2))
         own = replace(phasing.realise(replace(start, throws=throws, firing_order=None)), phasing=None)
@@ -297,8 +297,8 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     result = laufruhe.solve(problem)
     assert result.status is Status.FEASIBLE
     values = []
-    start = starts_of(problem.phasing, None, True)[0]
-    for angle in np.radians(np.linspace(100, 140, 5)):
+    start = start_candidates(problem.phasing, None, True)[0]
+    for angle in np.radians(np.linspace(100, 140, 9)):
         own = problem.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
         decision = own.mount_decisions[0]
         for stiffness in np.linspace(decision.lower, decision.upper, 6):

@@ -206,8 +206,8 @@ def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) 
     limits = [{"limit": "mean shaking force", "orders": [2], "max": maximum}]
     told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [], "constraints": limits}
     design = StarDesign(Candidate((0.0,)), state(load_tables(told, Path("single.toml"))))
-    assert not design.is_met
-    assert design.is_excluded is excluded
+    assert not design.is_feasible
+    assert design.is_infeasible is excluded
 
 
 def test_a_design_is_not_broken_by_what_few_angles_read_of_a_limit_that_it_cannot_move() -> None:

@@ -247,7 +247,7 @@ def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"rms mount force"', '"mean main-bearing force"', "nothing that is asked depends on it"),
+        ('"rms mount force"', '"mean main-bearing force"', "no objective or limit depends on it"),
     ],
 )  # fmt: skip
 def test_what_is_not_decided_with_leads_is_told(old: str, new: str, said: str, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, with_mounts
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.mounts.bounds import conflict_of, excludes
+from laufruhe.solvers.mounts.bounds import are_contradictory, minimal_conflict
 
 
 def limits_of(problem: Problem, share: float, seed: int = 0) -> list[dict[str, Any]]:
@@ -50,9 +50,9 @@ def limited(seed: int, share: float) -> Problem:
 def test_what_is_excluded_no_search_meets(seed: int) -> None:
     """Limits that random designs keep are not excluded; tighter ones are, and a search breaks them."""
     kept = limited(seed, 1.02)
-    assert not excludes(kept, kept.limits)
+    assert not are_contradictory(kept, kept.limits)
     problem = limited(seed, 0.7)
-    assert excludes(problem, problem.limits)
+    assert are_contradictory(problem, problem.limits)
     low, high = sides(problem)
     given = evaluate(problem)
 
@@ -70,4 +70,4 @@ def test_a_conflict_of_run_ups_is_named() -> None:
     asked = tables_of(READY)
     force = {"limit": "run-up force", "max": "300 N"}
     problem = load_tables({**asked, "constraints": [*asked["constraints"], force]}, Path("single.toml"))
-    assert conflict_of(problem) == ("static sag", "run-up travel", "run-up force")
+    assert minimal_conflict(problem) == ("static sag", "run-up travel", "run-up force")

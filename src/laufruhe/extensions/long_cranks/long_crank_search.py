@@ -29,8 +29,8 @@ from laufruhe.solvers.stars.even_search import (
     EvenStarResult,
     amplitudes,
     can_list,
-    listed_answer,
-    merge_answers,
+    enumeration_result,
+    merge_results,
     search_even,
 )
 from laufruhe.solvers.stars.families import Family
@@ -62,8 +62,8 @@ def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
             stars, method = enumerate_stars(space, objective, phasing.best), "every star looked at"
         else:
             stars, method = search_stars(space, objective, phasing.best, phasing.time_limit), _BY_HALVES
-        answers.append(listed_answer(phasing, family, stars, method))
-    return merge_answers(answers, phasing.best)
+        answers.append(enumeration_result(phasing, family, stars, method))
+    return merge_results(answers, phasing.best)
 
 
 def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
@@ -83,7 +83,7 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
     stars, looked_at = [tuple(map(int, star)) for star in known], len(known)
     answer = _evaluate_stars(problem, phasing, family, stars, 0.0)
     if answer.complete:
-        return merge_answers([answer], phasing.best)
+        return merge_results([answer], phasing.best)
     three = [phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)]
     objective = couple_norms(problem, family.space, three)
     if objective is None:
@@ -91,7 +91,7 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
     every = search_stars(family.space, objective, phasing.best, phasing.time_limit, known)
     stars += [tuple(map(int, star)) for star in every.stars]
     answer = _evaluate_stars(problem, phasing, family, stars, every.lower_bound)
-    answer = merge_answers([answer], phasing.best)
+    answer = merge_results([answer], phasing.best)
     return replace(answer, complete=every.complete, looked_at=looked_at + every.nodes, method=_BY_HALVES)
 
 
@@ -110,7 +110,7 @@ def _evaluate_stars(
         bound = max(bound, firing_bound(problem, design))
         is_proven = gap <= problem.tolerance
         complete = complete or is_proven
-        designs.append(EvenDesign.of_steps(phasing, family, steps, (), value, bound, is_proven))
+        designs.append(EvenDesign.from_steps(phasing, family, steps, (), value, bound, is_proven))
     designs.sort(key=lambda design: design.value)
     method = "star without couples, which leaves what every even one has"
     return EvenStarResult(tuple(designs), bound, complete, len(designs), method)
@@ -147,9 +147,9 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         bound = cut.minimum(space)
         done = gap_of(design.value, bound, zero_level) <= 2.0 * problem.tolerance
         method = f"exchanges of throws at {model.samples} angles"
-        best = EvenDesign.of_steps(phasing, family, design.star, design.built, design.value, design.bound, done)
+        best = EvenDesign.from_steps(phasing, family, design.star, design.built, design.value, design.bound, done)
         answers.append(EvenStarResult((best,), bound, done, 1, method))
-    return merge_answers(answers, phasing.best)
+    return merge_results(answers, phasing.best)
 
 
 def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:

@@ -18,7 +18,7 @@ from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, ProofData, broken_limits, build_result, infeasible_result
-from laufruhe.solvers.mounts.bounds import conflict_of, divided_by
+from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
 from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
@@ -44,17 +44,19 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     # a rough first search helps only with several starts
     is_single_start = starts == 1
     first = None if relaxed is None or is_single_start else place_of(problem, relaxed)
-    search = MountSearch(search_problem, initial, first=first, beside=True, coarser=1 if is_single_start else COARSER)
+    search = MountSearch(
+        search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSER
+    )
     has_bound = divides(problem) and bounds_runs(problem)
     search.run()
     can_refine = bool(search.optima) and not has_stops and not is_single_start
     if can_refine and search.best is not None and search.best.design.violation <= NEAR:
-        search.refined()
-    box_result = divided_by(problem, search, False) if has_bound else BoxResult(0.0, 0)
+        search.refine()
+    box_result = bound_search(problem, search, False) if has_bound else BoxResult(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
-    best = search.chosen
+    best = search.best_or_baseline
     if best is None or best.design.violation > KEPT:
-        conflict = conflict_of(problem) if box_result.bound == math.inf else ()
+        conflict = minimal_conflict(problem) if box_result.bound == math.inf else ()
         result = infeasible_result(problem, initial, conflict, timing)
         return result if conflict else _infeasible(problem, search, best, result)
     return _best_result(problem, search, best, initial, relaxed, box_result, timing)

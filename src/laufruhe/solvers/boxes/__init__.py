@@ -1,1 +1,1 @@
-"""What is not convex, divided into boxes: places, leads, flywheel, crankshaft, sizes."""
+"""Solve for decisions without a convex program by branch and bound: positions, phase leads, flywheel sizes."""

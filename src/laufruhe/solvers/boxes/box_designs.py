@@ -19,7 +19,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.boxes.search import BoxSearch, SearchBox, divided
+from laufruhe.solvers.boxes.search import BoxSearch, SearchBox, divide_boxes
 from laufruhe.solvers.conclusion import (
     Design,
     ProofData,
@@ -34,12 +34,20 @@ from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
 SHARE = 0.25
-"""Share of the tolerance that the programs of boxes use up."""
+"""Share of the tolerance for the programs of boxes."""
 
 
 @dataclass(frozen=True, eq=False)
 class RebalancedDesign:
-    """A design, and the result that decided its unbalances."""
+    """A design, and the result of the problem that determined its unbalances.
+
+    Attributes
+    ----------
+    design
+        The design.
+    result
+        Result of the problem of the unbalances; None if no unbalance is open.
+    """
 
     design: Design
     result: Result | None = None
@@ -51,7 +59,7 @@ class RebalancedDesign:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """Sort key of the design."""
+        """Sort key: feasible designs first, then by objective."""
         return self.design.rank
 
 
@@ -60,11 +68,11 @@ class BoundedBox(SearchBox, Protocol):
 
     @property
     def lower(self) -> Array:
-        """Lower bounds."""
+        """Lower bounds of the numbers, shape (n,)."""
 
     @property
     def upper(self) -> Array:
-        """Upper bounds."""
+        """Upper bounds of the numbers, shape (n,)."""
 
 
 S = TypeVar("S", bound=BoundedBox)
@@ -75,27 +83,27 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
 
     conflict: tuple[str, ...] = ()
     angles = 0
-    """Least number of angles of a cycle at which programs start."""
+    """Smallest number of samples per cycle of the first cone program."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
-    def known(self, design: RebalancedDesign) -> Witness | None:
+    def witness_of(self, design: RebalancedDesign) -> Witness | None:
         """Return a design as a witness of bounds, or None if it violates limits."""
         return known_of(design.design, self.place(design))
 
     def place(self, design: RebalancedDesign) -> Array:
-        """Return the numbers of a design that boxes bound, shape (n,)."""
+        """Return the values of the decisions that boxes bound, shape (n,)."""
         pairs = zip(self.problem.decisions, design.design.values, strict=True)
         return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
     def holds(self, box: S, design: RebalancedDesign) -> bool:
-        """Return whether a design lies in a box."""
-        at = self.place(design)
-        return bool(np.all(box.lower <= at) and np.all(at <= box.upper))
+        """Return True if a design lies in a box."""
+        numbers = self.place(design)
+        return bool(np.all(box.lower <= numbers) and np.all(numbers <= box.upper))
 
     def prices(self, _: Design) -> dict[Side, Price]:
-        """Return prices of limits that the problem of the unbalances lacks."""
+        """Return prices of limits that are not in the problem of the unbalances."""
         return {}
 
     def add_conflict(self, conflict: Sequence[str]) -> None:
@@ -103,8 +111,8 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         names = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in names)
 
-    def solved(
-        self, root: S | FathomedPart, first: RebalancedDesign | None, maximum: int, what: str, how: str
+    def solve(
+        self, root: S | FathomedPart, first: RebalancedDesign | None, maximum: int, numbers: str, method: str
     ) -> Result:
         """Return the best design of a branch and bound search, with its certificate.
 
@@ -113,17 +121,18 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         root
             Box of all open numbers, or the proof that no design is feasible.
         first
-            Incumbent to start with.
+            First incumbent; None if there is none.
         maximum
             Largest number of boxes.
-        what, how
-            Names of the open numbers and of the bounding method.
+        numbers, method
+            Names of the open numbers and of the bounding method, for reports.
         """
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, FathomedPart) and first is not None:
             zero_level = numerical_zero(problem)
-            best, bound, boxes = divided(self, root, first, zero_level, problem.tolerance, maximum, f"boxes of {what}")
+            name = f"boxes of {numbers}"
+            best, bound, boxes = divide_boxes(self, root, first, zero_level, problem.tolerance, maximum, name)
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):
             return infeasible_result(problem, initial, self.conflict, timing)
@@ -132,35 +141,35 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
             bound=0.0 if design.rank[0] else bound,
             strength=ProofStrength.EXACT,
             kkt_residual=balance.certificate.kkt_residual if balance and balance.certificate else math.inf,
-            method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
+            method=f"{method} {boxes} box{'es' * (boxes > 1)} of {numbers}",
             prices=(balance.prices if balance else {}) | self.prices(design),
         )
         return build_result(design, replace(initial, samples=design.evaluation.samples), proof, timing)
 
 
-def rebalance(problem: Problem, fixed: Problem, where: dict[str, Value], angles: int = 0) -> RebalancedDesign:
-    """Return the best design with fixed values of some decisions.
+def rebalance(problem: Problem, balance: Problem, fixed_values: dict[str, Value], angles: int = 0) -> RebalancedDesign:
+    """Optimise the unbalances of a design with fixed values of all other decisions.
 
-    If none is feasible, the unbalances keep their start values, and the design violates limits.
+    If no design is feasible, the unbalances keep their start values, and the design violates limits.
 
     Parameters
     ----------
     problem
-        All decisions.
-    fixed
-        The unbalances alone, with the other decisions at their values.
-    where
-        Values of the fixed decisions by name.
+        Problem with all decisions.
+    balance
+        Problem with the unbalances as its only decisions.
+    fixed_values
+        Values of the other decisions by name [SI].
     angles
-        Least number of angles of a cycle at which the program starts.
+        Smallest number of samples per cycle of the first cone program.
     """
     result, samples = None, None
-    values: dict[str, Value] = {decision.name: decision.start for decision in problem.decisions} | where
-    if fixed.decisions:
-        fixed = replace(fixed, tolerance=SHARE * problem.tolerance)
-        result = solve_unbalances(fixed, angles=angles)
+    values: dict[str, Value] = {decision.name: decision.start for decision in problem.decisions} | fixed_values
+    if balance.decisions:
+        balance = replace(balance, tolerance=SHARE * problem.tolerance)
+        result = solve_unbalances(balance, angles=angles)
         if result.status is not Status.INFEASIBLE:
-            unbalances = unbalances_of(fixed, result)
-            values |= dict(zip((decision.name for decision in fixed.decisions), unbalances, strict=True))
+            unbalances = unbalances_of(balance, result)
+            values |= dict(zip((decision.name for decision in balance.decisions), unbalances, strict=True))
         samples = result.final.samples
     return RebalancedDesign(evaluate_design(problem, list(values.values()), samples), result)

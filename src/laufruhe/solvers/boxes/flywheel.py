@@ -1,4 +1,4 @@
-"""Flywheel sizes by branch and bound: objective and limits are monotone in each size (T9)."""
+"""Solve for flywheel sizes by branch and bound: objective and limits are monotone in each size (T9)."""
 
 from __future__ import annotations
 
@@ -26,56 +26,60 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
 
 WIDTH = "flywheel.width"
-# share of the tolerance for a monotone objective, whose boxes close fast
-SHARPER = 1e-3
-# relative distance that local programs keep from limits
-INSIDE = 1e-9
-# boxes for each set of limits that may contradict each other
+# share of the tolerance for a monotone objective, whose gap closes fast
+MONOTONE_SHARE = 1e-3
+# relative margin of local programs to limits
+MARGIN = 1e-9
+# largest number of boxes to test a set of limits for a contradiction
 FEW_BOXES = 64
 
 
 @dataclass(frozen=True, eq=False)
 class _Coordinates:
-    """Coordinates of boxes: the decisions, or the mass of the rim in place of its width.
+    """Coordinates of boxes: the decisions, or the decisions with the rim's mass in place of its width.
 
-    Mass, inertia and stress depend on diameter, height and mass alone. With the mass as coordinate, boxes need not
-    follow a width that compensates a height.
+    Mass, inertia and stress depend on diameter, height and mass alone. In these coordinates, fewer boxes cover designs
+    of equal mass.
 
     Attributes
     ----------
+    problem
+        Problem whose decisions are flywheel sizes.
+    initial
+        Flywheel of the baseline design.
     width
         Index of the width among the decisions; None if the coordinates are the decisions themselves.
     """
 
     problem: Problem
-    given: Flywheel
+    initial: Flywheel
     width: int | None
 
     @classmethod
     def from_problem(cls, problem: Problem, by_mass: bool) -> _Coordinates:
-        """Return the coordinates of a problem, with the mass in place of the width if `by_mass`."""
+        """Build the coordinates of a problem; if `by_mass`, the rim's mass replaces its width."""
         if problem.engine.flywheel is None:
-            raise TypeError("an engine without a flywheel has none to decide")
+            raise TypeError("the engine has no flywheel")
         names = [decision.name for decision in problem.decisions]
         has_mass = by_mass and len(names) > 1 and WIDTH in names
         return cls(problem, problem.engine.flywheel, names.index(WIDTH) if has_mass else None)
 
     def wheel(self, x: Array) -> Flywheel:
-        """Return the flywheel at coordinates."""
+        """Return the flywheel at coordinates x, shape (n,)."""
         values = x.tolist()
         if self.width is not None:
             values = [*values[: self.width], self.problem.decisions[self.width].start, *values[self.width : -1]]
-        wheel = apply_decisions(Numbers(), self.problem.decisions, values).flywheel(self.given)
+        wheel = apply_decisions(Numbers(), self.problem.decisions, values).flywheel(self.initial)
         return wheel if self.width is None else wheel.weighing(float(x[-1]))
 
     def decisions(self, x: Array) -> Array:
-        """Return the values of the decisions at coordinates."""
+        """Return the values of the decisions at coordinates x, shape (n,) [SI]."""
         if self.width is None:
             return x
         return np.clip(np.insert(x[:-1], self.width, self.wheel(x).ring.width), *self.bounds)
 
     def place(self, values: Sequence[Value]) -> Array:
-        """Return the coordinates of a design."""
+        """Return the coordinates of a design, shape (n,), from the values of its decisions."""
         x = np.array([float(value.real) for value in values])
         if self.width is None:
             return x
@@ -90,7 +94,14 @@ class _Coordinates:
     def monotone_problem(self, initial: Evaluation, limits: Sequence[Limit]) -> MonotoneProblem:
         """Return objective and limits as monotone functions of the coordinates.
 
-        At constant speed the flywheel affects no other quantity.
+        At constant speed, the flywheel affects no quantity of the loads.
+
+        Parameters
+        ----------
+        initial
+            Evaluation of the baseline design.
+        limits
+            Limits of the problem to include.
         """
         lower, upper = self.bounds
         width: list[tuple[float, Monotone]] = []
@@ -99,14 +110,14 @@ class _Coordinates:
             for sign, bound in ((1.0, upper), (-1.0, lower)):
                 function = Monotone(lambda x, sign=sign: sign * self.wheel(x).ring.width, sign * signs)  # type: ignore[misc]
                 width.append((sign * bound[self.width], function))
-            ends = (replace(self, width=None).wheel(bound).ring.mass for bound in (lower, upper))
+            masses = (replace(self, width=None).wheel(bound).ring.mass for bound in (lower, upper))
             lower, upper = (
-                np.append(np.delete(b, self.width), end) for b, end in zip((lower, upper), ends, strict=True)
+                np.append(np.delete(b, self.width), mass) for b, mass in zip((lower, upper), masses, strict=True)
             )
 
         def monotone(measure: Measure) -> Monotone:
             if measure.channel.flywheel_value is None:
-                raise TypeError(f"{measure.name} is not of the flywheel")
+                raise TypeError(f"{measure.name} does not measure the flywheel")
             flywheel_value = measure.channel.flywheel_value(measure, initial)
             sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
             return Monotone(lambda x: flywheel_value(self.wheel(x)), np.full(len(lower), sign))
@@ -126,34 +137,38 @@ class _WheelProgram(LocalProgram):
     functions: MonotoneProblem
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective, then the relative distance to each limit."""
+        """Return the objective [SI], then the relative distance to each limit."""
         x, problem = np.array(self.values(shares)), self.functions
-        rooms = (1.0 - function.value(x) / maximum - INSIDE for maximum, function in problem.limits)
-        return np.array([problem.value(x), *rooms])
+        distances = (1.0 - function.value(x) / maximum - MARGIN for maximum, function in problem.limits)
+        return np.array([problem.value(x), *distances])
 
 
 def solve_flywheel(problem: Problem) -> Result:
-    """Return the best flywheel with its proof, or the limits that contradict each other."""
+    """Return the best flywheel with its certificate, or the limits that contradict each other."""
     started = time.perf_counter()
     initial = evaluate(problem)
-    coordinates, plain = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
+    coordinates, decision_coordinates = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
     functions = coordinates.monotone_problem(initial, problem.limits)
-    program = _WheelProgram(problem, *plain.bounds, plain.monotone_problem(initial, problem.limits))
+    program = _WheelProgram(
+        problem, *decision_coordinates.bounds, decision_coordinates.monotone_problem(initial, problem.limits)
+    )
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
 
-    def bounded(value: float, room: float, design: Design) -> BoxResult:
+    def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
         known = None if math.isinf(value) else known_of(design, coordinates.place(design.values), violation=0.0)
-        result = divided(functions, value, (SHARPER if functions.is_monotone else 1.0) * room, known=known)
+        result = divided(
+            functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, known=known
+        )
         return replace(result, places=tuple(coordinates.decisions(x) for x in result.places))
 
-    def excluded(limits: Sequence[Limit]) -> bool:
-        limited = replace(coordinates.monotone_problem(initial, limits), terms=())
-        return divided(limited, math.inf, 0.0, FEW_BOXES).bound == math.inf
+    def is_infeasible(limits: Sequence[Limit]) -> bool:
+        feasibility = replace(coordinates.monotone_problem(initial, limits), terms=())
+        return divided(feasibility, math.inf, 0.0, FEW_BOXES).bound == math.inf
 
-    answer = proven(program, best, bounded)
+    outcome = proven(program, best, bounded)
     timing = {"solve": time.perf_counter() - started}
-    if answer.excludes_all:
-        return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
-    method = f"monotone quantities, bounded on {answer.divided.boxes} boxes of the flywheel's numbers"
-    proof = proof_data(program, answer.design, answer.bound, ProofStrength.EXACT, method)
-    return build_result(answer.design, initial, proof, timing)
+    if outcome.excludes_all:
+        return infeasible_result(problem, initial, smallest_conflict(problem.limits, is_infeasible), timing)
+    method = f"monotone quantities, bounded on {outcome.divided.boxes} boxes of the flywheel's numbers"
+    proof = proof_data(program, outcome.design, outcome.bound, ProofStrength.EXACT, method)
+    return build_result(outcome.design, initial, proof, timing)

@@ -1,4 +1,4 @@
-"""Relaxation of open positions: a problem whose unbalances stand at the vertices of a box (P8).
+"""Relax open positions to a problem whose unbalances stand at the vertices of a box (P8).
 
 The load of an unbalance U at a position r is linear in U and in U r. If r lies in a box with
 vertices r_c, it is the load of the unbalances
@@ -7,9 +7,9 @@ vertices r_c, it is the load of the unbalances
 
 at the vertices. The relaxation drops two conditions: all U_c have one angle, and unbalances at one
 position have the same l_c. So its optimum is a lower bound of all designs with positions in the
-box. A fixed unbalance makes U r linear in r, and the relaxation is exact.
+box. If U is fixed, U r is linear in r, and the relaxation is exact.
 
-The two bearings next to a load share it, so that their forces have a kink where a position passes a
+The two bearings next to a load share it, so their forces have a kink if a position passes a
 bearing (B4). Planes of bearings inside a box are vertices too (P20). All other decisions stay
 open: the relaxation is a problem without open positions.
 """
@@ -34,10 +34,10 @@ from laufruhe.problem.sets import Interval, Set, Value
 from laufruhe.solvers.conclusion import unbalances_of, values_of
 from laufruhe.solvers.result import Result
 
-ALONG = 0
-"""Axis of a position along its shaft."""
+AXIAL = 0
+"""Index of the axial coordinate of a position."""
 UNUSED = 1e-6
-"""Share of the largest unbalance at the vertices under which one counts as zero."""
+"""Unbalance at a vertex that counts as zero, relative to the largest."""
 
 
 class Relaxation:
@@ -46,21 +46,21 @@ class Relaxation:
     Parameters
     ----------
     problem
-        A problem with open positions.
+        Problem with open positions.
     share
-        Share of its tolerance for the relaxations.
+        Share of the problem's tolerance for the relaxations.
     """
 
     def __init__(self, problem: Problem, share: float) -> None:
         self._tolerance = share * problem.tolerance
-        # limits on distances are no limits of the relaxation
+        # the relaxation ignores limits on distances
         limits = tuple(limit for limit in problem.limits if not limit.measure.channel.is_placing)
         self.problem = problem = problem.changed(limits=limits)
         self.places = tuple(d for d in problem.decisions if d.kind is Kind.PLACE)
-        self.others = tuple(d for d in problem.decisions if d.kind is not Kind.PLACE)
+        self.other_decisions = tuple(d for d in problem.decisions if d.kind is not Kind.PLACE)
         self.unbalances = problem.unbalances
         self._smallest = [_smallest(decision.set) for decision in self.unbalances]
-        # rotors with every unbalance as small as its bounds allow
+        # rotors with the smallest unbalances that their bounds allow
         self._base = problem.design(self._smallest, self.unbalances)
         self._rotors = {rotor.name: rotor for rotor in self._base.rotors}
         self._placed: dict[str, list[int]] = {}
@@ -74,7 +74,7 @@ class Relaxation:
         dependences = {dependence(measure.channel, Kind.PLACE, self.problem) for measure in self.problem.measures}
         if Dependence.BENT not in dependences:
             return np.zeros(0)
-        shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == ALONG}
+        shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == AXIAL}
         return np.unique([
             x for shaft in shafts for x in sorted(b.x for b in self.problem.engine.bearings if b.shaft == shaft)[1:-1]
         ])  # fmt: skip
@@ -84,13 +84,13 @@ class Relaxation:
         return [np.array([low, *kinks[(kinks > low) & (kinks < high)], high]) for kinks, low, high in sides]
 
     def program(self, lower: Array, upper: Array) -> Problem:
-        """Return the relaxation over a box: open unbalances stand at its vertices, and no position is open."""
+        """Return the relaxation over a box [m]: open unbalances stand at its vertices, and no position is open."""
         nodes = self._nodes(lower, upper)
         rotors, decisions = self._fixed_unbalances(nodes)
         limits: list[Limit] = []
         names = {name: [name] for name in self._placed}
         smallest = dict(zip((decision.name for decision in self.unbalances), self._smallest, strict=True))
-        for decision in self.others:
+        for decision in self.other_decisions:
             axes = self._axes(decision)
             if not axes:
                 decisions.append(replace(decision, start=smallest.get(decision.name, decision.start)))
@@ -109,11 +109,11 @@ class Relaxation:
                 rotors += copies
                 names.setdefault(rotor_name, [rotor_name]).extend(rotor.name for rotor in copies)
             limits.append(_limit_on_sum(decision, first, parts[first.rotor]))
-        others = tuple(rotor for rotor in self._rotors.values() if rotor.name not in self._placed)
+        fixed_rotors = tuple(rotor for rotor in self._rotors.values() if rotor.name not in self._placed)
         problem = self.problem
         return replace(
             problem,
-            engine=replace(self._base, rotors=(*others, *rotors)),
+            engine=replace(self._base, rotors=(*fixed_rotors, *rotors)),
             decisions=tuple(decisions),
             objective=tuple(replace(t, measure=_renamed(t.measure, names)) for t in problem.objective),
             limits=(*(replace(x, measure=_renamed(x.measure, names)) for x in problem.limits), *limits),
@@ -121,9 +121,10 @@ class Relaxation:
         )
 
     def _fixed_unbalances(self, nodes: Sequence[Array]) -> tuple[list[Rotor], list[Decision]]:
-        """Return rotors and decisions of fixed unbalances: their loads are linear in the position within a cell.
+        """Return rotors and decisions of fixed unbalances, whose loads are linear in the position within a cell.
 
-        The relaxation drops the condition that a position fills a cell before it enters the next.
+        Each decision is the share of a cell that the position has covered. The relaxation drops the condition that a
+        position covers a whole cell before it enters the next.
         """
         rotors: list[Rotor] = []
         decisions: list[Decision] = []
@@ -136,9 +137,9 @@ class Relaxation:
                 for c, (low, high) in enumerate(pairwise(nodes[k])):
                     if high == low:
                         continue
-                    for at, gain in ((low, -unbalance), (high, unbalance)):
-                        end = self._placed_at(name, first | {k: float(at)}, f"{name} | {k} {c} {gain:g}")
-                        # the mass of the rotor counts once
+                    for side, gain in ((low, -unbalance), (high, unbalance)):
+                        end = self._placed_at(name, first | {k: float(side)}, f"{name} | {k} {c} {gain:g}")
+                        # other roles would count the mass of the rotor again
                         rotors.append(replace(end, role=Role.THROW))
                         drives.setdefault(_cell_name(self.places[k], c), []).append(RotorDrive(end.name, gain))
         for place, coordinates in zip(self.places, nodes, strict=True):
@@ -146,49 +147,65 @@ class Relaxation:
             decisions += [Decision(n, "", Interval(0.0, 1.0), 0.0, tuple(drives[n])) for n in names if n in drives]
         return rotors, decisions
 
-    def _placed_at(self, name: str, places: dict[int, float], new: str) -> Rotor:
+    def _placed_at(self, name: str, places: dict[int, float], new_name: str) -> Rotor:
         # a rotor under a new name has no unbalance
         rotor = self._rotors[name]
-        where = list(rotor.place)
-        for k, at in places.items():
+        place = list(rotor.place)
+        for k, coordinate in places.items():
             for drive in self.places[k].place_drives:
                 if drive.rotor == name:
-                    where[drive.axis] = at
-        moved = replace(rotor.placed(*where), name=new)
-        # the limit on the sum of all vertices needs any radius
-        return moved if new == name else replace(moved, unbalance=0.0j, radius=rotor.radius or 1.0)
+                    place[drive.axis] = coordinate
+        moved = replace(rotor.placed(*place), name=new_name)
+        # the limit on the sum over all vertices needs a radius, of any size
+        return moved if new_name == name else replace(moved, unbalance=0.0j, radius=rotor.radius or 1.0)
 
-    def placing(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return the position of the relaxed solution and the spread of its unbalances [m], shape (places,) each."""
+    def recover_places(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Return the positions of the relaxed solution and the spread of its unbalances [m], shape (places,) each.
+
+        Parameters
+        ----------
+        relaxed, result
+            Relaxation over the box, and its result.
+        lower, upper
+            Bounds of the positions [m], shape (places,) each.
+        """
         unbalances = dict(zip((d.name for d in relaxed.unbalances), unbalances_of(relaxed, result), strict=True))
-        # unbalances and coordinates that pull each position, a pair of arrays per decision
-        votes: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
+        # unbalances and their coordinates along each position, a pair of arrays per decision
+        moments: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
         nodes = self._nodes(lower, upper)
         for k, (place, coordinates) in enumerate(zip(self.places, nodes, strict=True)):
             shares = [unbalances.get(_cell_name(place, c), 0.0) for c in range(len(coordinates) - 1)]
             if _cell_name(place, 0) in unbalances:
                 size = sum(abs(self._rotors[drive.rotor].unbalance) for drive in place.place_drives)
-                votes[k].append((np.array(-size * np.diff([1.0, *shares, 0.0]), complex), coordinates))
+                moments[k].append((np.array(-size * np.diff([1.0, *shares, 0.0]), complex), coordinates))
         for decision in self.unbalances:
             axes = self._axes(decision)
             vertices = _vertices(nodes, axes) if axes else ()
             gain = sum(abs(drive.gain) for drive in decision.rotor_drives)
             sizes = np.array([gain * unbalances[_vertex_name(decision, c)] for c in range(len(vertices))], complex)
             for k in axes:
-                votes[k].append((sizes, np.array([vertex[k] for vertex in vertices])))
+                moments[k].append((sizes, np.array([vertex[k] for vertex in vertices])))
         middle, spread = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, pairs in enumerate(votes):
+        for k, pairs in enumerate(moments):
             total = sum(float(np.abs(sizes).sum()) for sizes, _ in pairs)
             if total > 0.0:
-                middle[k] = np.clip(sum(np.abs(sizes) @ at for sizes, at in pairs) / total, lower[k], upper[k])
-                spread[k] = sum(_spread(sizes, at, float(middle[k]), self._kinks[k]) for sizes, at in pairs) / total
+                middle[k] = np.clip(sum(np.abs(sizes) @ x for sizes, x in pairs) / total, lower[k], upper[k])
+                spread[k] = sum(_spread(sizes, x, float(middle[k]), self._kinks[k]) for sizes, x in pairs) / total
         return middle, spread
 
     def values(self, relaxed: Problem, result: Result, middle: Array) -> tuple[Value, ...]:
-        """Return values of all decisions: positions, sums over vertices, and the other decisions of the relaxation."""
+        """Return values of all decisions of the problem from the relaxed solution.
+
+        Parameters
+        ----------
+        relaxed, result
+            Relaxation over a box, and its result.
+        middle
+            Positions [m], shape (places,). Unbalances are sums over the vertices.
+        """
         relaxed_values = dict(zip((d.name for d in relaxed.decisions), values_of(relaxed, result), strict=True))
         values: dict[str, Value] = {place.name: float(x) for place, x in zip(self.places, middle, strict=True)}
-        for decision in self.others:
+        for decision in self.other_decisions:
             names = [_vertex_name(decision, c) for c in range(len(relaxed.decisions))] if self._axes(decision) else ()
             parts = [relaxed_values[name] for name in names if name in relaxed_values]
             values[decision.name] = sum(parts) if parts else relaxed_values[decision.name]
@@ -208,14 +225,14 @@ def _vertices(nodes: Sequence[Array], axes: Sequence[int]) -> tuple[dict[int, fl
     return tuple(dict(zip(axes, map(float, vertex), strict=True)) for vertex in product(*(nodes[k] for k in axes)))
 
 
-def _spread(sizes: NDArray[np.complex128], at: Array, middle: float, kinks: Array) -> float:
+def _spread(sizes: NDArray[np.complex128], x: Array, middle: float, kinks: Array) -> float:
     # moment of the unbalances about the middle
     weights = np.abs(sizes)
-    used = at[weights > UNUSED * weights.max(initial=0.0)]
-    if used.size and ((kinks > used.min()) & (kinks < used.max())).any():
+    occupied = x[weights > UNUSED * weights.max(initial=0.0)]
+    if occupied.size and ((kinks > occupied.min()) & (kinks < occupied.max())).any():
         # no single position has the load of unbalances on both sides of a kink
-        return float(weights @ np.abs(at - middle))
-    return float(abs(sizes @ (at - middle)))
+        return float(weights @ np.abs(x - middle))
+    return float(abs(sizes @ (x - middle)))
 
 
 def _cell_name(place: Decision, cell: int) -> str:
@@ -234,7 +251,7 @@ def _smallest(values: Set) -> Value:
 
 
 def _from_zero(values: Set) -> Set:
-    # difference to the smallest unbalance
+    # bounds of the difference to the smallest unbalance
     if isinstance(values, Interval):
         smallest = min(max(values.lower, 0.0), values.upper)
         return replace(values, lower=min(values.lower - smallest, 0.0), upper=max(values.upper - smallest, 0.0))

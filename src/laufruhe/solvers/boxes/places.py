@@ -1,4 +1,4 @@
-"""Positions of unbalances by branch and bound; a relaxed program bounds every box of positions (P8, P20)."""
+"""Solve for positions of unbalances by branch and bound; a relaxation bounds every box of positions (P8, P20)."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, 
 from laufruhe.prove.witness import thin_box
 from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
-from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.boxes.search import divide_boxes
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
@@ -31,33 +31,37 @@ from laufruhe.solvers.result import Result, Status
 Solve: TypeAlias = Callable[[Problem], Result]
 Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
 MOST_BOXES, MOST_OTHERS = 300, 500
-"""Largest number of boxes of positions, and of boxes of the method for other decisions."""
-HALF = 0.5
-"""Share of the tolerance for the method of other decisions."""
-# [m]
-EXACT = 1e-6
+"""Largest number of boxes of positions, and of boxes of the method for the other decisions."""
+OTHER_SHARE = 0.5
+"""Share of the tolerance for the method for the other decisions."""
+# spread of unbalances up to which a relaxation counts as exact [m]
+EXACT_SPREAD = 1e-6
 # share of the range of a position by which finite differences move it
-STEP = 1e-3
-# [m] tolerance of limits on distances, and margin where positions are moved into them
-REACH, INSIDE = 1e-9, 1e-7
-# bisections of the slice that is cut off a side
+STEP_SHARE = 1e-3
+# tolerance of limits on distances, and margin when positions move into these limits [m]
+DISTANCE_TOLERANCE, MARGIN = 1e-9, 1e-7
+# bisections to shrink each side of a box
 HALVINGS = 10
-# corners of a box from which feasible positions are sought
+# corners of a box from which local searches for feasible positions start
 MOST_CORNERS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class _Box:
-    """Positions between bounds, the lower bound there, and the positions of its relaxation.
+    """Box of positions, with its lower bound and the positions of its relaxation.
 
     Attributes
     ----------
-    lower, upper, middle
-        Positions [m], shape (places,) each.
+    lower, upper
+        Bounds of the positions [m], shape (places,) each.
+    bound
+        Lower bound of the objective in the box [SI].
+    middle
+        Positions of the relaxed solution [m], shape (places,).
     spread
-        Distance by which the relaxation spreads the unbalances of each position [m]; zero if it is exact.
-    near
-        Values of all decisions of the problem about the solution of the relaxation.
+        Distance by which the relaxation spreads the unbalances of each position [m], shape (places,); zero if exact.
+    start
+        Values of all decisions from the relaxed solution, to start a local search.
     """
 
     lower: Array
@@ -65,51 +69,54 @@ class _Box:
     bound: float
     middle: Array
     spread: Array
-    near: tuple[Value, ...] = ()
+    start: tuple[Value, ...] = ()
 
     @property
     def is_exact(self) -> bool:
-        """Tell if the relaxation is exact."""
-        return bool(self.spread.max() <= EXACT)
+        """True if the relaxation is exact."""
+        return bool(self.spread.max() <= EXACT_SPREAD)
 
 
 def solve_places(problem: Problem) -> Result:
-    """Return the best positions and unbalances, with a bound by boxes of positions."""
+    """Return the best positions and unbalances, with a lower bound by branch and bound over positions."""
     search = PlaceSearch(problem)
     root = search.box(*search.bounds)
     first = None if isinstance(root, FathomedPart) else search.rebalance_at(root.middle)
-    return search.solved(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
+    return search.solve(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
 
 
-def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose) -> Result:
-    """Return a proposed design, with the bound of the relaxation over all positions (P20).
+def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Propose) -> Result:
+    """Return a design of a local search, with the lower bound of the relaxation over all positions (P20).
 
     Parameters
     ----------
-    prove, how
-        Method for the problem without open positions, and its name.
+    problem
+        Problem with open positions.
+    prove, method
+        Solver for the problem without open positions, and its name.
     propose
-        Local search that starts from given values of the decisions.
+        Local search from start values of all decisions.
     """
     started, maximum = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
 
-    def prove_roughly(part: Problem) -> Result:
-        return prove(replace(part, tolerance=HALF * problem.tolerance, search=replace(part.search, boxes=maximum)))
+    def prove_roughly(relaxed: Problem) -> Result:
+        search = replace(relaxed.search, boxes=maximum)
+        return prove(replace(relaxed, tolerance=OTHER_SHARE * problem.tolerance, search=search))
 
     search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
     if isinstance(root, FathomedPart):
         return infeasible_result(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
-    result = propose(problem, [root.near])
+    result = propose(problem, [root.start])
     if not result.status.has_design or not problem.search.proves:
         return result
     first = RebalancedDesign(evaluate_design(problem, values_of(problem, result), result.final.samples), result)
-    _, bound, _ = divided(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
-    return with_bound(result, bound, f"{how} with places at the corners of their bounds")
+    _, bound, _ = divide_boxes(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
+    return with_bound(result, bound, f"{method} with places at the corners of their bounds")
 
 
 class PlaceSearch(RebalancedSearch[_Box]):
-    """Boxes of the open positions of a problem."""
+    """Branch and bound search over the open positions of a problem."""
 
     is_shared = True
 
@@ -121,14 +128,14 @@ class PlaceSearch(RebalancedSearch[_Box]):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Bounds of all positions [m]."""
+        """Lower and upper bounds of all positions [m], shape (places,) each."""
         return real_bounds(self.places)
 
     def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
-        """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
-        width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
-        pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
-        side = int(np.argmax(pulled))
+        """Yield the parts of a box, each with the best design at its middle if that may be better than `value`."""
+        width, root_width = box.upper - box.lower, self.bounds[1] - self.bounds[0]
+        scores = box.spread if box.spread.max(initial=0.0) > 1e-9 * root_width.max() else width / root_width
+        side = int(np.argmax(scores))
         for bounds in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
             half = self.box(*bounds, box.bound)
             yield (
@@ -137,7 +144,19 @@ class PlaceSearch(RebalancedSearch[_Box]):
             )
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | FathomedPart:
-        """Return a box with the bound and the positions of its relaxation, or that it has no feasible design."""
+        """Solve the relaxation over a box.
+
+        Parameters
+        ----------
+        lower, upper
+            Bounds of the positions [m], shape (places,) each.
+        floor
+            Known lower bound of the objective in the box [SI].
+
+        Returns
+        -------
+        Box with its bound and positions, or `INFEASIBLE_PART` if it has no feasible design.
+        """
         violated = self._violated(lower, upper)
         if violated:
             self.add_conflict(violated)
@@ -149,13 +168,13 @@ class PlaceSearch(RebalancedSearch[_Box]):
             self.add_conflict(result.conflict)
             return INFEASIBLE_PART
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
-        middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
+        middle, spread = self.relaxation.recover_places(relaxed, result, lower, upper)
         feasible = self._move_into_limits(middle, lower, upper)
-        # limits on distances are not in the relaxation
+        # the relaxation ignores limits on distances
         moved = upper - lower if feasible is None else np.abs(feasible - middle)
         spread, middle = np.maximum(spread, moved), middle if feasible is None else feasible
-        near = self.relaxation.values(relaxed, result, middle)
-        return _Box(lower, upper, max(bound, floor), middle, spread, near)
+        start = self.relaxation.values(relaxed, result, middle)
+        return _Box(lower, upper, max(bound, floor), middle, spread, start)
 
     def place(self, design: RebalancedDesign) -> Array:
         """Return the positions of a design [m], shape (places,)."""
@@ -163,13 +182,13 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return np.array([float(np.real(values[place.name])) for place in self.places])
 
     def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
-        """Return a thin box around the positions of a design, with its bound by few angles."""
-        few = PlaceSearch(self.problem.changed(search=replace(self.problem.search, proves=False)))
-        return few.box(*thin_box(self.place(design), *self.bounds))
+        """Return a thin box around the positions of a design, with its bound at few samples."""
+        coarse = PlaceSearch(self.problem.changed(search=replace(self.problem.search, proves=False)))
+        return coarse.box(*thin_box(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
         result = solve_unbalances(relaxed, angles=self.angles)
-        # halves need as many angles as the first box
+        # all boxes start at the samples of the first box
         self.angles = self.angles or result.final.samples // 2
         return result
 
@@ -184,24 +203,24 @@ class PlaceSearch(RebalancedSearch[_Box]):
 
     def _violated(self, lower: Array, upper: Array) -> tuple[str, ...]:
         for limit, minimum, maximum in self._spans(lower, upper):
-            if minimum > limit.maximum + REACH or maximum < limit.minimum - REACH:
+            if minimum > limit.maximum + DISTANCE_TOLERANCE or maximum < limit.minimum - DISTANCE_TOLERANCE:
                 return (limit.name,)
         return ()
 
     def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return a box without slices at its sides that violate a limit on distances everywhere."""
+        """Cut slices off the sides of a box in which every position violates a limit on distances."""
         lower, upper = lower.copy(), upper.copy()
-        for side, at_top in product(range(len(lower)) if self._envelope else (), (True, False)):
+        for side, is_upper in product(range(len(lower)) if self._envelope else (), (True, False)):
             low, high, width = 0.0, 1.0, upper[side] - lower[side]
             for _ in range(HALVINGS):
                 share = 0.5 * (low + high)
                 first, last = lower.copy(), upper.copy()
-                if at_top:
+                if is_upper:
                     first[side] = upper[side] - share * width
                 else:
                     last[side] = lower[side] + share * width
                 low, high = (share, high) if self._violated(first, last) else (low, share)
-            if at_top:
+            if is_upper:
                 upper[side] -= low * width
             else:
                 lower[side] += low * width
@@ -210,16 +229,16 @@ class PlaceSearch(RebalancedSearch[_Box]):
     def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
         """Return positions in a box close to `middle` that keep the limits on distances, or None."""
 
-        def room(places: Array) -> Array:
+        def slacks(places: Array) -> Array:
             spans = self._spans(places, places)
-            sides = [(limit.maximum - at, at - limit.minimum) for limit, at, _ in spans]
+            sides = [(limit.maximum - value, value - limit.minimum) for limit, value, _ in spans]
             return np.asarray(np.minimum(np.array(sides).ravel(), 1.0))
 
-        if not self._envelope or room(middle).min() >= -REACH:
+        if not self._envelope or slacks(middle).min() >= -DISTANCE_TOLERANCE:
             return middle
         from scipy.optimize import NonlinearConstraint, minimize
 
-        limits = NonlinearConstraint(room, INSIDE, np.inf)
+        limits = NonlinearConstraint(slacks, MARGIN, np.inf)
         width, sides = np.where(upper > lower, upper - lower, 1.0), list(zip(lower, upper, strict=True))
 
         def distance(places: Array) -> float:
@@ -232,36 +251,39 @@ class PlaceSearch(RebalancedSearch[_Box]):
         feasible = []
         for start in (middle, *corners):
             end = minimize(distance, start, jac=slope, method="SLSQP", bounds=sides, constraints=[limits])
-            feasible += [at for at in (np.clip(end.x, lower, upper), start) if room(at).min() >= -REACH]
+            points = np.clip(end.x, lower, upper), start
+            feasible += [point for point in points if slacks(point).min() >= -DISTANCE_TOLERANCE]
         return min(feasible, key=distance, default=None)
 
     def prices(self, design: Design) -> dict[Side, Price]:
-        """Return prices of limits on distances, by finite differences of the objective and the distances (P19)."""
+        """Return prices of limits on distances, by finite differences of objective and distances (P19)."""
         places = self.place(RebalancedDesign(design))
-        # every shaft at a limit has its own distance
+        # a limit has one distance per shaft
         active = [
             (limit, k, side)
             for limit in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
-            for room, _, side in (limit.slack(value),) if room <= ACTIVE
+            for slack, _, side in (limit.slack(value),) if slack <= ACTIVE
         ]  # fmt: skip
         if not active:
             return {}
         width = self.bounds[1] - self.bounds[0]
-        ends = [(self.rebalance_at(places - step), self.rebalance_at(places + step)) for step in np.diag(STEP * width)]
+        ends = [
+            (self.rebalance_at(places - step), self.rebalance_at(places + step)) for step in np.diag(STEP_SHARE * width)
+        ]
 
         def slope(number: Callable[[Design], float]) -> Array:
-            return np.array([(number(high.design) - number(low.design)) / (2.0 * STEP) for low, high in ends])
+            return np.array([(number(high.design) - number(low.design)) / (2.0 * STEP_SHARE) for low, high in ends])
 
         signs = {"at most": 1.0, "at least": -1.0}
         gradients = [
-            signs[side] * slope(lambda at, limit=limit, k=k: at.evaluation.values(limit.measure)[k])  # type: ignore[misc]
+            signs[side] * slope(lambda x, limit=limit, k=k: x.evaluation.values(limit.measure)[k])  # type: ignore[misc]
             for limit, k, side in active
         ]  # fmt: skip
         edges = [
             normal * width[k] * np.eye(len(places))[k]
             for k, place in enumerate(self.places) for normal in edges_at(place, places[k : k + 1]).values()
         ]  # fmt: skip
-        objective = [Slopes.smooth(slope(lambda at: at.value))]
+        objective = [Slopes.smooth(slope(lambda x: x.value))]
         prices = prices_of(objective, [Slopes.smooth(row) for row in gradients], np.reshape(edges, (-1, len(places))))
         by_side: dict[Side, Price] = {}
         for (limit, _, side), price in zip(active, prices or (), strict=False):
@@ -269,15 +291,15 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return by_side
 
     def rebalance_at(self, places: Array) -> RebalancedDesign:
-        """Return the best design with these positions [m]."""
-        where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
-        engine = self.problem.design(list(where.values()), self.places)
-        fixed = replace(self.relaxation.problem, engine=engine, decisions=self.relaxation.others)
-        return rebalance(self.problem, fixed, where, self.angles)
+        """Return the best design with these positions [m], shape (places,)."""
+        fixed_values: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
+        engine = self.problem.design(list(fixed_values.values()), self.places)
+        balance = replace(self.relaxation.problem, engine=engine, decisions=self.relaxation.other_decisions)
+        return rebalance(self.problem, balance, fixed_values, self.angles)
 
 
 class _PlaceSearchByMethod(PlaceSearch):
-    """Boxes of positions of a problem whose other decisions need another method than cones."""
+    """Branch and bound search over positions, with a general solver for the other decisions."""
 
     is_shared = False
 
@@ -286,7 +308,7 @@ class _PlaceSearchByMethod(PlaceSearch):
         self._prove = prove
 
     def around(self, design: RebalancedDesign) -> _Box | FathomedPart:
-        """Return a thin box around the positions of a design with its bound."""
+        """Return a thin box around the positions of a design, with its bound."""
         return self.box(*thin_box(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:

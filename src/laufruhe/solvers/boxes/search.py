@@ -1,4 +1,4 @@
-"""Branch and bound over boxes with a design from each box; worker processes prepare boxes ahead (P9)."""
+"""Branch and bound over boxes with a design from each box; worker processes compute boxes ahead (P9)."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.witness import Bounder, Witness, check_near_witness
 
 # share of the tolerance at which the gap counts as closed
-NEARLY = 0.99
-# boxes that workers prepare ahead
+GAP_SAFETY = 0.99
+# boxes that workers compute ahead
 AHEAD = 32
 # best points of a grid from which simplex searches begin
-POLISHED = 3
+SEARCHES = 3
 
 
 class SearchBox(Protocol):
@@ -34,7 +34,7 @@ class SearchBox(Protocol):
 
     @property
     def is_exact(self) -> bool:
-        """Tell if the bound has no relaxation error; splitting the box cannot improve it."""
+        """True if the bound has no relaxation error, so that splitting the box cannot improve it."""
 
 
 class BoxDesign(Protocol):
@@ -54,12 +54,12 @@ D = TypeVar("D", bound=BoxDesign)
 
 
 class BoxSearch(Generic[B, D]):
-    """Boxes and designs of one method.
+    """Boxes and designs of a method.
 
     Attributes
     ----------
     is_shared
-        Whether worker processes may divide the boxes.
+        True if worker processes may divide the boxes.
     """
 
     is_shared = False
@@ -70,23 +70,33 @@ class BoxSearch(Generic[B, D]):
         raise NotImplementedError
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
-        """Yield boxes that cover a box, or the level below which a part has no design, each with a design or None."""
+        """Yield parts that cover a box, each with a design in it, or None.
+
+        A part is a box, or the proof that no design in it has an objective below a level.
+
+        Parameters
+        ----------
+        box
+            The box to split.
+        value
+            Objective of the incumbent [SI].
+        """
         raise NotImplementedError
 
     def level(self, _: float) -> float:
-        """Return the least objective of designs that bounds cut off, for the value of the incumbent."""
+        """Return the level that bounds exclude, for the objective of the incumbent [SI]; infinite if none."""
         return math.inf
 
-    def known(self, _: D) -> Witness | None:
+    def witness_of(self, _: D) -> Witness | None:
         """Return a design as a witness of bounds, or None."""
         raise NotImplementedError
 
     def holds(self, _box: B, _design: D) -> bool:
-        """Return whether a design lies in a box."""
+        """Return True if a design lies in a box."""
         return False
 
     def around(self, _: D) -> B | FathomedPart | None:
-        """Return a thin box around a design with its bound, or None."""
+        """Return a thin box around a design, with its bound, or None."""
         raise NotImplementedError
 
     def add_conflict(self, conflict: Sequence[str]) -> None:
@@ -94,43 +104,43 @@ class BoxSearch(Generic[B, D]):
 
 
 class _Branching(BranchAndBound[B], Generic[B, D]):
-    """Branch and bound that keeps the best design of all boxes."""
+    """Branch and bound that stores the best design of all boxes."""
 
     def __init__(
         self, search: BoxSearch[B, D], best: D, zero_level: float, tolerance: float, what: str,
         ahead: Speculation[Any, Any],
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
-        self.witness = search.known(best)
+        self.witness = search.witness_of(best)
         self._search, self._zero_level, self._tolerance, self._ahead = search, zero_level, tolerance, ahead
 
     @property
     def level(self) -> float:
-        """Least objective of designs that bounds cut off; infinite if they cut off none."""
+        """Smallest objective that designs in cut-off boxes may have [SI]; infinite if none is cut off."""
         return self._search.level(self.value)
 
     def contains_witness(self, box: B) -> bool:
-        """Return whether the best design lies in a box."""
+        """Return True if the best design lies in a box."""
         return self._search.holds(box, self.best)
 
     def is_fathomed(self, node: OpenNode[B]) -> bool:
-        """Return whether the gap between a box and the incumbent is closed."""
+        """Return True if the gap between a box and the incumbent is closed."""
         gap = gap_of(self.value, node.bound, self._zero_level)
         # the bound of an exact box differs from its best design by no more than the tolerance of its program
-        return gap <= NEARLY * self._tolerance or (gap < np.inf and node.part.is_exact)
+        return gap <= GAP_SAFETY * self._tolerance or (gap < np.inf and node.part.is_exact)
 
     def branch(self, nodes: Sequence[OpenNode[B]]) -> BoundedParts[B]:
-        """Yield the parts of a box, prepared by workers if the search is shared."""
+        """Yield the parts of a box, computed by workers if the search is shared."""
         ((bound, name, box),) = nodes
         search, step = self._search, (self._search, box, self.value)
         if search.is_shared:
-            others = ((number, (search, part, self.value)) for _, number, part in self.next_nodes(AHEAD))
-            self._ahead.prefetch([(name, step), *others])
+            next_steps = ((number, (search, part, self.value)) for _, number, part in self.next_nodes(AHEAD))
+            self._ahead.prefetch([(name, step), *next_steps])
         parts, conflict = self._ahead.result(name, step)
         search.add_conflict(conflict)
         for part, design in parts:
             if design is not None and design.rank < self.best.rank:
-                self.best, self.value, self.witness = design, design.value, search.known(design)
+                self.best, self.value, self.witness = design, design.value, search.witness_of(design)
             yield part if isinstance(part, FathomedPart) else (part.bound, part)
             if not search.is_shared and is_time_over():
                 # the remaining parts have at least the bound of the box
@@ -138,15 +148,17 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
                 return
 
 
-def divided(
+def divide_boxes(
     search: BoxSearch[B, D], root: B, best: D, zero_level: float, tolerance: float, maximum: int, what: str
 ) -> tuple[D, float, int]:
-    """Divide boxes until the least bound meets the best design.
+    """Divide boxes until the least bound closes the gap to the best design.
 
     Parameters
     ----------
+    search
+        Method that divides and bounds boxes.
     root, best
-        Box of all open numbers, and a design to begin with.
+        Box of all open numbers, and the first incumbent.
     zero_level
         Objective that counts as zero [SI].
     tolerance
@@ -160,24 +172,24 @@ def divided(
     -------
     The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
     """
-    with speculation(_parted) as ahead:
+    with speculation(_split_box) as ahead:
         boxes = _Branching(search, best, zero_level, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), maximum)
     if boxes.witness is not None:
-        around: Bounder[D, B | FathomedPart] = _Around(search, what)
+        around: Bounder[D, B | FathomedPart] = _ThinBoxes(search, what)
         check_near_witness(around, boxes.best, boxes.witness)
     return boxes.best, bound, boxes.node_count
 
 
 @dataclass(frozen=True, eq=False)
-class _Around(Generic[B, D]):
+class _ThinBoxes(Generic[B, D]):
     """Thin boxes of a search, to check bounds around a known design."""
 
     search: BoxSearch[B, D]
     what: str
 
     def around(self, design: D) -> B | FathomedPart | None:
-        """Return a thin box around a design with its bound."""
+        """Return a thin box around a design, with its bound, or None."""
         return self.search.around(design)
 
     def bound(self, box: B | FathomedPart) -> float:
@@ -185,7 +197,7 @@ class _Around(Generic[B, D]):
         return box.level if isinstance(box, FathomedPart) else box.bound
 
 
-def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:
+def _split_box(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:
     search, box, value = step
     parts = search.parts(box, value)
     return (list(parts) if search.is_shared else parts), search.conflict
@@ -194,12 +206,12 @@ def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tu
 def search_from_grid(
     penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
 ) -> list[Array]:
-    """Return the ends of simplex searches from the best points of a grid.
+    """Return the ends of simplex searches from the best points of a grid, shape (n,) each.
 
     Parameters
     ----------
     penalised
-        Objective with penalties on violated limits.
+        Objective with penalties on violated limits, a function of a point, shape (n,).
     lower, upper
         Bounds, shape (n,).
     steps, maximum
@@ -214,7 +226,7 @@ def search_from_grid(
     points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
     bounds: Any = list(zip(lower, upper, strict=True))
     ends = []
-    for point in points[:POLISHED]:
+    for point in points[:SEARCHES]:
         simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
         tolerance = 1e-12 * max(penalised(point), 1e-300)
         options: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": tolerance, "maxiter": most_steps}

@@ -1,4 +1,4 @@
-"""Phase lead between two cranks that share chambers with gas: local searches, and bounds by boxes of leads (P15)."""
+"""Solve for the phase lead between two cranks that share gas chambers, by branch and bound (P15)."""
 
 from __future__ import annotations
 
@@ -37,21 +37,21 @@ SHARE = 0.5
 
 
 def solve_shared_leads(problem: Problem) -> Result:
-    """Return the best leads, with a bound by boxes of leads."""
+    """Return the best leads, with a lower bound by branch and bound over leads."""
     started, initial = time.perf_counter(), evaluate(problem)
     lower, upper = real_bounds(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
-    value, room, known = math.inf, 0.0, None
+    value, gap_tolerance, known = math.inf, 0.0, None
     if best is not None and best.violation <= KEPT:
         value = best.value
-        room = SHARE * problem.tolerance * max(value, numerical_zero(problem))
+        gap_tolerance = SHARE * problem.tolerance * max(value, numerical_zero(problem))
         known = known_of(best, np.array([float(x.real) for x in best.values]))
-    divided = bisect_box(boxes, lower, upper, value, room, problem.search.boxes_or(MOST_BOXES), known)
+    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MOST_BOXES), known)
     timing = {"solve": time.perf_counter() - started}
-    if best is None or (known is None and math.isinf(divided.bound)):
+    if best is None or (known is None and math.isinf(division.bound)):
         return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
-    method = f"local searches; lower bound on {divided.boxes} box{'es' * (divided.boxes > 1)} of leads"
-    return build_result(best, initial, ProofData(divided.bound, ProofStrength.EXACT, math.inf, method), timing)
+    method = f"local searches; lower bound on {division.boxes} box{'es' * (division.boxes > 1)} of leads"
+    return build_result(best, initial, ProofData(division.bound, ProofStrength.EXACT, math.inf, method), timing)
 
 
 def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
@@ -64,8 +64,8 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
             return None
 
     def penalised(leads: Array) -> float:
-        at = design(leads)
-        return math.inf if at is None else at.value * (1.0 + 1e3 * max(at.violation, 0.0))
+        candidate = design(leads)
+        return math.inf if candidate is None else candidate.value * (1.0 + 1e3 * max(candidate.violation, 0.0))
 
     ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
     best = design(np.array([d.real_start for d in problem.decisions]))

@@ -1,4 +1,4 @@
-"""Lower bounds of designs on open mounts, and proofs that limits contradict each other."""
+"""Compute lower bounds of designs on open mounts, and prove that limits contradict each other."""
 
 from __future__ import annotations
 
@@ -24,74 +24,84 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import over_read
 
 MOST_DIVISIONS = 3
-# share of the boxes of a problem that each set of limits may use up
-FEW = 0.1
+# share of the problem's largest number of boxes for a test of one set of limits
+CONFLICT_SHARE = 0.1
 
 
 def mount_numbers(design: Design) -> Array:
-    """Return the open numbers of the mounts of a design."""
+    """Return the open numbers of the mounts of a design [SI], shape (n,)."""
     pairs = zip(design.problem.decisions, design.values, strict=True)
     return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
 
-def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
-    """Bound the result of a search by all provers; continue the search where their bounds are least.
+def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> BoxResult:
+    """Bound the result of a search by all provers; continue the search where their bounds are lowest.
 
     Parameters
     ----------
-    among
-        Whether the problem is one of several. Those with more than stiffness open then wait for `bounded_under`.
+    problem
+        Problem with open mounts.
+    search
+        Search of the problem, already run.
+    defer_bounds
+        True to leave bounds to `with_mount_bounds`, unless only stiffness is open.
     """
-    divided = BoxResult(0.0, 0)
-    if search.moves is not None or not problem.search.proves or (among and not divides(problem)):
-        return divided
+    division = BoxResult(0.0, 0)
+    if search.moves is not None or not problem.search.proves or (defer_bounds and not divides(problem)):
+        return division
     for _ in until_time_limit(range(MOST_DIVISIONS)):
-        design = search.chosen.design if search.chosen is not None else None
+        design = search.best_or_baseline.design if search.best_or_baseline is not None else None
         value, known = math.inf, None
         if design is not None and design.violation <= KEPT:
-            # boxes cannot bound what few samples overestimate
+            # bounds exclude errors of coarse sampling
             value = design.value - over_read(problem, design.evaluation)
             known = known_of(design, mount_numbers(design))
-        room = gap_tolerance_of(
+        gap_tolerance = gap_tolerance_of(
             value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None)
         )
-        near = design.values if design is not None else ()
-        question, count = Question(problem, value, room, near, known), len(problem.mount_decisions)
-        divided = proven(question)
-        places = [(place[:count].tolist(), place[count:] if len(place) > count else None) for place in divided.places]
-        if not places or is_time_over() or not search.again(places):
+        values = design.values if design is not None else ()
+        question, count = Question(problem, value, gap_tolerance, values, known), len(problem.mount_decisions)
+        division = proven(question)
+        starts = [(start[:count].tolist(), start[count:] if len(start) > count else None) for start in division.places]
+        if not starts or is_time_over() or not search.search_from(starts):
             break
-        # the bound also serves a value that differs by less than the gap tolerance
-        if search.best is not None and search.best.design.value > question.value - room:
+        # after a small improvement, the bound still closes the gap
+        if search.best is not None and search.best.design.value > question.value - gap_tolerance:
             break
-    return divided
+    return division
 
 
-def bounded_under(result: Result, value: float, cutoff: float = math.inf, of_many: bool = False) -> Result:
-    """Return a result with a lower bound by all provers of its mounts.
+def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in_batch: bool = False) -> Result:
+    """Improve the lower bound of a result by all provers of its mounts.
 
     Parameters
     ----------
+    result
+        Result of a problem with open mounts.
     value
-        Objective of a design known from elsewhere; the bound need not be higher [SI].
+        Objective of the best design of all stars; the bound need not be higher [SI].
     cutoff
         Bound at which the proof stops [SI].
-    of_many
-        Whether many results are bounded, so that cheap bounds come first.
+    in_batch
+        True if many results are bounded, so that cheap bounds come first.
     """
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
     zero_level = numerical_zero(problem, result.final.engine)
-    room = max(gap_tolerance_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / GAP_SAFETY)
-    question = Question(problem, value, room, values_of(problem, result), of_many=of_many)
-    divided = proven(question)
-    if divided.bound <= certificate.lower_bound:
+    gap_tolerance = max(
+        gap_tolerance_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / GAP_SAFETY
+    )
+    question = Question(problem, value, gap_tolerance, values_of(problem, result), of_many=in_batch)
+    division = proven(question)
+    if division.bound <= certificate.lower_bound:
         return result
-    text = f"{certificate.method}; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+    text = (
+        f"{certificate.method}; bounds of mounts looked at in {division.boxes} box{'es' if division.boxes > 1 else ''}"
+    )
     certificate = make_certificate(
         result.objective.value,
-        divided.bound,
+        division.bound,
         zero_level,
         problem.tolerance,
         ProofStrength.PARTIAL,
@@ -101,18 +111,27 @@ def bounded_under(result: Result, value: float, cutoff: float = math.inf, of_man
     return replace(result, certificate=certificate)
 
 
-def excludes(problem: Problem, limits: Sequence[Limit]) -> bool:
-    """Return whether boxes prove that no stiffness keeps some limits of a problem that `divides`."""
-    alone = replace(problem, objective=(), limits=tuple(limits))
-    return bool(limits) and any(divided.bound == math.inf for divided in divided_bounds(alone, math.inf, 0.0, (FEW,)))
-
-
-def conflict_of(problem: Problem) -> tuple[str, ...]:
-    """Return the names of limits that contradict each other, without those that boxes prove to be needless for that.
+def are_contradictory(problem: Problem, limits: Sequence[Limit]) -> bool:
+    """Return True if branch and bound over stiffness proves that these limits contradict each other.
 
     Parameters
     ----------
     problem
-        That `divides`, proven to have no design that keeps all limits.
+        Problem that `divides` accepts.
+    limits
+        Limits of the problem.
     """
-    return smallest_conflict(problem.limits, lambda limits: excludes(problem, limits))
+    limited = replace(problem, objective=(), limits=tuple(limits))
+    divisions = divided_bounds(limited, math.inf, 0.0, (CONFLICT_SHARE,))
+    return bool(limits) and any(division.bound == math.inf for division in divisions)
+
+
+def minimal_conflict(problem: Problem) -> tuple[str, ...]:
+    """Return the names of a minimal set of limits that contradict each other.
+
+    Parameters
+    ----------
+    problem
+        Problem that `divides` accepts, proven to be infeasible.
+    """
+    return smallest_conflict(problem.limits, lambda limits: are_contradictory(problem, limits))

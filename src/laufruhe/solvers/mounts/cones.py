@@ -1,4 +1,4 @@
-"""Convex programs of mount stiffness for Clarabel: matrix inequalities and matrix fractions."""
+"""Solve convex programs of mount stiffness by Clarabel: matrix inequalities and matrix fractions."""
 
 from __future__ import annotations
 
@@ -24,32 +24,35 @@ from laufruhe.prove.mounts.convex_functions import (
 )
 from laufruhe.solvers.cones.conic import ATTEMPTS
 
-# a bound by duals of a matrix inequality is as accurate as these
-SHARP = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
+# a bound from the duals of a matrix inequality has these tolerances
+TIGHT = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
 
 
 def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
-    """Return stiffnesses and duals by Clarabel, or None if duals prove that the limits contradict each other.
+    """Return stiffnesses [N/m], shape (n,), and duals; None if duals prove that the limits contradict each other.
 
-    If the solver fails with all settings, a program with the least violation of limits decides, which is always
-    feasible. If that fails too, the proposal is the middle of the box.
+    If Clarabel fails with all settings, minimise the violation of the limits instead, which is always feasible. If that
+    fails too, return the middle of the box.
     """
-    stated = _Program(program)
-    if stated.solve():
-        return stated.x, stated.duals
-    nearest = _Program(replace(program, terms=()), relaxed=True)
-    if not nearest.solve():
+    exact = _Program(program)
+    if exact.solve():
+        return exact.x, exact.duals
+    relaxation = _Program(replace(program, terms=()), relaxed=True)
+    if not relaxation.solve():
         return 0.5 * (program.lower + program.upper), ConvexDuals.none(program)
-    return None if excludes(program, nearest.x, nearest.duals) else (nearest.x, ConvexDuals.none(program))
+    is_infeasible = excludes(program, relaxation.x, relaxation.duals)
+    return None if is_infeasible else (relaxation.x, ConvexDuals.none(program))
 
 
 class _Program:
-    """A scaled program in cvxpy.
+    """Scaled convex program in cvxpy.
 
     Parameters
     ----------
+    program
+        The convex program in SI units.
     relaxed
-        Whether to minimise the relative violation of the limits.
+        True to add the largest relative violation of the limits to the objective.
     """
 
     def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:
@@ -66,20 +69,20 @@ class _Program:
         size = max((abs(term.value(middle)) for _, term in program.terms), default=1.0)
         self.size = size if np.isfinite(size) and size > 0.0 else 1.0
         self._constraints: list[Any] = [self.y >= lower / self.scale, self.y <= upper / self.scale]
-        tops, self._cones = [], []
+        terms, self._cones = [], []
         for weight, term in program.terms:
-            top, cone = self._over(term)
-            tops.append(weight * top / self.size)
+            epigraph, cone = self._epigraph(term)
+            terms.append(weight * epigraph / self.size)
             self._cones.append(cone)
-        missed = cp.Variable(nonneg=True) if relaxed else 0.0
-        self._limits = [self._limited(each.function, each.maximum, missed) for each in program.limits]
-        self._problem = cp.Problem(cp.Minimize(sum(tops) + missed if tops or relaxed else 0), self._constraints)
+        violation = cp.Variable(nonneg=True) if relaxed else 0.0
+        self._limits = [self._limited(limit.function, limit.maximum, violation) for limit in program.limits]
+        self._problem = cp.Problem(cp.Minimize(sum(terms) + violation if terms or relaxed else 0), self._constraints)
 
     def solve(self) -> bool:
-        """Solve with several settings, and return whether one succeeds."""
-        for settings in (SHARP, *ATTEMPTS):
+        """Solve with several settings; return True at the first success."""
+        for settings in (TIGHT, *ATTEMPTS):
             with warnings.catch_warnings():
-                # the certificate shows how accurate a solution is
+                # the certificate measures the accuracy
                 warnings.simplefilter("ignore")
                 with suppress(cp.error.SolverError):
                     self._problem.solve(solver=cp.CLARABEL, **settings)
@@ -99,38 +102,38 @@ class _Program:
         vectors = tuple(_vector(cone) for cone in self._cones)
         return ConvexDuals(vectors, tuple(price for price, _ in limits), tuple(dual for _, dual in limits))
 
-    def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
-        # expression, and the cone of its dual vector
+    def _epigraph(self, function: ConvexFunction) -> tuple[Any, Any]:
+        # expression of the function, and the cone of its dual vector
         if isinstance(function, LinearFunction):
             return function.constant + (function.gradient * self.scale) @ self.y, None
         if isinstance(function, Compliance):
             return (function.factor / self.unit) * cp.matrix_frac(function.load, self.matrix), None
         if isinstance(function, Residual):
             return self._residual(function.axis)
-        raise TypeError(f"{type(function).__name__} is limited, not minimised")
+        raise TypeError(f"{type(function).__name__} may be limited, not minimised")
 
     def _residual(self, axis: AxisResidual) -> tuple[Any, Any]:
-        """Return the scaled residual and its cone; the squared frequency may be a variable."""
-        answer = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
-        unit = float(np.linalg.norm(answer)) or 1.0
-        one = unit / float(np.linalg.norm(axis.mass))
-        top, square = cp.Variable(), cp.Variable()
-        self._constraints.append(square >= axis.minimum / one)
+        """Return the residual and its cone; its squared angular frequency is a variable within bounds."""
+        response = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
+        unit = float(np.linalg.norm(response)) or 1.0
+        square_unit = unit / float(np.linalg.norm(axis.mass))
+        epigraph, square = cp.Variable(), cp.Variable()
+        self._constraints.append(square >= axis.minimum / square_unit)
         if axis.maximum < np.inf:
-            self._constraints.append(square <= axis.maximum / one)
-        rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (one / unit) * axis.mass
-        cone = cp.SOC(top, rows)
+            self._constraints.append(square <= axis.maximum / square_unit)
+        rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (square_unit / unit) * axis.mass
+        cone = cp.SOC(epigraph, rows)
         self._constraints.append(cone)
-        return unit * top, cone
+        return unit * epigraph, cone
 
-    def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
+    def _limited(self, function: ConvexFunction, maximum: float, violation: Any) -> tuple[Any, float]:
         # constraint, and the factor from its dual to program units
-        whole = abs(maximum) or 1.0
+        scale = abs(maximum) or 1.0
         if isinstance(function, Eigenvalue):
-            room = (maximum + missed * whole) / self.unit
-            constraint, factor = room * np.eye(6) - function.sign * self.matrix >> 0, 1.0 / self.unit
+            bound = (maximum + violation * scale) / self.unit
+            constraint, factor = bound * np.eye(6) - function.sign * self.matrix >> 0, 1.0 / self.unit
         else:
-            constraint, factor = self._over(function)[0] / whole <= maximum / whole + missed, 1.0 / whole
+            constraint, factor = self._epigraph(function)[0] / scale <= maximum / scale + violation, 1.0 / scale
         self._constraints.append(constraint)
         return constraint, factor
 
@@ -148,5 +151,5 @@ def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | N
 def _vector(cone: Any) -> Array | None:
     if cone is None or cone.dual_value is None:
         return None
-    top, rows = (np.asarray(part, dtype=float).reshape(-1) for part in cone.dual_value)
-    return -rows / max(float(top[0]), 1e-300)
+    head, rows = (np.asarray(part, dtype=float).reshape(-1) for part in cone.dual_value)
+    return -rows / max(float(head[0]), 1e-300)

@@ -1,4 +1,4 @@
-"""Mount stiffness by convex programs, if objective and limits are convex in it (E16-E19)."""
+"""Solve for mount stiffness by convex programs, if objective and limits are convex in it (E16-E19)."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels
 
 
 def is_convex(problem: Problem) -> bool:
-    """Return whether only stiffnesses are open, and objective and limits are convex in them."""
+    """Return True if only stiffnesses are open, and objective and limits are convex in them."""
     if problem.load_terms or problem.load_limits or not problem.objective:
         return False
     if not all(decision.is_stiffness for decision in problem.decisions):
@@ -68,7 +68,7 @@ def _is_convex_limit(limit: Limit) -> bool:
 
 
 def convex_program(problem: Problem) -> ConvexProgram:
-    """Return the convex program of a problem that `is_convex`."""
+    """Build the convex program of a problem that `is_convex` accepts."""
     decisions = problem.decisions
     lower, upper = real_bounds(decisions)
     start = np.array([d.real_start for d in decisions])
@@ -83,7 +83,7 @@ def convex_program(problem: Problem) -> ConvexProgram:
 
 
 def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
-    # E3: derivative of K, shape (6, 6)
+    # derivative of the stiffness matrix, shape (6, 6) (E3)
     total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
     for drive in decision.mount_drives:
         place, spring = springs[drive.mount]
@@ -93,54 +93,58 @@ def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
 
 
 def _function(
-    quantity: Measure, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
+    measure: Measure, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
 ) -> ConvexFunction:
-    if quantity.channel is channels.SAG:
+    if measure.channel is channels.SAG:
         weight = weight_wrench(mounting.block)
         return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
-    if quantity.channel.axis_residual is not None:
-        return Residual(matrices, quantity.channel.axis_residual(mounting.block, quantity.frequency))
+    if measure.channel.axis_residual is not None:
+        return Residual(matrices, measure.channel.axis_residual(mounting.block, measure.frequency))
     gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
     start = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
     return LinearFunction(start - float(gradient @ [d.real_start for d in problem.decisions]), gradient)
 
 
 def _limits(
-    limit: Limit, k: int, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
+    limit: Limit, source: int, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
 ) -> list[ConvexLimit]:
-    found = []
+    limits = []
     if limit.measure.channel is channels.FREQUENCIES:
         if limit.maximum < math.inf:
-            found.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, k))
+            limits.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, source))
         if limit.minimum > -math.inf:
-            found.append(ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), k, "at least"))
-        return found
+            limits.append(
+                ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), source, "at least")
+            )
+        return limits
     function = _function(limit.measure, matrices, mounting, problem)
     if limit.maximum < math.inf:
-        found.append(ConvexLimit(function, limit.maximum, k))
+        limits.append(ConvexLimit(function, limit.maximum, source))
     if limit.minimum > -math.inf and isinstance(function, LinearFunction):
-        found.append(ConvexLimit(LinearFunction(-function.constant, -function.gradient), -limit.minimum, k, "at least"))
-    return found
+        limits.append(
+            ConvexLimit(LinearFunction(-function.constant, -function.gradient), -limit.minimum, source, "at least")
+        )
+    return limits
 
 
 def solve_convex_mounts(problem: Problem) -> Result:
-    """Return the global optimum of a problem that `is_convex`, with its certificate."""
+    """Return the global optimum of a problem that `is_convex` accepts, with its certificate."""
     from laufruhe.solvers.mounts.cones import solve_cones
 
     started = time.perf_counter()
     program = convex_program(problem)
     initial = evaluate_start(problem)
-    modelled = time.perf_counter()
+    model_time = time.perf_counter()
     solution = solve_cones(program)
     solved = time.perf_counter()
-    timing = {"model": modelled - started, "solve": solved - modelled}
+    timing = {"model": model_time - started, "solve": solved - model_time}
     if solution is None:
 
-        def excluded(kept: Sequence[Limit]) -> bool:
-            limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
+        def is_infeasible(subset: Sequence[Limit]) -> bool:
+            limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in subset)
             return solve_cones(replace(program, terms=(), limits=limits)) is None
 
-        return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
+        return infeasible_result(problem, initial, smallest_conflict(problem.limits, is_infeasible), timing)
     x, duals = solution
     bound, gradient = dual_bound(program, x, duals)
     proof = ProofData(
@@ -160,13 +164,13 @@ def solve_convex_mounts(problem: Problem) -> Result:
 
 
 def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:
-    # fall of the objective per unit of relaxation
+    # decrease of the objective per unit of a limit
     prices: dict[Side, Price] = {}
     for limit, price in zip(program.limits, duals.prices, strict=True):
         source = problem.limits[limit.source]
         slope = 1.0
         if source.measure.channel is channels.FREQUENCIES:
-            # the limit is on the square of 2 pi f
+            # the program limits the square of 2 pi f
             slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
         prices[source, limit.side] = Price.both(price * slope)
     return prices
@@ -175,12 +179,12 @@ def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dic
 def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Array) -> float:
     # largest relative violation of the KKT conditions
     width = np.where(program.upper > program.lower, program.upper - program.lower, 1.0)
-    whole = abs(program.objective(x)) or 1.0
-    moved = np.clip(x - gradient * width**2 / whole, program.lower, program.upper)
+    scale = abs(program.objective(x)) or 1.0
+    step_end = np.clip(x - gradient * width**2 / scale, program.lower, program.upper)
     # possible decrease of the linear model inside the box
-    decrease = float(np.abs(gradient * (moved - x)).max(initial=0.0)) / whole
+    decrease = float(np.abs(gradient * (step_end - x)).max(initial=0.0)) / scale
     violations = [decrease]
     for limit, price in zip(program.limits, duals.prices, strict=True):
-        room = limit.maximum - limit.function.value(x)
-        violations += [max(-room, 0.0) / (abs(limit.maximum) or 1.0), abs(price * room) / whole]
+        slack = limit.maximum - limit.function.value(x)
+        violations += [max(-slack, 0.0) / (abs(limit.maximum) or 1.0), abs(price * slack) / scale]
     return max(violations)

@@ -1,4 +1,4 @@
-"""Mounts, and unbalances with them: multistart search, then bounds."""
+"""Solve for mounts, and unbalances with them: multistart search, then lower bounds."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from laufruhe.solvers.conclusion import (
     unbalances_of,
 )
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
-from laufruhe.solvers.mounts.bounds import conflict_of, divided_by, excludes
+from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.places import Place, evaluate_design_at
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
@@ -48,20 +48,30 @@ from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
 from laufruhe.solvers.smooth.program import SmoothProgram
 
-WORTH_SAYING = 1.01
-# operating points of all candidates from which on a search takes longer than the start of workers
-MANY_LOOKS = 256
+NOTABLE_RATIO = 1.01
+# evaluated operating points from which a search takes longer than the start of workers
+MANY_EVALUATIONS = 256
 
 
 def solve_mounts(
-    problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
+    problem: Problem,
+    workers: int | None = None,
+    defer_bounds: bool = False,
+    start_mounts: Sequence[float] | None = None,
 ) -> Result:
-    """Solve a convex problem exactly, and any other by `solve_joint`."""
-    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among, near)
+    """Solve a problem on elastic mounts: a convex program if possible, else the multistart search of `solve_joint`."""
+    return (
+        solve_convex_mounts(problem)
+        if is_convex(problem)
+        else solve_joint(problem, workers, defer_bounds, start_mounts)
+    )
 
 
 def solve_joint(
-    problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
+    problem: Problem,
+    workers: int | None = None,
+    defer_bounds: bool = False,
+    start_mounts: Sequence[float] | None = None,
 ) -> Result:
     """Return the best local optimum of a multistart search, with a lower bound (E20-E24).
 
@@ -70,65 +80,70 @@ def solve_joint(
     problem
         Problem on elastic mounts.
     workers
-        Processes; as many as processors by default.
-    among
-        Whether the problem is one of several, which are bounded when the best of all is known.
-    near
-        Numbers of the mounts of the first start.
+        Number of processes; by default the number of processors.
+    defer_bounds
+        True to leave bounds to `with_mount_bounds`, for one of several problems.
+    start_mounts
+        Numbers of the mounts of the first start [SI], shape (n,).
 
     Raises
     ------
     SolverError
         If a process of the solver dies.
     """
-    return _solved(problem, workers, None, None if near is None else (list(near), None), among)[0]
+    return _search_and_bound(
+        problem, workers, None, None if start_mounts is None else (list(start_mounts), None), defer_bounds
+    )[0]
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
-    """Solve a problem whose throws may leave their star, and return the new throws (E36).
+    """Solve a problem whose throws may leave their star; return the result and the star with its new throws (E36).
 
     Parameters
     ----------
     problem
         Problem of the star.
     moves
-        Throws that may move.
+        Moves of the throws.
     even
-        Result of the star itself, the first start.
+        Result of the star without moves, the first start; None if there is none.
     """
     first = place_of(problem, even) if even is not None and even.decisions else None
-    # bounds of mounts alone do not hold for moved throws
-    result, turns = _solved(problem, None, moves, first, True)
+    # bounds over mounts alone are not valid for moved throws
+    result, turns = _search_and_bound(problem, None, moves, first, True)
     return result, moves.candidate(turns)
 
 
-def _solved(
+def _search_and_bound(
     problem: Problem,
     workers: int | None,
     moves: ThrowMoves | None,
     first: Place | None,
-    among: bool,
+    defer_bounds: bool,
 ) -> tuple[Result, Array]:
-    """Return the result, and deviations of the throws [rad]."""
+    """Return the result, and the moves of the throws from their star [rad], shape (moves,)."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    worth = evaluation_count(problem) >= MANY_LOOKS and workers != 1 and not among
-    with worker_pool(run, *(prover.bounds for prover in provers())) if worth else nullcontext():
-        search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
-        modelled = time.perf_counter()
+    uses_workers = evaluation_count(problem) >= MANY_EVALUATIONS and workers != 1 and not defer_bounds
+    with worker_pool(run, *(prover.bounds for prover in provers())) if uses_workers else nullcontext():
+        search = MountSearch(problem, initial, workers, moves, first, keep_baseline=moves is None)
+        model_time = time.perf_counter()
         search.run()
         with speculation(_balance, math.inf) as ahead:
-            # decide the unbalances anew while provers bound, which may still find a better design
-            ahead.prefetch((each.design.values, _share(each.design)) for each in [search.chosen] if each is not None)
-            divided = divided_by(problem, search, among)
-            best = search.chosen
-            timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
+            # optimise the unbalances again while provers bound; a prover may still find a better design
+            results = [search.best_or_baseline]
+            ahead.prefetch((x.design.values, _share(x.design)) for x in results if x is not None)
+            division = bound_search(problem, search, defer_bounds)
+            best = search.best_or_baseline
+            timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
             if best is None or best.design.violation > KEPT:
-                return _none(problem, search, initial, divided, timing), search.turns
+                return _without_design(problem, search, initial, division, timing), search.turns
             balance = ahead.result(best.design.values, _share(best.design))
-    proven = None if balance is None else _rebalanced(best.design, *balance)
-    design = best.design if proven is None or proven[0].value >= best.design.value else proven[0]
-    return _result(search, initial, replace(best, design=design), proven, divided, timing, among), search.turns
+    rebalanced = None if balance is None else _rebalanced(best.design, *balance)
+    design = best.design if rebalanced is None or rebalanced[0].value >= best.design.value else rebalanced[0]
+    return _result(
+        search, initial, replace(best, design=design), rebalanced, division, timing, defer_bounds
+    ), search.turns
 
 
 def _mounts(design: Design) -> list[float]:
@@ -141,12 +156,12 @@ def _share(design: Design) -> tuple[Problem, Sequence[float]]:
 
 
 def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
-    """Return the best unbalances on fixed mounts and their proven gap, or None if that is not convex."""
+    """Return optimal unbalances on fixed mounts and their gap; None if the program is not convex."""
     problem, mounts = share
     if not problem.unbalances or not problem.load_terms or problem.mount_terms or is_time_over():
         return None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
-        # transmissibility depends on what excites
+        # transmissibility depends on the excitation
         return None
     engine = problem.design(mounts, problem.mount_decisions)
     result = solve_unbalances(replace(problem, engine=engine).balance)
@@ -158,8 +173,8 @@ def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], flo
 def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
     mounts, columns = iter(_mounts(design)), iter(unbalances)
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
-    again = evaluate_design_at(design.problem, values)
-    return None if again is None or again.violation > KEPT else (again, gap)
+    rebalanced = evaluate_design_at(design.problem, values)
+    return None if rebalanced is None or rebalanced.violation > KEPT else (rebalanced, gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -167,13 +182,13 @@ def _convex_part(problem: Problem) -> Problem | None:
     if not decisions or not all(decision.is_stiffness for decision in decisions):
         return None
     terms = tuple(term for term in problem.mount_terms if term.measure.channel in CONVEX)
-    alone = replace(problem, objective=terms or (Term(Measure(channels.TOTAL_STIFFNESS)),), decisions=decisions)
-    limits = tuple(limit for limit in problem.mount_limits if is_convex(replace(alone, limits=(limit,))))
-    return replace(alone, limits=limits)
+    convex = replace(problem, objective=terms or (Term(Measure(channels.TOTAL_STIFFNESS)),), decisions=decisions)
+    limits = tuple(limit for limit in problem.mount_limits if is_convex(replace(convex, limits=(limit,))))
+    return replace(convex, limits=limits)
 
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
-    """Return limits that contradict each other by convex programs, or by boxes of stiffness without unbalances."""
+    """Return limits that contradict each other, by convex programs or by branch and bound over stiffness."""
     conflict = conflict_on_any_mounts(problem)
     if conflict:
         return conflict
@@ -181,115 +196,117 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     conflict = () if convex is None else solve_convex_mounts(convex).conflict
     if conflict or not problem.unbalances:
         return conflict
-    # numbers without loads are the same for all unbalances
+    # measures without loads do not depend on unbalances
     limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.depends_on_loads)
-    alone = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
-    return conflict_of(alone) if divides(alone) and excludes(alone, limits) else ()
+    mounts_only = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
+    return minimal_conflict(mounts_only) if divides(mounts_only) and are_contradictory(mounts_only, limits) else ()
 
 
-def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
-    """Return a lower bound by the sum of bounds of each kind of terms, none of which is negative [SI].
+def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
+    """Return a lower bound of the objective: the sum of bounds of each kind of terms, none of which is negative [SI].
 
     Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
-    and masses (P4). Provers bound forces and travel of the mounts if other terms are in the objective too.
+    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts.
 
     Parameters
     ----------
-    near
-        Values of the decisions of a good design.
+    problem
+        Problem with open mounts.
+    values
+        Values of the decisions of a good design; provers need them.
     """
-    problem, total, parts = named_part(problem), 0.0, []
+    problem, total, results = named_part(problem), 0.0, []
     on_mounts, block = (
         tuple(term for term in problem.load_terms if term.measure.on_mounts == kind) for kind in (True, False)
     )
-    if near and on_mounts and (block or problem.mount_terms):
-        alone = replace(problem, objective=on_mounts)
-        evaluation = evaluate(alone, alone.design(list(near)))
-        value = objective_value(alone, evaluation)
+    if values and on_mounts and (block or problem.mount_terms):
+        part = replace(problem, objective=on_mounts)
+        evaluation = evaluate(part, part.design(list(values)))
+        value = objective_value(part, evaluation)
         total += proven(
-            Question(alone, value, gap_tolerance_of(value, alone.tolerance, numerical_zero(alone)), near)
+            Question(part, value, gap_tolerance_of(value, part.tolerance, numerical_zero(part)), values)
         ).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
-        alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
-        if alone.decisions:
-            parts.append(solve_unbalances(alone))
+        part = replace(off_resonance(problem).balance, objective=block, limits=limits)
+        if part.decisions:
+            results.append(solve_unbalances(part))
         else:
-            total += objective_value(alone, evaluate(alone))
+            total += objective_value(part, evaluate(part))
     convex = _convex_part(problem)
     if convex is not None and set(convex.objective) <= set(problem.objective):
-        parts.append(solve_convex_mounts(convex))
-    return total + sum(part.certificate.lower_bound for part in parts if part.certificate is not None)
+        results.append(solve_convex_mounts(convex))
+    return total + sum(result.certificate.lower_bound for result in results if result.certificate is not None)
 
 
 def _result(
     search: MountSearch,
     initial: Evaluation,
     best: SearchResult,
-    proven: tuple[Design, float] | None,
-    divided: BoxResult,
+    rebalanced: tuple[Design, float] | None,
+    division: BoxResult,
     timing: dict[str, float],
-    among: bool,
+    defer_bounds: bool,
 ) -> Result:
     problem, design, optimum = search.problem, best.design, best.optimum
     zero_level = numerical_zero(problem, design.evaluation.engine)
-    bound = divided.bound
-    # the bound does not hold for moved throws
+    bound = division.bound
+    # the bound is not valid for moved throws
     if search.moves is None and problem.search.proves and gap_of(design.value, bound, zero_level) > problem.tolerance:
-        bound = max(bound, mounts_bound(problem, () if among else design.values))
+        bound = max(bound, mounts_bound(problem, () if defer_bounds else design.values))
     proof = ProofData(
         bound=bound,
-        strength=ProofStrength.PARTIAL if divided.boxes else ProofStrength.RELAXED,
+        strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
-        method=_method(search.optima, max(design.value, zero_level), proven, divided),
+        method=_method(search.optima, max(design.value, zero_level), rebalanced, division),
         prices=best.joint.prices(optimum) if optimum is not None else {},
     )
     if search.moves is not None:
-        # prices of limits depend on the open throws
+        # prices of limits refer to the problem with open throws
         design = replace(design, problem=replace(design.problem, phasing=search.moves.phasing))
     return build_result(design, initial, proof, timing)
 
 
 def _method(
-    optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: BoxResult
+    optima: Sequence[LocalOptimum], scale: float, rebalanced: tuple[Design, float] | None, division: BoxResult
 ) -> str:
-    different = distinct(optima, scale)
-    text = ends_in_words(optima, len(different))
-    if len(different) > 1 and different[-1].value > WORTH_SAYING * different[0].value > 0.0:
-        text += f", up to {different[-1].value / different[0].value:.3g} times the best"
-    if proven is not None:
-        text += f"; balance on these mounts proven within {proven[1]:.0e}"
-    if divided.boxes:
-        text += f"; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+    ends = distinct(optima, scale)
+    text = ends_in_words(optima, len(ends))
+    if len(ends) > 1 and ends[-1].value > NOTABLE_RATIO * ends[0].value > 0.0:
+        text += f", up to {ends[-1].value / ends[0].value:.3g} times the best"
+    if rebalanced is not None:
+        text += f"; balance on these mounts proven within {rebalanced[1]:.0e}"
+    if division.boxes:
+        text += f"; bounds of mounts looked at in {division.boxes} box{'es' if division.boxes > 1 else ''}"
     return text
 
 
-def _none(
-    problem: Problem, search: MountSearch, initial: Evaluation, divided: BoxResult, timing: dict[str, float]
+def _without_design(
+    problem: Problem, search: MountSearch, initial: Evaluation, division: BoxResult, timing: dict[str, float]
 ) -> Result:
-    """Return a result without a design, with the limits that contradict each other if that is proven."""
+    """Return a result without a design: infeasible with the conflicting limits if proven, else failed."""
     conflict = _proven_conflict(problem)
-    if not conflict and divided.bound == math.inf:
-        conflict = conflict_of(problem)
+    if not conflict and division.bound == math.inf:
+        conflict = minimal_conflict(problem)
     result = infeasible_result(problem, initial, conflict, timing)
     if conflict:
         return result
     nearest = min(search.optima, key=lambda o: o.violation)
     names = _violated_limits(search.joint, nearest)
     message = (
-        f"no design found: from {sum(o.starts for o in search.optima)} starts none meets {names or 'the limits'} "
+        f"no design found: from {sum(o.starts for o in search.optima)} starts none keeps {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
     design = search.best.design if search.best else None
-    near = nearest_of(problem, design.evaluation, decided(design)) if design else None
-    return replace(result, status=Status.FAILED, message=message, nearest=near)
+    nearest_design = nearest_of(problem, design.evaluation, decided(design)) if design else None
+    return replace(result, status=Status.FAILED, message=message, nearest=nearest_design)
 
 
 def _violated_limits(joint: SmoothProgram, optimum: LocalOptimum) -> str:
     program = joint.program
-    g = optimum.constraints
-    if len(g) != len(program.constraint_names):
+    values = optimum.constraints
+    if len(values) != len(program.constraint_names):
         return ""
-    miss = np.maximum(program.constraint_lower - g, g - program.constraint_upper)
-    names = [program.constraint_names[k] for k in np.flatnonzero(miss > 1e-6)]
+    excess = np.maximum(program.constraint_lower - values, values - program.constraint_upper)
+    names = [program.constraint_names[k] for k in np.flatnonzero(excess > 1e-6)]
     return " and ".join(f"'{name}'" for name in dict.fromkeys(names) if name != "modes")

@@ -1,4 +1,4 @@
-"""Multistart search of mounts, with unbalances and throws; the exact model evaluates every end."""
+"""Multistart search of mounts, unbalances and throws; the exact model evaluates every local optimum."""
 
 from __future__ import annotations
 
@@ -27,36 +27,41 @@ from laufruhe.solvers.smooth.nonlinear import StopWhen, solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
-# relative difference by which two designs have the same value
+# relative difference of objectives that counts as none
 SAME = 1e-6
 MOST_MARGINS = 6
 # violation of a limit that a peak between samples may cause
 NEAR = 0.05
 ITERATIONS = 100
 MOST_AROUND = 3
-# ends of a search that are refined with exact simulations
+# local optima of a search that are refined with exact simulations
 MOST_REFINED = 1
 # iterations of a search that simulates in every step
 SIMULATED_ITERATIONS = 60
-# share of the objective unit below which a search is repeated in a smaller unit, and number of such repetitions
+# share of the objective's unit below which a search is repeated in a smaller unit, and number of repetitions
 SMALL = 1e-2
 MOST_SIZES = 3
 SPREAD = 0.4
-# starts at which limits are checked; relative distance to a limit that leaves it out, and that puts it back
+# starts at which limits are checked
 CHECKED_STARTS = 6
-ROOM, CLOSE = 0.5, 0.05
+# relative distance to a limit from which the program leaves it out, and below which the program includes it again
+FAR_FROM_LIMIT, NEAR_LIMIT = 0.5, 0.05
 # deviation of start throws from their star [rad]
 NUDGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """A design with the local optimum that it comes from; without one if it was only evaluated.
+    """A design, and the local optimum from which it was computed.
 
     Attributes
     ----------
+    design
+        Design by the exact model.
     joint
-        Program of the local optimum.
+        Smooth program of mounts, unbalances and throws together.
+    optimum
+        Local optimum of the program; None if the design was only evaluated.
     """
 
     design: Design
@@ -79,27 +84,27 @@ class MountSearch:
     initial
         Evaluation of the baseline design, which competes with the results.
     workers
-        Processes; as many as processors by default.
+        Number of processes; by default the number of processors.
     moves
-        Throws that may leave the star of the problem.
+        Moves of the throws from their star; None if throws are fixed.
     first
-        First start: mounts and columns of unbalances, or None for those that are best on the baseline mounts.
-    beside
-        Whether the baseline is a start too when `first` is given.
+        First start. Without columns, it has the unbalances that are optimal on the baseline mounts.
+    keep_baseline
+        True to keep the baseline as a start if there is another first start.
     coarser
-        Length of time steps of simulations, as a multiple of that of the final evaluation.
+        Factor of the time step of simulations over the final evaluation.
 
     Attributes
     ----------
     best
-        Best result so far; None if no end has loads.
+        Best result so far; None if every local optimum is on an undamped resonance.
     optima
-        Local optima of all starts.
+        Local optima from all starts.
     """
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: Place | None = None, beside: bool = False, coarser: int = COARSER,
+        first: Place | None = None, keep_baseline: bool = False, coarser: int = COARSER,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         report_progress("starts of the mounts")
@@ -107,8 +112,8 @@ class MountSearch:
         if first is not None:
             mounts, columns = first
             columns = self._points[0][1] if columns is None else columns
-            self._points = [(mounts, columns), *self._points[0 if beside else 1 :]]
-        self._ignored = self._limits_with_room()
+            self._points = [(mounts, columns), *self._points[0 if keep_baseline else 1 :]]
+        self._ignored = self._inactive_limits()
         report_progress("smooth program of all that is open")
         self.joint = self._program()
         self._baseline = initial_design(problem, initial) if moves is None else None
@@ -118,13 +123,13 @@ class MountSearch:
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
-        """Search from all starts, and again in a smaller objective unit if the first one hides the optimum.
+        """Search from all starts; repeat in a smaller unit of the objective if the result is far below the unit.
 
-        If the time budget is over, the first start is the result if it is feasible.
+        If no time is left and the first start is feasible, it is the result.
         """
         start = started_at(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
         if start is not None and start.violation <= SLACK:
-            self._keep_best(SearchResult(start, self.joint))
+            self._update_best(SearchResult(start, self.joint))
             return
         zero_level = numerical_zero(self.problem)
         self._repeat_with_active_limits(lambda: self._search(self._points))
@@ -137,49 +142,51 @@ class MountSearch:
             self._search([_start_of(self.best), *self._points[1:]])
         self._tighten()
 
-    def refined(self) -> None:
-        """Repeat the search from the best ends, with the time steps of the final evaluation."""
-        ends = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
-        ends = ends or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
-        places = [_split(self.joint, optimum.x) for optimum in ends[:MOST_REFINED]]
-        if self.best is not None and self.best.optimum not in ends[:MOST_REFINED]:
-            places.append(_start_of(self.best))
+    def refine(self) -> None:
+        """Search again from the best local optima, with the time step of the final evaluation."""
+        optima = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
+        optima = optima or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
+        starts = [_split(self.joint, optimum.x) for optimum in optima[:MOST_REFINED]]
+        if self.best is not None and self.best.optimum not in optima[:MOST_REFINED]:
+            starts.append(_start_of(self.best))
         self._coarser = 1
         self.joint = self._program()
-        self._take(self._solve([self.joint.start(*place) for place in places]))
+        self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
         self._tighten()
 
-    def again(self, places: Sequence[Place]) -> bool:
-        """Search from other mounts; return whether the best design improved.
+    def search_from(self, places: Sequence[Place]) -> bool:
+        """Search from additional starts; return True if the best design improved.
 
-        Starts without columns have the unbalances of the best design. Complete starts are candidates themselves.
+        Starts without columns take the unbalances of the best design. Complete starts are candidates themselves.
         """
-        before = self.best
-        default = self._points[0][1] if before is None or before.optimum is None else _start_of(before)[1]
+        previous = self.best
+        default = self._points[0][1] if previous is None or previous.optimum is None else _start_of(previous)[1]
         starts = []
         for mounts, columns in places:
             starts.append((mounts, default if columns is None else columns))
             if columns is not None or not self.problem.unbalances:
                 start = started_at(self.problem, starts[-1])
-                # a rounding over a limit is no improvement
+                # a start that exceeds a limit by rounding is no candidate
                 if start is not None and start.violation <= 0.0:
-                    self._keep_best(SearchResult(start, self.joint))
-        self._repeat_with_active_limits(lambda: self._take(self._solve([self.joint.start(*start) for start in starts])))
+                    self._update_best(SearchResult(start, self.joint))
+        self._repeat_with_active_limits(
+            lambda: self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
+        )
         self._tighten()
-        return self.best is not None and (before is None or self.best.rank < before.rank)
+        return self.best is not None and (previous is None or self.best.rank < previous.rank)
 
     @property
-    def chosen(self) -> SearchResult | None:
-        """The best of the results and the baseline; an equally good end lends the baseline its prices."""
+    def best_or_baseline(self) -> SearchResult | None:
+        """Best of the results and the baseline; the baseline takes the prices of an equally good local optimum."""
         best, baseline = self.best, self._baseline
         if baseline is None or (best is not None and best.rank <= SearchResult(baseline, self.joint).rank):
             return best
-        same = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.violation <= SLACK
-        return SearchResult(baseline, self.joint, best.optimum if best is not None and same else None)
+        is_equal = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.violation <= SLACK
+        return SearchResult(baseline, self.joint, best.optimum if best is not None and is_equal else None)
 
     @property
     def turns(self) -> Array:
-        """Deviations of the throws of the best design from their star [rad]."""
+        """Moves of the throws of the best design from their star [rad], shape (moves,)."""
         optimum = self.best.optimum if self.best is not None else None
         return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
 
@@ -188,39 +195,41 @@ class MountSearch:
         return self.best is not None and self.best.design.violation <= SLACK
 
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        """Search from points, then from random points around the best ends."""
+        """Search from points, then from random points around the best local optima."""
         problem, joint = self.problem, self.joint
         generator = np.random.default_rng(problem.search.seed)
         starts = [
             joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
         ]
         optima = self._solve(starts, self._is_explored)
-        around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
-        if around and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
+        centres = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
+        if centres and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
             low, high = real_bounds(problem.mount_decisions)
             starts = []
             for k in range(max(len(points) // 2, 1)):
-                x = around[k % len(around)].x
+                x = centres[k % len(centres)].x
                 centre, columns = _split(joint, x)
                 mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
                 starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.throw_deviations(x)))
             more = self._solve(starts, try_all, len(points))
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
-        self._take(optima)
+        self._evaluate_optima(optima)
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
         limits = tuple(limit for limit in self.problem.limits if limit not in self._ignored)
         problem = self.problem if not self._ignored else replace(self.problem, limits=limits)
         return SmoothProgram(problem, self._size, margin, self.moves, coarser=self._coarser)
 
-    def _limits_with_room(self) -> set[Limit]:
+    def _inactive_limits(self) -> set[Limit]:
         # each load limit would add hundreds of rows to the program
         if self.moves is not None:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
         for place in self._points[:CHECKED_STARTS] if limits else ():
             design = started_at(self.problem, place)
-            limits = [x for x in limits if design is not None and design.evaluation.check_limit(x).violation < -ROOM]
+            limits = [
+                x for x in limits if design is not None and design.evaluation.check_limit(x).violation < -FAR_FROM_LIMIT
+            ]
         return set(limits)
 
     def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
@@ -245,18 +254,18 @@ class MountSearch:
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
 
-    def _take(self, optima: Sequence[LocalOptimum]) -> None:
-        """Evaluate local optima by the exact model, whatever the solver reports of them."""
+    def _evaluate_optima(self, optima: Sequence[LocalOptimum]) -> None:
+        """Evaluate local optima by the exact model, whatever status the solver reports."""
         self.optima += tuple(optima)
         designs: list[Design] = []
         for k, optimum in enumerate(optima):
             best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
-            report_progress("ends judged", k, len(optima), best)
-            design = self._evaluated(optimum, self.joint)
+            report_progress("evaluated local optima", k, len(optima), best)
+            design = self._evaluate_optimum(optimum, self.joint)
             if design is not None:
                 designs.append(design)
                 result = SearchResult(design, self.joint, optimum)
-                self._keep_best(result)
+                self._update_best(result)
                 if FEASIBLE < design.violation <= NEAR:
                     self._nearly_feasible.append(result)
         self._active_again = {
@@ -266,59 +275,61 @@ class MountSearch:
     def _comes_close(self, design: Design, limit: Limit) -> bool:
         if self.best is not None and self._is_feasible and design.value > self.best.design.value:
             return False
-        limits = [other for other in self.problem.limits if other not in self._ignored]
-        return design.evaluation.check_limit(limit).violation > -CLOSE and design.evaluation.violation(limits) <= NEAR
+        limits = [active for active in self.problem.limits if active not in self._ignored]
+        return (
+            design.evaluation.check_limit(limit).violation > -NEAR_LIMIT and design.evaluation.violation(limits) <= NEAR
+        )
 
-    def _keep_best(self, result: SearchResult) -> None:
+    def _update_best(self, result: SearchResult) -> None:
         if self.best is None or result.rank < self.best.rank:
             self.best = result
 
-    def _evaluated(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
+    def _evaluate_optimum(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
         if not np.all(np.isfinite(optimum.x)):
             return None
         mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
         try:
             problem = self.problem if self.moves is None else joint.problem_at(optimum.x)
         except ModelError:
-            # throws at an end that is no optimum may not fire in their order
+            # the throws may violate the firing order if the search stopped early
             return None
         values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
         return evaluate_design_at(problem, values)
 
     def _nudged(self, generator: np.random.Generator, k: int) -> Array:
-        # a symmetric star may be a saddle, so later starts are random
+        # a symmetric star may be a saddle point, so later starts are random
         if self.moves is None or k == 0:
             return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()))
         nudge = NUDGE * generator.normal(size=self.moves.size)
         return np.clip(nudge, self.moves.lower, self.moves.upper)
 
     def _tighten(self) -> None:
-        """Search with tighter limits from promising ends that a peak between samples makes infeasible."""
+        """Search with tighter limits from good local optima that a peak between samples makes infeasible."""
         by_value = sorted(self._nearly_feasible, key=lambda result: result.design.value)
         self._nearly_feasible = []
         values = [result.design.value for result in by_value]
-        different = [
+        distinct_results = [
             result for k, result in enumerate(by_value)
             if k == 0 or abs(values[k] - values[k - 1]) > 1e-3 * abs(values[k - 1])
         ]  # fmt: skip
-        for near in different[:MOST_AROUND]:
+        for result in distinct_results[:MOST_AROUND]:
             best = self.best
-            if best is None or best.design.violation > FEASIBLE or near.design.value < best.design.value:
-                self._search_with_margin(near)
+            if best is None or best.design.violation > FEASIBLE or result.design.value < best.design.value:
+                self._search_with_margin(result)
 
-    def _search_with_margin(self, near: SearchResult) -> None:
+    def _search_with_margin(self, result: SearchResult) -> None:
         margin = 0.0
         for _ in timed_rounds(MOST_MARGINS):
-            if near.optimum is None or not FEASIBLE < near.design.violation <= NEAR:
+            if result.optimum is None or not FEASIBLE < result.design.violation <= NEAR:
                 break
-            margin += 1.001 * near.design.violation
+            margin += 1.001 * result.design.violation
             joint = self._program(margin)
-            ends = solve_nonlinear(joint.program, [near.optimum.x], 1, self._iterations)
-            design = self._evaluated(ends[0], joint) if ends else None
+            ends = solve_nonlinear(joint.program, [result.optimum.x], 1, self._iterations)
+            design = self._evaluate_optimum(ends[0], joint) if ends else None
             if design is None:
                 break
-            near = SearchResult(design, joint, ends[0])
-            self._keep_best(near)
+            result = SearchResult(design, joint, ends[0])
+            self._update_best(result)
 
 
 def _split(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:

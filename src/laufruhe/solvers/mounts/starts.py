@@ -1,4 +1,4 @@
-"""Start points of a search of mounts: a Latin hypercube, the most promising points first."""
+"""Choose start points for a search of mounts: the best points of a Latin hypercube."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 
-# starts for each open number; candidates for each start, which cost about as much as its search
+# starts per open number; candidates per start, which together cost about as much as its search
 STARTS = 4
 POOL = 16
-# tolerance of the unbalances of starts
-ROUGHLY = 1e-2
+# relative gap of the unbalances of starts
+START_TOLERANCE = 1e-2
 # share of the remaining time for the evaluation of candidates
-LOOKING = 0.25
-# factor of candidates with simulated measures, which have many optima
+POOL_TIME = 0.25
+# factor of the number of candidates with simulated measures, which have many local optima
 SIMULATED_POOL = 4
-# weight of violations with simulated measures, whose limits few designs keep
-MISSED_WEIGHT = 10.0
+# weight of violations with simulated measures, which most designs violate
+VIOLATION_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
 def evaluation_count(problem: Problem) -> int:
-    """Return the number of operating points that the candidates evaluate, a measure of the time of a search."""
+    """Return the number of operating points to evaluate for all candidates, a measure of the time of a search."""
     return _candidates(problem) * len(problem.points)
 
 
@@ -51,45 +51,47 @@ def _most_starts(problem: Problem) -> int:
 
 
 def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
-    """Return a Latin hypercube, shape (count, n)."""
+    """Return a Latin hypercube between bounds, shape (n,) each, as points of shape (count, n)."""
     generator = np.random.default_rng(seed)
     cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
     return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
 
 
 def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
-    """Return mounts and columns of unbalances of a result."""
-    found = {decision.name: decision.value for decision in result.decisions}
-    mounts = [found[decision.name] for decision in problem.mount_decisions]
+    """Return the mounts of a result [SI] and its columns of unbalances [kg m], shape (columns,)."""
+    values = {decision.name: decision.value for decision in result.decisions}
+    mounts = [values[decision.name] for decision in problem.mount_decisions]
     return mounts, projected_vector(domains_of(problem.unbalances), unbalances_of(problem, result))
 
 
-def _balance_on_baseline(problem: Problem) -> list[complex] | None:
+def _baseline_balance(problem: Problem) -> list[complex] | None:
     if not problem.unbalances or not problem.load_terms:
         return None
-    result = solve_unbalances(replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, ROUGHLY)))
+    result = solve_unbalances(
+        replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, START_TOLERANCE))
+    )
     return unbalances_of(problem, result) if result.decisions else None
 
 
 def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
     """Return mounts and columns of unbalances of all starts, and a unit of the objective [SI].
 
-    The first start is the baseline design. The others spread over all bounds, stiffnesses by ratio. The unit is the
-    least positive objective of all candidates, so that a start close to a resonance does not hide smaller values.
+    The first start is the baseline design. The other starts cover all bounds, with stiffnesses on a logarithmic scale.
+    The unit is the smallest positive objective of all candidates: the solver's tolerance is relative to it.
     """
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     initial = evaluate_start(problem)
-    # a search cannot start on a resonance
-    wanted = _most_starts(problem) - (not initial.resonance)
-    pool = _spread_over(problem) if wanted else np.zeros((0, len(decisions)))
+    # no search starts on a resonance
+    count = _most_starts(problem) - (not initial.resonance)
+    pool = _spread_over(problem) if count else np.zeros((0, len(decisions)))
     with _evaluating(problem, initial, pool) as scores:
-        balanced = _balance_on_baseline(problem)
+        unbalances = _baseline_balance(problem)
         scored = scores()
-    best = projected_vector(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    best = projected_vector(domains, [d.start for d in problem.unbalances] if unbalances is None else unbalances)
     starts = [] if initial.resonance else [([d.real_start for d in decisions], best)]
-    if not wanted:
+    if not count:
         return starts, objective_value(problem, initial) or 1.0
-    rows, unit = _promising(problem, initial, pool, scored, wanted)
+    rows, unit = _promising(problem, initial, pool, scored, count)
     for k, row in enumerate(rows):
         columns = row[len(decisions) :].copy()
         for domain in domains:
@@ -112,16 +114,16 @@ def _spread_over(problem: Problem) -> Array:
     return points
 
 
-def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array, wanted: int) -> tuple[Array, float]:
-    # two thirds are the best of the pool, the others its first
-    misses, values = scored.T
-    known = values[np.isfinite(values)]
-    middle = float(np.median(known)) if len(known) else 0.0
-    best = np.argsort(misses + values / (middle or 1.0), kind="stable")
-    chosen = list(best[: wanted - wanted // 3])
-    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
-    given_value = math.inf if initial.resonance else objective_value(problem, initial)
-    minimum = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
+def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array, count: int) -> tuple[Array, float]:
+    # two thirds are the best candidates of the pool, the other third is its first
+    violations, values = scored.T
+    finite = values[np.isfinite(values)]
+    middle = float(np.median(finite)) if len(finite) else 0.0
+    best = np.argsort(violations + values / (middle or 1.0), kind="stable")
+    chosen = list(best[: count - count // 3])
+    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: count - len(chosen)]
+    baseline_value = math.inf if initial.resonance else objective_value(problem, initial)
+    minimum = min((float(v) for v in (*finite, baseline_value) if 0.0 < v < math.inf), default=1.0)
     return pool[chosen], minimum
 
 
@@ -129,55 +131,55 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
 def _evaluating(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Callable[[], Array]]:
     """Evaluate points in workers; yield a function that waits for violation and objective, shape (points, 2).
 
-    Points without an evaluation in time have infinite rows.
+    Points not evaluated in time have infinite rows.
     """
-    # higher orders hardly move a block, but take most of the time
+    # higher orders hardly move the block, but take most of the time
     loads = tuple(replace(load, wrench=load.wrench.series.truncated(POOL_ORDERS)) for load in initial.loads)
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
     shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
     with speculation(_scores, math.inf) as ahead:
-        with limit_time(LOOKING * seconds_left()):
+        with limit_time(POOL_TIME * seconds_left()):
             ahead.prefetch(enumerate(shares))
 
         def scores() -> Array:
-            with limit_time(LOOKING * seconds_left()):
+            with limit_time(POOL_TIME * seconds_left()):
                 return np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
 
         yield scores
 
 
 def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
-    """Return violation and objective of a share of the points, shape (points, 2)."""
+    """Return the sum of violations and the objective of a share of the points, shape (points, 2)."""
     problem, coarse, points = share
     if not len(points):
         return np.zeros((0, 2))
     count = len(problem.mount_decisions)
-    # unbalances are not decided yet, and may keep limits on loads
+    # unbalances may still change, so ignore limits on loads if some are open
     limits = problem.mount_limits if problem.unbalances else problem.limits
     plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.simulation))
     limits = tuple(limit for limit in limits if not limit.measure.channel.simulation)
     peaks = peaks_of(problem, COARSER, roughly=True)
-    out = np.full((len(points), 2), math.inf)
+    scores = np.full((len(points), 2), math.inf)
     for k, row in until_time_limit(enumerate(points)):
         try:
             design = with_mounts(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
-        missed, value = (
+        excess, value = (
             sum(max(design.check_limit(limit).violation, 0.0) for limit in limits),
             objective_value(plain, design),
         )
         if peaks is not None and peaks.is_known:
-            violation, worth = _of_peaks(problem, peaks, row)
-            missed, value = MISSED_WEIGHT * (missed + violation), value + worth
-        out[k] = missed, value
-    return out
+            violation, objective = _peak_scores(problem, peaks, row)
+            excess, value = VIOLATION_WEIGHT * (excess + violation), value + objective
+        scores[k] = excess, value
+    return scores
 
 
-def _of_peaks(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
-    # relative excess over limits, and share of the objective
+def _peak_scores(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
+    # sum of violations of limits on peaks, and their share of the objective
     parts = np.split(peaks.values(row), np.cumsum(peaks.counts)[:-1])
     maximum = dict(zip(simulated_measures(problem), map(np.max, parts), strict=True))
-    over = (float(maximum[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in maximum)
+    excesses = (float(maximum[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in maximum)
     terms = (term.weight * float(maximum[term.measure]) for term in problem.objective if term.measure in maximum)
-    return sum(max(each, 0.0) for each in over), sum(terms)
+    return sum(max(excess, 0.0) for excess in excesses), sum(terms)

@@ -1,1 +1,1 @@
-"""Stars, firing orders and shafts, with everything else at its own optimum."""
+"""Solve for crank stars, firing orders and balancer shafts, with all other decisions at their optimum."""

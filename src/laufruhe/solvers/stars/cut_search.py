@@ -1,8 +1,8 @@
-"""Exact search over stars and sets of shafts with everything else at its own optimum (S13-S15).
+"""Search exactly over stars and sets of shafts, with unbalances at their optimum (S13-S15).
 
-The cone program of one star gives dual rows Z. The bound that they prove is affine in the star, so one solve bounds
-every star from below, or shows that others keep the limits as little. The next star is that of the least bound, as
-long as this lies under the best value known. The search ends with a proof, because each star is solved at most once.
+The cone program of one star gives dual rows Z. The bound from these rows is affine in the star, so one solve bounds
+every star from below, or proves that other stars violate the limits too. The next star is the one with the lowest
+bound. The search ends with a proof when this bound reaches the best objective. Each star is solved at most once.
 """
 
 from __future__ import annotations
@@ -20,34 +20,34 @@ from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.throws.star_cuts import Cut
-from laufruhe.solvers.stars.star_program import Solved, shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import SolvedStar, shaft_owners, solve_design
 
 _CHUNK = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
 class CutSearchResult:
-    """Designs that were solved, and what was proven of all.
+    """Designs that a search solved, and lower bounds of all designs.
 
     Attributes
     ----------
     solved
-        Every design that was solved, best first.
+        Every solved design, best first.
     lower_bound
-        Bound over all stars and sets of shafts.
-    beyond
-        Bound over what was not solved.
+        Lower bound of the objective over all stars and sets of shafts [SI].
+    open_bound
+        Lower bound of the objective over designs not solved [SI]; infinite if all are solved or infeasible.
     complete
-        Whether the search ended by itself.
+        True if the search ended with a proof, False if its time ended.
     designs
-        Number of stars times sets of shafts.
+        Number of stars times number of sets of shafts.
     infeasible
-        Number of solved designs that cannot keep the limits.
+        Number of solved stars and sets of shafts without a feasible design.
     """
 
-    solved: tuple[Solved, ...]
+    solved: tuple[SolvedStar, ...]
     lower_bound: float
-    beyond: float
+    open_bound: float
     complete: bool
     designs: int
     infeasible: int
@@ -61,47 +61,47 @@ def search_designs(
     time_limit: float = float("inf"),
     zero_level: float = 0.0,
 ) -> CutSearchResult:
-    """Return the best designs of stars and shafts, proven (S15).
+    """Return the best designs of stars and shafts, with a proof (S15).
 
     Parameters
     ----------
     model
         Rows of every star.
     stars
-        Every star allowed, shape (n, throws).
+        Steps of every star allowed, shape (n, throws).
     count
-        How many designs are to be proven best.
+        Number of best designs to prove.
     tolerance
-        Relative gap at which a bound meets a value.
+        Relative gap that counts as closed.
     time_limit
-        [s].
+        Largest time of the search [s].
     zero_level
-        Value that counts as zero [SI].
+        Objective that counts as zero [SI].
     """
     started = time.perf_counter()
     owners, shafts = shaft_owners(model), model.phasing.shafts
-    # only the largest sets of shafts where every unbalance may be zero
-    has_least = any(owner >= 0 and d.set.lower > 0.0 for d, owner in zip(model.domains, owners, strict=True))
-    sets = shafts.allowed if has_least else shafts.largest
+    # if every unbalance may be zero, the largest sets of shafts include all others
+    has_minimum = any(owner >= 0 and d.set.lower > 0.0 for d, owner in zip(model.domains, owners, strict=True))
+    sets = shafts.allowed if has_minimum else shafts.largest
     bounds = np.zeros((len(stars), len(sets)))
     is_open = np.ones(bounds.shape, dtype=bool)
-    solved: list[Solved] = []
+    solved: list[SolvedStar] = []
     infeasible, complete = 0, False
     while True:
-        left = np.where(is_open, bounds, np.inf)
-        beyond = float(left.min(initial=np.inf))
-        lower_bound = min([beyond, *(one.bound for one in solved)])
+        open_bounds = np.where(is_open, bounds, np.inf)
+        open_bound = float(open_bounds.min(initial=np.inf))
+        lower_bound = min([open_bound, *(design.bound for design in solved)])
         values = distinct_values(model.space, solved)
         target = values[count - 1] if len(values) >= count else float("inf")
-        if not is_open.any() or beyond >= target - gap_tolerance_of(target, tolerance, zero_level):
+        if not is_open.any() or open_bound >= target - gap_tolerance_of(target, tolerance, zero_level):
             complete = True
             break
-        has_tried = bool(solved or infeasible)
-        if time.perf_counter() - started > time_limit or (is_time_over() and has_tried):
+        has_result = bool(solved or infeasible)
+        if time.perf_counter() - started > time_limit or (is_time_over() and has_result):
             break
-        best = min((one.value for one in solved), default=float("inf"))
+        best = min((design.value for design in solved), default=float("inf"))
         report_progress("stars and sets of shafts", len(solved) + infeasible, bounds.size, best, lower_bound)
-        row, column = divmod(int(np.argmin(left)), len(sets))
+        row, column = divmod(int(np.argmin(open_bounds)), len(sets))
         star = tuple(int(p) for p in stars[row])
         design, cut = solve_design(model, star, sets[column], owners, tolerance, zero_level)
         is_open[row, column] = False
@@ -113,7 +113,7 @@ def search_designs(
         else:
             solved.append(design)
     solved.sort(key=lambda s: (s.value, s.star, s.built))
-    return CutSearchResult(tuple(solved), lower_bound, beyond, complete, bounds.size, infeasible)
+    return CutSearchResult(tuple(solved), lower_bound, open_bound, complete, bounds.size, infeasible)
 
 
 def _raise_bounds(
@@ -126,15 +126,23 @@ def _raise_bounds(
         np.maximum(bounds[part], proven, out=bounds[part])
 
 
-def distinct_values(space: StarSpace, solved: Sequence[Solved]) -> list[float]:
-    """Return objectives in ascending order, images of one star that are worth the same counted once (S2)."""
+def distinct_values(space: StarSpace, solved: Sequence[SolvedStar]) -> list[float]:
+    """Return objectives of designs in ascending order [SI]; images of one star with equal objectives count once (S2).
+
+    Parameters
+    ----------
+    space
+        Space of the stars.
+    solved
+        Solved designs.
+    """
     if not solved:
         return []
     images = replace(space, mirror=True, reflect=True)
-    stars = images.canonical(np.array([s.star for s in solved], dtype=np.uint8))
-    seen: list[tuple[bytes, tuple[int, ...], float]] = []
-    for star, s in sorted(zip(stars, solved, strict=True), key=lambda pair: pair[1].value):
-        key = star.tobytes(), s.built
-        if not any(key == (a, b) and abs(v - s.value) <= 1e-6 * max(v, s.value) for a, b, v in seen):
-            seen.append((*key, s.value))
-    return [value for _, _, value in seen]
+    stars = images.canonical(np.array([design.star for design in solved], dtype=np.uint8))
+    distinct: list[tuple[bytes, tuple[int, ...], float]] = []
+    for star, design in sorted(zip(stars, solved, strict=True), key=lambda pair: pair[1].value):
+        key = star.tobytes(), design.built
+        if not any(key == (a, b) and abs(v - design.value) <= 1e-6 * max(v, design.value) for a, b, v in distinct):
+            distinct.append((*key, design.value))
+    return [value for _, _, value in distinct]

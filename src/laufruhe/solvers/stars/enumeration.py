@@ -1,4 +1,4 @@
-"""Best stars, and best firing orders, by looking at every one (S4, V9)."""
+"""Find the best stars and the best firing orders by enumeration (S4, V9)."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
 
 SLACK = 1e-9
-"""Share by which a value is no better than another."""
+"""Relative difference of objectives that counts as none."""
 MOST_SLOTS = 13
-"""Cylinders whose firing orders, a factorial of them, are looked at one by one."""
+"""Largest number of cylinders whose firing orders are enumerated; their number grows as the factorial."""
 _BLOCK = 1 << 17
 
 
 class StarObjective(Protocol):
-    """Objective of stars, as far as even ones differ."""
+    """Objective as a function of even stars."""
 
     def values(self, space: StarSpace, stars: Stars) -> Array:
-        """Return the values of many stars, shape (n,)."""
+        """Return the objectives of stars, shape (n,), from their steps, shape (n, throws)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +34,13 @@ class StarSearchResult:
     Attributes
     ----------
     stars, values
-        Shapes (n, throws) and (n,).
+        Steps of the stars, shape (n, throws), and objectives [SI], shape (n,).
     lower_bound
-        Bound of the objective of every star.
+        Lower bound of the objective over all stars [SI].
     complete
-        Whether the search ended by itself, so that these are proven the best.
+        True if the search ended with a proof that these stars are the best.
     nodes
-        Arrangements of halves, and whole stars, that were looked at.
+        Number of partial and complete stars that the search evaluated.
     """
 
     stars: Stars
@@ -52,7 +52,17 @@ class StarSearchResult:
 
 @dataclass
 class BestStars:
-    """Best stars so far, and the value that a new one has to beat."""
+    """Best stars so far.
+
+    Attributes
+    ----------
+    count
+        Largest number of stars.
+    throws
+        Number of throws of a star.
+    stars, values
+        Steps of the stars, shape (n, throws), and objectives [SI], shape (n,), best first.
+    """
 
     count: int
     throws: int
@@ -64,73 +74,83 @@ class BestStars:
 
     @property
     def cut(self) -> float:
-        """Value that a new star has to beat."""
+        """Objective that a new star must be below [SI]; infinite while there are fewer than `count` stars."""
         return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
 
     def offer(self, stars: Stars, values: Array) -> None:
-        """Take stars that are among the best, each once."""
+        """Add stars that are among the best, without duplicates.
+
+        Parameters
+        ----------
+        stars, values
+            Steps of the stars, shape (n, throws), and objectives [SI], shape (n,).
+        """
         if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
             return
-        near = np.argsort(values, kind="stable")[: 4 * self.count]
-        both = np.concatenate([self.stars, stars[near]])
-        value = np.concatenate([self.values, values[near]])
-        _, first = np.unique(both, axis=0, return_index=True)
-        # values equal to a rounding are ordered by the star alone, so that runs repeat
-        scale = float(np.abs(value).max()) or 1.0
-        keys = (*(both[first, k] for k in range(self.throws - 1, -1, -1)), np.round(value[first] / scale, 11))
+        best = np.argsort(values, kind="stable")[: 4 * self.count]
+        all_stars = np.concatenate([self.stars, stars[best]])
+        all_values = np.concatenate([self.values, values[best]])
+        _, first = np.unique(all_stars, axis=0, return_index=True)
+        # objectives equal within rounding sort by their star, so that runs are repeatable
+        scale = float(np.abs(all_values).max()) or 1.0
+        keys = (*(all_stars[first, k] for k in range(self.throws - 1, -1, -1)), np.round(all_values[first] / scale, 11))
         selected = first[np.lexsort(keys)[: self.count]]
-        self.stars, self.values = both[selected], value[selected]
+        self.stars, self.values = all_stars[selected], all_values[selected]
 
 
 def enumerate_stars(space: StarSpace, objective: StarObjective, count: int = 1) -> StarSearchResult:
-    """Return the best `count` stars by looking at every one, in blocks."""
-    best, seen = BestStars(count, space.throws), 0
+    """Return the best `count` stars of a space by evaluating all, in blocks."""
+    best, nodes = BestStars(count, space.throws), 0
     for block in space.blocks():
         best.offer(block, objective.values(space, block))
-        seen += len(block)
+        nodes += len(block)
     minimum = float(best.values[0]) if len(best.values) else float("inf")
-    return StarSearchResult(best.stars, best.values, minimum, True, seen)
+    return StarSearchResult(best.stars, best.values, minimum, True, nodes)
 
 
 def enumerate_orders(
     objective: PairObjective, cylinders: int, count: int = 1, time_limit: float = float("inf")
 ) -> StarSearchResult:
-    """Return the best `count` firing orders, the first cylinder in the first slot (V9).
+    """Return the best `count` firing orders, with cylinder 1 in the first slot (V9).
 
-    Stars grow throw by throw, and their squares with them, in blocks of bounded memory.
+    Partial orders grow by one throw at a time, and the squares of their loads with them, in blocks of bounded memory.
 
     Parameters
     ----------
+    objective
+        Objective as a function of squares of loads, with tables of pairs of throws.
     cylinders
-        Cylinders, each on a throw of its own.
+        Number of cylinders, each on its own throw.
+    count
+        Number of best firing orders.
     time_limit
-        Time after which it ends with the best so far, which is not complete [s].
+        Time after which the search returns the best orders so far, without a proof [s].
     """
-    best, seen, ended = BestStars(count, cylinders), 0, False
+    best, nodes, is_late = BestStars(count, cylinders), 0, False
     stars = np.zeros((1, cylinders), dtype=np.uint8)
     squares = np.array([[table.constant + table.placed(stars, stars[:, 0], 0)[0] for table in objective.tables]])
-    waiting: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
+    queue: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
     with limit_time(time_limit):
-        while waiting and not ended:
-            report_progress("partial firing orders", seen, value=float(best.values.min(initial=np.inf)))
-            placed, stars, squares = waiting.pop()
-            ended = is_time_over()
-            if placed == cylinders:
+        while queue and not is_late:
+            report_progress("partial firing orders", nodes, value=float(best.values.min(initial=np.inf)))
+            depth, stars, squares = queue.pop()
+            is_late = is_time_over()
+            if depth == cylinders:
                 values = objective.values(squares)
                 allowed = np.isfinite(values)
                 best.offer(stars[allowed], values[allowed])
-                seen += len(stars)
+                nodes += len(stars)
                 continue
             free = np.ones(stars.shape, dtype=bool)
-            for k in range(placed):
+            for k in range(depth):
                 free[np.arange(len(stars)), stars[:, k]] = False
             rows, steps = np.nonzero(free)
             for start in range(0, len(rows), _BLOCK):
                 row, step = rows[start : start + _BLOCK], steps[start : start + _BLOCK].astype(np.uint8)
-                grown = stars[row]
-                more = [table.placed(grown, step, placed) for table in objective.tables]
-                grown[:, placed] = step
-                waiting.append((placed + 1, grown, squares[row] + np.stack(more, axis=1)))
-    of_best = np.array([table.squares(best.stars[:1])[0] for table in objective.tables if len(best.values)])
-    minimum = objective.below(of_best) if len(best.values) else float("inf")
-    return StarSearchResult(best.stars, best.values, 0.0 if ended else minimum, not ended, seen)
+                extended = stars[row]
+                increments = [table.placed(extended, step, depth) for table in objective.tables]
+                extended[:, depth] = step
+                queue.append((depth + 1, extended, squares[row] + np.stack(increments, axis=1)))
+    best_squares = np.array([table.squares(best.stars[:1])[0] for table in objective.tables if len(best.values)])
+    minimum = objective.below(best_squares) if len(best.values) else float("inf")
+    return StarSearchResult(best.stars, best.values, 0.0 if is_late else minimum, not is_late, nodes)

@@ -1,4 +1,4 @@
-"""Degree of irregularity beside open stars of even firing (S35)."""
+"""Solve for even stars if the problem also measures the degree of irregularity, which is equal for all (S35)."""
 
 from __future__ import annotations
 
@@ -19,39 +19,46 @@ from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import no_star, solve_fixed, with_star
 from laufruhe.solvers.values import ObjectiveValue
 
-_ALIKE = "every star that fires evenly turns the crank as evenly"
+_EQUAL_STARS = "every star that fires evenly turns the crank as evenly"
 
 
 def flywheel_measures(problem: Problem) -> list[Measure]:
-    """Return measures of the flywheel, and of how evenly it turns."""
+    """Return measures of the flywheel and of its degree of irregularity."""
     return [measure for measure in problem.measures if measure.channel.is_flywheel]
 
 
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
-    """Decide stars of even firing by all but the flywheel: alike cylinders on the same dead centres turn alike (S35).
+    """Choose among even stars without the flywheel's measures, which are equal for all of them (S35).
+
+    All even stars of equal cylinders have the same dead centres, and so the same torque.
 
     Parameters
     ----------
+    problem, phasing
+        The problem and its open phasing.
     solve
         Solver of the problem without measures of the flywheel.
     """
     initial = evaluate(problem)
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
-    broken = broken_limits(wheel, initial)
-    if broken:
-        why = f"no star keeps {quoted(broken)}: all that fire evenly turn the crank as evenly; give it more inertia"
-        return no_star(problem, why, conflict=broken)
+    violated = broken_limits(wheel, initial)
+    if violated:
+        reason = (
+            f"no star keeps {quoted(violated)}: the degree of irregularity is equal for all even stars; "
+            "increase the flywheel's inertia"
+        )
+        return no_star(problem, reason, conflict=violated)
     limits = tuple(limit for limit in problem.limits if limit not in wheel)
     terms = tuple(term for term in problem.objective if not term.measure.channel.is_flywheel)
     limited = [Term(limit.measure) for limit in limits if not limit.measure.channel.is_number]
     if not terms and not limited:
         return _any_star(problem, phasing)
-    # where nothing else is minimised, any design within the limits is as good
-    others = terms or tuple(limited[:1])
+    # without other terms, any design within the limits is optimal
+    load_terms = terms or tuple(limited[:1])
 
     def without_wheel(star_problem: Problem) -> Problem:
-        rest = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)
-        return star_problem.changed(objective=others, limits=rest)
+        load_limits = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)
+        return star_problem.changed(objective=load_terms, limits=load_limits)
 
     inner = replace(phasing, realise=lambda candidate: without_wheel(phasing.realise(candidate)))
     result = solve(replace(without_wheel(problem), phasing=inner))
@@ -59,17 +66,19 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     result = replace(result, problem=replace(result.problem, phasing=phasing))
     if result.objective is None or result.certificate is None:
         return result
-    # what all stars share of the objective
+    # part of the objective that is equal for all stars
     wheel_terms = [term for term in problem.objective if term.measure.channel.is_flywheel]
-    shared = sum((term.weight * result.final.value(term.measure) for term in wheel_terms), 0.0)
+    wheel_value = sum((term.weight * result.final.value(term.measure) for term in wheel_terms), 0.0)
     value, proof = objective_value(problem, result.final), result.certificate
-    bound = shared + (proof.lower_bound if terms else 0.0)
+    bound = wheel_value + (proof.lower_bound if terms else 0.0)
     zero_level = numerical_zero(problem, result.final.engine)
     details = result.phasing
     if details is not None and terms:
-        ranking = (replace(s, value=s.value + shared, lower_bound=s.lower_bound + shared) for s in details.ranking)
+        ranking = (
+            replace(s, value=s.value + wheel_value, lower_bound=s.lower_bound + wheel_value) for s in details.ranking
+        )
         details = replace(details, ranking=tuple(ranking))
-    method = f"{proof.method}; {_ALIKE}"
+    method = f"{proof.method}; {_EQUAL_STARS}"
     return replace(
         result,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
@@ -82,15 +91,17 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
 
 
 def _any_star(problem: Problem, phasing: Phasing) -> Result:
-    """Return one of the stars where all are worth the same."""
-    families, why = families_of(phasing)
+    """Return the result of the first star; all stars have the same objective."""
+    families, reason = families_of(phasing)
     if not families:
-        return no_star(problem, f"no star exists: {why}")
+        return no_star(problem, f"no star exists: {reason}")
     family = families[0]
     candidate = family.candidate(phasing, family.first)
     result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
     value = objective_value(result.problem, result.final)
-    proof = make_certificate(value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, _ALIKE)
+    proof = make_certificate(
+        value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, _EQUAL_STARS
+    )
     ranking = [ranked_star(phasing, candidate, family.first, value, value, True)]
-    details = ranking_result(phasing, candidate, ranking, sum(each.size for each in families), 1, _ALIKE)
+    details = ranking_result(phasing, candidate, ranking, sum(x.size for x in families), 1, _EQUAL_STARS)
     return with_star(problem, phasing, result, candidate, proof, details)

@@ -1,4 +1,4 @@
-"""Search over all even stars: which solver decides, and what it proves (S18)."""
+"""Search all even stars for the best designs, by enumeration or by cuts of cone programs (S18)."""
 
 from __future__ import annotations
 
@@ -25,18 +25,22 @@ MOST_LISTED = 1_000_000
 
 @dataclass(frozen=True, eq=False)
 class EvenDesign:
-    """A design that a search returned, before it is evaluated anew.
+    """Design of an even star from a search, before the exact model evaluates it.
 
     Attributes
     ----------
+    family
+        Family of the star.
     steps
         Steps of the throws.
     built
-        Numbers of the sets of optional shafts that are built.
+        Indices of the sets of optional shafts that are built.
+    candidate
+        Throws, geometry and shafts of the star.
     value, bound
-        Objective, and its bound over all designs of this star [SI].
+        Objective, and its lower bound over all designs of this star [SI].
     proven
-        Whether nothing that was left out is better.
+        True if no design outside the result is better.
     """
 
     family: Family
@@ -48,21 +52,35 @@ class EvenDesign:
     proven: bool
 
     @classmethod
-    def of_steps(
+    def from_steps(
         cls, phasing: Phasing, family: Family, steps: tuple[int, ...], built: tuple[int, ...], value: float,
         bound: float, proven: bool,
     ) -> EvenDesign:  # fmt: skip
-        """Return the design of a family with these steps and sets of shafts."""
+        """Build the design of a family from the steps of its throws.
+
+        Parameters
+        ----------
+        phasing, family
+            Open phasing, and family of the star.
+        steps
+            Steps of the throws.
+        built
+            Indices of the sets of optional shafts that are built.
+        value, bound
+            Objective, and its lower bound over all designs of this star [SI].
+        proven
+            True if no design outside the result is better.
+        """
         return cls(family, steps, built, family.candidate(phasing, steps, phasing.without(built)), value, bound, proven)
 
-    def ranked(self, phasing: Phasing) -> RankedStar:
-        """Return its entry of a ranking."""
+    def ranking_entry(self, phasing: Phasing) -> RankedStar:
+        """Return the entry of the design in a ranking."""
         if self.family.is_of_orders:
             phasing = replace(phasing, firing_order=self.candidate.firing_order)
         return ranked_star(phasing, self.candidate, self.steps, self.value, self.bound, self.proven)
 
     def equals(self, other: EvenDesign) -> bool:
-        """Return True if its star is an image of the other and is worth the same (S2)."""
+        """Return True if both stars are mirror images of each other with equal objectives (S2)."""
         if self.family is not other.family or self.built != other.built:
             return False
         if abs(self.value - other.value) > 1e-6 * max(self.value, other.value):
@@ -74,7 +92,23 @@ class EvenDesign:
 
 @dataclass(frozen=True, eq=False)
 class EvenStarResult:
-    """Designs, best first, and the bound of all designs."""
+    """Best designs of a search over even stars, and the lower bound of all.
+
+    Attributes
+    ----------
+    designs
+        Best designs, best first.
+    bound
+        Lower bound of the objective over all designs [SI].
+    complete
+        True if the search ended with a proof, False if its time ended.
+    looked_at
+        Number of stars or partial stars that the search evaluated.
+    method
+        Name of the method, for the certificate.
+    infeasible
+        Number of stars without a feasible design.
+    """
 
     designs: tuple[EvenDesign, ...]
     bound: float
@@ -85,12 +119,12 @@ class EvenStarResult:
 
 
 def can_list(problem: Problem, families: Sequence[Family]) -> bool:
-    """Return True if the even stars of a problem, or its firing orders, are few enough to be looked at one by one."""
+    """Return True if the even stars of a problem, or its firing orders, are few enough to enumerate."""
     return sum(family.size for family in families) <= MOST_LISTED or _differ_by_squares(problem, families)
 
 
 def is_long(problem: Problem) -> bool:
-    """Return True if even stars are open that are too many to be listed."""
+    """Return True if the open even stars of a problem are too many to enumerate."""
     phasing = problem.phasing
     if phasing is None or phasing.throws is not None or phasing.throw_bounds is not None:
         return False
@@ -98,7 +132,7 @@ def is_long(problem: Problem) -> bool:
 
 
 def refuse_long(problem: Problem) -> None:
-    """Raise `ModelError` if even stars are open that are too many to be listed."""
+    """Raise `ModelError` if the open even stars of a problem are too many to enumerate."""
     if is_long(problem):
         raise _too_many()
 
@@ -109,7 +143,18 @@ def _too_many() -> ModelError:
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even stars: every star where orders alone count, else cuts of cone programs."""
+    """Return the best designs of all even stars.
+
+    The method is enumeration if the objective depends on single orders or on squares of loads, else cuts of cone
+    programs.
+
+    Parameters
+    ----------
+    problem, phasing
+        The problem and its open phasing.
+    families
+        Families of even stars.
+    """
     if not can_list(problem, families):
         raise _too_many()
     if _differ_by_squares(problem, families):
@@ -118,17 +163,19 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
             raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
         model = family.model(phasing)
         pairs = PairObjective.of(model.at(model.samples))
-        listed = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
-        answer = listed_answer(phasing, family, listed, "every firing order looked at, pair by pair of throws")
-        return replace(answer, infeasible=0 if answer.designs else listed.nodes)
-    simple = [(family, objective) for family in families if (objective := amplitudes(phasing, family)) is not None]
-    if len(simple) < len(families):
+        search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
+        result = enumeration_result(phasing, family, search, "every firing order looked at, pair by pair of throws")
+        return replace(result, infeasible=0 if result.designs else search.nodes)
+    family_objectives = [
+        (family, objective) for family in families if (objective := amplitudes(phasing, family)) is not None
+    ]
+    if len(family_objectives) < len(families):
         return _search_by_cuts(problem, phasing, families)
-    answers = []
-    for family, objective in simple:
-        listed = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
-        answers.append(listed_answer(phasing, family, listed, "every star looked at"))
-    return merge_answers(answers, phasing.best)
+    results = []
+    for family, objective in family_objectives:
+        search = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
+        results.append(enumeration_result(phasing, family, search, "every star looked at"))
+    return merge_results(results, phasing.best)
 
 
 def _differ_by_squares(problem: Problem, families: Sequence[Family]) -> bool:
@@ -140,57 +187,67 @@ def _differ_by_squares(problem: Problem, families: Sequence[Family]) -> bool:
 
 
 def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
-    """Return the objective of a family as norms of single orders, where it is of that kind (S3)."""
+    """Return the objective of a family as a sum of norms of single orders; None if it has another form (S3)."""
     if family.fixed or family.is_of_orders:
         return None
     first = phasing.realise(family.candidate(phasing, family.first))
     return amplitude_objective(first, phasing, family.layout)
 
 
-def listed_answer(phasing: Phasing, family: Family, listed: StarSearchResult, method: str) -> EvenStarResult:
-    """Return the result of a search of stars alone as an answer."""
+def enumeration_result(phasing: Phasing, family: Family, search: StarSearchResult, method: str) -> EvenStarResult:
+    """Convert the result of an enumeration of stars.
+
+    Parameters
+    ----------
+    phasing, family
+        Open phasing, and family of the stars.
+    search
+        Result of the enumeration.
+    method
+        Name of the method, for the certificate.
+    """
     designs = tuple(
-        EvenDesign.of_steps(phasing, family, tuple(map(int, star)), (), float(value), float(value), listed.complete)
-        for star, value in zip(listed.stars, listed.values, strict=True)
+        EvenDesign.from_steps(phasing, family, tuple(map(int, star)), (), float(value), float(value), search.complete)
+        for star, value in zip(search.stars, search.values, strict=True)
     )
-    return EvenStarResult(designs, listed.lower_bound, listed.complete, listed.nodes, method)
+    return EvenStarResult(designs, search.lower_bound, search.complete, search.nodes, method)
 
 
 def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
     zero_level = numerical_zero(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
-    answers = []
+    results = []
     for family in families:
         model = family.model(phasing)
         search = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, zero_level)
-        highest = search.beyond * (1.0 + problem.tolerance)
+        maximum = search.open_bound * (1.0 + problem.tolerance)
         designs = tuple(
-            EvenDesign.of_steps(phasing, family, s.star, s.built, s.value, s.bound, s.value <= highest)
+            EvenDesign.from_steps(phasing, family, s.star, s.built, s.value, s.bound, s.value <= maximum)
             for s in search.solved
         )
         method = f"cone programs of {len(search.solved)} of {search.designs} designs, dual cuts for the others"
-        # what is proven of the best does not need the whole ranking
+        # the proof of the best design needs no proof of the whole ranking
         is_closed = bool(designs) and gap_of(designs[0].value, search.lower_bound, zero_level) <= problem.tolerance
         complete = search.complete or is_closed
-        answers.append(
+        results.append(
             EvenStarResult(designs, search.lower_bound, complete, len(search.solved), method, search.infeasible)
         )
-    return merge_answers(answers, phasing.best)
+    return merge_results(results, phasing.best)
 
 
-def merge_answers(answers: Sequence[EvenStarResult], count: int) -> EvenStarResult:
-    """Return the best `count` designs of several geometries, equal ones counted once."""
+def merge_results(results: Sequence[EvenStarResult], count: int) -> EvenStarResult:
+    """Merge results of several geometries into the best `count` designs, without duplicates."""
     best: list[EvenDesign] = []
-    for design in sorted((d for answer in answers for d in answer.designs), key=lambda d: d.value):
+    for design in sorted((d for result in results for d in result.designs), key=lambda d: d.value):
         if not any(design.equals(other) for other in best):
             best.append(design)
         if len(best) == count:
             break
     return EvenStarResult(
         tuple(best),
-        min(answer.bound for answer in answers),
-        all(answer.complete for answer in answers),
-        sum(answer.looked_at for answer in answers),
-        answers[0].method,
-        sum(answer.infeasible for answer in answers),
+        min(result.bound for result in results),
+        all(result.complete for result in results),
+        sum(result.looked_at for result in results),
+        results[0].method,
+        sum(result.infeasible for result in results),
     )

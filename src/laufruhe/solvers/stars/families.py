@@ -1,4 +1,4 @@
-"""Even stars of every bank angle and split pin that a problem allows (S6, S7)."""
+"""List the even stars of every bank angle and split pin that a problem allows (S6, S7)."""
 
 from __future__ import annotations
 
@@ -20,16 +20,20 @@ from laufruhe.problem.problem import Phasing
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Even stars of one bank angle and split pin, or firing orders of cylinders that have a throw each (V9).
+    """Even stars of one bank angle and split pin, or firing orders of cylinders with one throw each (V9).
 
     Attributes
     ----------
     geometry
-        Bank angle and split pin angle [rad]; None where the layout has none.
+        Bank angle and split pin angle [rad]; None if the layout has none.
+    layout
+        Layout with this geometry.
+    space
+        Space of the stars.
     fixed
-        Steps of the only star, where the firing order is given.
+        Steps of the only star if the firing order is fixed, else None.
     is_of_orders
-        Whether every firing order is a design: the steps of its star are slots of the cycle.
+        True if every firing order is a design; the steps of its star are slots of the cycle.
     """
 
     geometry: tuple[float | None, float | None]
@@ -40,40 +44,52 @@ class Family:
 
     @property
     def size(self) -> int:
-        """Number of stars, images counted."""
+        """Number of stars, including mirror images."""
         return 1 if self.fixed is not None else self.space.size
 
     @property
     def first(self) -> tuple[int, ...]:
-        """Steps of one of the stars."""
+        """Steps of the first star."""
         return self.space.first if self.fixed is None else self.fixed
 
     @property
     def stars(self) -> Stars:
-        """Stars, one of each set of images, shape (n, throws)."""
+        """Steps of all stars, one of each set of mirror images, shape (n, throws)."""
         if self.fixed is not None:
             return np.array([self.fixed], dtype=np.uint8)
         return np.concatenate(list(self.space.blocks()))
 
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """Return the design of a star, with the first of its firing orders."""
+        """Return the candidate of a star, with the first of its firing orders.
+
+        Parameters
+        ----------
+        phasing
+            Open phasing.
+        steps
+            Steps of the throws.
+        left_out
+            Names of optional shafts that are not built.
+        """
         if self.is_of_orders:
             return phasing.fired(steps, self.geometry, left_out)
         return phasing.star(steps, self.space.phases, self.geometry, left_out)
 
     def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
-        """Return rows of every star, of those of another space where one is given."""
+        """Return the model of all stars of the family, or of the stars of `space`."""
         kind = FiringModel if self.is_of_orders else StarModel
         return kind(phasing, space or self.space, self.geometry, self.fixed)
 
 
 def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
-    """Return stars that fire evenly for every geometry allowed, and why there are none.
+    """Return families of even stars for every geometry allowed, and the reason if there are none.
 
     Parameters
     ----------
+    phasing
+        Open phasing.
     by_firing
-        Whether firing orders of one star differ, so that each of them is a design.
+        True if loads depend on the firing order, so that every firing order is a design.
     """
     families, reason = [], "no bank angle and split pin within the bounds let the firing be even"
     lattice = firing_lattice(phasing.cycle, phasing.cylinders)

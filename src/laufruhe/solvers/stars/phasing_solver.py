@@ -1,4 +1,4 @@
-"""Decision of stars, firing orders and shafts together (S18)."""
+"""Solve for stars, firing orders and shafts together (S18)."""
 
 from __future__ import annotations
 
@@ -32,34 +32,36 @@ from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MOST_TIMES, ROUNDS = 16, 2
-"""Times as many angles at most for a search whose own are too few to prove its best star, and how often."""
+"""Largest factor of samples for a search that cannot prove its best star, and number of such searches."""
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
-"""A star, and its steps where it fires evenly."""
+"""A star, and its steps if it fires evenly."""
 Decide: TypeAlias = Callable[[Problem, float], Result]
 Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResult]
 
 
 def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
-    """Decide open throws, firing orders, shafts and unbalances together.
+    """Solve for open throws, firing orders, shafts and unbalances together.
 
     Parameters
     ----------
+    problem
+        Problem with open phasing.
     search
-        Search that returns the best designs of all even stars of some families.
+        Function that returns the best designs of families of even stars.
 
     Returns
     -------
-    Result with a ranking. Its certificate is `global` if the search ended by itself,
-    `global within gap` if time ended it, and `local` where throws left the even steps.
+    Result with a ranking. Its certificate is `global` if the search ended with a proof,
+    `global within gap` if its time ended, and `local` if throws left the even steps.
 
     Raises
     ------
     SolverError
-        If a solver stops without an answer.
+        If a solver stops without a result.
     """
     phasing = problem.phasing
     if phasing is None:
-        raise SolverError("nothing of the phasing is open")
+        raise SolverError("the problem has no open phasing")
     has_wheel = bool(flywheel_measures(problem))
     if phasing.throws is None and has_wheel and not phasing.continuous and not gas_distinguishes_cylinders(problem):
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
@@ -75,14 +77,16 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
 
 def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    is_unlike = gas_distinguishes_cylinders(problem)
-    if flywheel_measures(problem) and not is_unlike:
+    cylinders_differ = gas_distinguishes_cylinders(problem)
+    if flywheel_measures(problem) and not cylinders_differ:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         solve = partial(solve_phasing, search=search)
         result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
         return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
-    one_by_one = is_unlike or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
-    if (problem.depends_on_firing_order or is_unlike) and is_even and one_by_one:
+    solves_each = (
+        cylinders_differ or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
+    )
+    if (problem.depends_on_firing_order or cylinders_differ) and is_even and solves_each:
         stars = even_stars(phasing)
         result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:
@@ -93,83 +97,88 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
         if phasing.continuous:
             return _solve_uneven(problem, phasing, None)
         return no_star(problem, why_none_fires(phasing)[0])
-    answer = search(_with_half_tolerance(problem), phasing, families)
-    if not answer.designs:
+    search_result = search(_with_half_tolerance(problem), phasing, families)
+    if not search_result.designs:
         if phasing.continuous:
             return _solve_uneven(problem, phasing, None)
         names = tuple(limit.name for limit in problem.limits)
-        if answer.complete:
-            # one star may break some of the limits, and another the others
+        if search_result.complete:
+            # each star may violate other limits
             limits = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
-            why = f"no star keeps {limits}, whatever else is decided ({counted(answer.infeasible, 'design')} tried)"
-            return no_star(problem, why, conflict=names)
+            tried = counted(search_result.infeasible, "design")
+            reason = f"no star keeps {limits}, whatever else is decided ({tried} tried)"
+            return no_star(problem, reason, conflict=names)
         cause = "the time limit" if is_time_over() else f"phasing.time_limit = {phasing.time_limit:g} s"
-        why = f"no feasible design was found in {cause}; raise it"
-        return no_star(problem, why, Status.FAILED)
-    result = _best_of(problem, phasing, answer)
-    if answer.complete and problem.search.proves:
-        result = _with_more_angles(problem, families, result, search)
+        reason = f"no feasible design was found in {cause}; raise it"
+        return no_star(problem, reason, Status.FAILED)
+    result = _best_of(problem, phasing, search_result)
+    if search_result.complete and problem.search.proves:
+        result = _with_more_samples(problem, families, result, search)
     return _solve_uneven(problem, phasing, result) if phasing.continuous else result
 
 
 def _with_half_tolerance(problem: Problem) -> Problem:
-    # one half is for a design, the other for how much better another one has to be
+    # one half for the optimum of a design, the other half for the comparison of designs
     return replace(problem, tolerance=0.5 * problem.tolerance)
 
 
-def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result, search: Search) -> Result:
-    """Search again at more angles, while these are all that keeps a gap open (P7)."""
+def _with_more_samples(problem: Problem, families: Sequence[Family], result: Result, search: Search) -> Result:
+    """Search again at more samples, while their number limits the gap (P7)."""
     for _ in range(ROUNDS):
         gap = result.certificate.gap if result.certificate else 0.0
         if gap <= problem.tolerance or is_time_over():
             break
-        # averages about angles fall short of means by the square of their step
-        times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MOST_TIMES)
+        # the error of sample averages is proportional to the square of the step
+        factor = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MOST_TIMES)
         fidelity = problem.fidelity
-        # the gas keeps its steps: a design is worth the same at as many angles, whoever evaluates it
-        problem = problem.at(replace(fidelity, samples=times * fidelity.samples, gas_samples=fidelity.gas_steps))
+        # keep the steps of the gas, so that designs keep their objectives
+        problem = problem.at(replace(fidelity, samples=factor * fidelity.samples, gas_samples=fidelity.gas_steps))
         assert problem.phasing is not None
-        answer = search(_with_half_tolerance(problem), problem.phasing, families)
-        again = _best_of(problem, problem.phasing, answer) if answer.designs else result
-        if again.certificate is None or again.certificate.gap >= gap or not answer.complete:
+        search_result = search(_with_half_tolerance(problem), problem.phasing, families)
+        candidate = _best_of(problem, problem.phasing, search_result) if search_result.designs else result
+        if candidate.certificate is None or candidate.certificate.gap >= gap or not search_result.complete:
             break
-        result = again
+        result = candidate
     return result
 
 
-def _best_of(problem: Problem, phasing: Phasing, answer: EvenStarResult) -> Result:
-    """Solve the best even design once more as a problem of its own, with the bound of all designs (S17)."""
-    entries = [design.ranked(phasing) for design in answer.designs]
-    fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
-    if not fired:
+def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) -> Result:
+    """Solve the problem of the best even star, and certify it with the bound of all designs (S17)."""
+    entries = [design.ranking_entry(phasing) for design in search_result.designs]
+    designs = [
+        (design, entry) for design, entry in zip(search_result.designs, entries, strict=True) if entry.firing_orders
+    ]
+    if not designs:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
-    left = iter(fired)
-    for best, first in left:
+    remaining = iter(designs)
+    for best, first in remaining:
         left_out = phasing.without(_needed_shafts(problem, phasing, best))
         candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
         result = solve_fixed(replace(_with_half_tolerance(phasing.realise(candidate)), phasing=None))
-        # a peak may stand between the angles at which the search looks
-        if StarDesign(candidate, result).is_met:
+        # a peak between samples of the search may violate a limit
+        if StarDesign(candidate, result).is_feasible:
             break
     else:
-        why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
-        return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
-    shared = firing_bound(problem, result.final) if result.objective and not any(phasing.is_geometry_open) else 0.0
-    bound, zero_level = max(answer.bound, shared), numerical_zero(problem)
+        reason = f"each of the best {counted(len(designs), 'star')} violates a limit between the samples of the search"
+        return no_star(problem, f"{reason}; raise phasing.best or fidelity.samples", Status.FAILED)
+    firing_value = (
+        firing_bound(problem, result.final) if result.objective and not any(phasing.is_geometry_open) else 0.0
+    )
+    bound, zero_level = max(search_result.bound, firing_value), numerical_zero(problem)
     result, doubt = result_under(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
     certificate = make_certificate(
         value, bound, zero_level, problem.tolerance, ProofStrength.EXACT,
-        result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
+        result.certificate.kkt_residual if result.certificate else 0.0, search_result.method, doubt,
     )  # fmt: skip
-    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
+    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in remaining)]
     count = sum(family.size for family in families_of(phasing, problem.depends_on_firing_order)[0])
-    details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
+    details = ranking_result(phasing, candidate, ranking, count, search_result.looked_at, search_result.method)
     return with_star(problem, phasing, result, candidate, certificate, details)
 
 
 def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tuple[int, ...]:
-    """Return the sets of shafts without which the design would be worse: the others need not be built."""
+    """Return the sets of shafts that the best design needs; without any of them, it would be worse."""
     needed = best.built
     if not needed:
         return needed
@@ -178,14 +187,16 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
     zero_level, tolerance = numerical_zero(problem), 0.5 * problem.tolerance
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in needed if j != k)
-        again, _ = solve_design(model, best.steps, fewer, owners, tolerance, zero_level)
-        if again is not None and again.value <= best.value + gap_tolerance_of(best.value, tolerance, zero_level):
+        candidate, _ = solve_design(model, best.steps, fewer, owners, tolerance, zero_level)
+        if candidate is not None and candidate.value <= best.value + gap_tolerance_of(
+            best.value, tolerance, zero_level
+        ):
             needed = fewer
     return needed
 
 
 def even_stars(phasing: Phasing) -> list[Star]:
-    """Return throws as given, or all stars that fire evenly, images included."""
+    """Return the fixed throws, or all even stars including mirror images."""
     if phasing.throws is not None:
         return [(Candidate(phasing.throws, None, *phasing.minimum_geometry), None)]
     pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
@@ -193,74 +204,88 @@ def even_stars(phasing: Phasing) -> list[Star]:
 
 
 def solve_every_order(
-    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own),
+    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda fixed, _: solve_fixed(fixed),
     maximum: int | None = None,
 ) -> Result:  # fmt: skip
-    """Solve every firing order that loads tell apart, of every star with every set of shafts, each by itself.
+    """Solve every firing order with its own loads, of every star, with every set of shafts.
 
     Parameters
     ----------
+    problem, phasing
+        The problem and its open phasing.
+    stars
+        Stars with their steps.
     decide
-        Solver of all else that is open, given a problem and the least value so far.
+        Solver of the other decisions. Its arguments are the problem of a design and the smallest objective so far [SI].
     maximum
-        Number of designs, drawn of all, that are decided where no bound is requested; None for every one, with its
-        bound.
+        Number of random designs to solve, without a bound; None to solve all designs, with their bound.
     """
     orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
     if not any(orders.values()):
         return no_star(problem, why_none_fires(phasing)[0])
-    # the small ones first: a shaft that buys nothing is not built
-    sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
-    fired = [(star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)]
-    if maximum is None and len(fired) * len(sets) >= MOST_ORDERS:
+    # small sets first, so that a shaft without benefit is not built
+    sets = sorted(phasing.shafts.allowed, key=lambda built: (len(built), built))
+    star_orders = [
+        (star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)
+    ]
+    if maximum is None and len(star_orders) * len(sets) >= MOST_ORDERS:
         many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
         raise ModelError(f"{many}; give a firing order, or throws")
-    designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in fired]
-    whole = len(designs)
-    if maximum is not None and whole > maximum:
-        drawn = np.random.default_rng(problem.search.seed).choice(whole, maximum, replace=False)
+    designs = [
+        replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in star_orders
+    ]
+    total = len(designs)
+    if maximum is not None and total > maximum:
+        drawn = np.random.default_rng(problem.search.seed).choice(total, maximum, replace=False)
         designs = [designs[k] for k in sorted({0, *drawn.tolist()})]
-    started, every = time.perf_counter(), list[StarDesign]()
+    started, results = time.perf_counter(), list[StarDesign]()
     for k, candidate in enumerate(designs):
-        minimum = min((one.value for one in every), default=math.inf)
+        minimum = min((design.value for design in results), default=math.inf)
         report_progress("firing orders and sets of shafts", k, len(designs), minimum)
-        if every and (is_time_over() or time.perf_counter() - started > phasing.time_limit):
+        if results and (is_time_over() or time.perf_counter() - started > phasing.time_limit):
             break
-        every.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), minimum)))
-    complete = len(every) == whole
-    solved = [design for design in every if design.is_met]
+        results.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), minimum)))
+    complete = len(results) == total
+    solved = [design for design in results if design.is_feasible]
     if not solved:
-        proven = complete and all(design.is_excluded for design in every)
-        why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
-        status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
-        return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())
+        is_proven = complete and all(design.is_infeasible for design in results)
+        reason = (
+            f"no firing order and no set of shafts that may be built {'keeps' if is_proven else 'was found that keeps'}"
+        )
+        status, names = Status.INFEASIBLE if is_proven else Status.FAILED, [limit.name for limit in problem.limits]
+        return no_star(problem, f"{reason} the limits", status, tuple(names) if is_proven else ())
     zero_level = numerical_zero(problem)
     best = solved[0]
     for design in solved[1:]:
         if design.value < best.value - gap_tolerance_of(best.value, 0.5 * problem.tolerance, zero_level):
             best = design
-    bound = min(design.bound for design in every) if complete else 0.0
+    bound = min(design.bound for design in results) if complete else 0.0
     count = sum(map(len, orders.values()))
-    of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
-    method = f"{len(fired)} of {counted(count, 'firing order')}{of_stars} seen at {counted(len(sets), 'set')} of shafts"
+    stars_text = f" of {len(stars)} stars" if len(stars) > 1 else ""
+    method = f"{len(star_orders)} of {counted(count, 'firing order')}{stars_text}"
+    method += f" seen at {counted(len(sets), 'set')} of shafts"
     if not complete:
-        method += f", {len(every)} of all {whole} drawn and decided"
+        method += f", {len(results)} of all {total} drawn and decided"
     proof = best.result.certificate
-    how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
+    method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
     result, doubt = result_under(best.result, bound, zero_level)
     best = replace(best, result=result)
-    certificate = make_certificate(best.value, bound, zero_level, problem.tolerance, strength, residual, how, doubt)
-    # the first design of every star, its own firing order before the others of the star
+    certificate = make_certificate(
+        best.value, bound, zero_level, problem.tolerance, strength, residual, method_text, doubt
+    )
+    # best design of every star; its firing order comes first in the ranking
     firsts: dict[Candidate, StarDesign] = {}
-    for design in [best, *sorted(solved, key=lambda one: one.value)]:
+    for design in [best, *sorted(solved, key=lambda design: design.value)]:
         firsts.setdefault(replace(design.candidate, firing_order=None, left_out=()), design)
     ranking = []
     for star, design in [*firsts.items()][: phasing.best]:
         entry = ranked_star(phasing, design.candidate, None, design.value, bound, complete)
-        own = next(order for order in orders[star] if order.order == design.candidate.firing_order)
-        rest = tuple(order for order in orders[star] if order != own)
-        ranking.append(replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even))
+        order_entry = next(order for order in orders[star] if order.order == design.candidate.firing_order)
+        remaining_orders = tuple(order for order in orders[star] if order != order_entry)
+        ranking.append(
+            replace(entry, firing_orders=(order_entry, *remaining_orders)[:ORDERS_LISTED], even=order_entry.is_even)
+        )
     details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 

@@ -1,4 +1,4 @@
-"""Ranking of the best stars, and of the firing orders of each (S8, S9, S17)."""
+"""Rank the best stars, and the firing orders of each (S8, S9, S17)."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class RankedOrder:
     order
         Cylinder numbers, cylinder 1 first.
     neighbours
-        Firings in succession on one throw or on throws side by side.
+        Number of successive firings on one throw or on adjacent throws.
     longest_gap
-        Largest crank angle in which one bank does not fire [rad].
+        Largest crank angle between firings of one bank [rad].
     roll_content
-        Largest share of a roll-moment order below the firing order, 0 to 1.
+        Largest relative amplitude of a roll-moment order below the firing order, 0 to 1.
     intervals
-        Crank angles from firing to firing [rad].
+        Firing intervals [rad].
     """
 
     order: tuple[int, ...]
@@ -48,7 +48,7 @@ class RankedOrder:
         return max(self.intervals) - min(self.intervals) <= 1e-9 * math.tau
 
     def score(self, criterion: OrderCriterion) -> float:
-        """Return the value of a criterion; small is good."""
+        """Return the value of a criterion; smaller is better."""
         if criterion is OrderCriterion.NEIGHBOURS:
             return float(self.neighbours)
         exact = self.longest_gap if criterion is OrderCriterion.LONGEST_GAP else self.roll_content
@@ -57,31 +57,31 @@ class RankedOrder:
 
 @dataclass(frozen=True)
 class RankedStar:
-    """Entry of a ranking.
+    """Entry of a ranking of stars.
 
     Attributes
     ----------
     throws
-        Angles [rad] (C3).
+        Throw angles [rad] (C3).
     bank_angle, split_pin
-        [rad]; None where the layout has none.
+        Bank angle and split pin angle [rad]; None if the layout has none.
     shafts
-        Optional shafts that are built.
+        Names of the optional shafts that are built.
     value, lower_bound
-        Objective with everything else at its optimum, and its bound over all designs of this star [SI].
+        Objective with all other decisions at their optimum, and its lower bound over all designs of this star [SI].
     proven
-        Whether no design left out of the ranking before this one is better.
+        True if no design outside the ranking is better.
     forces, couples
-        |F_h| in forces of one throw, and |C_h| in that force times the spacing of the
-        throws, of every order in `orders`.
+        |F_h| relative to the force of one throw, and |C_h| relative to that force times the throw spacing, for every
+        order in `orders`.
     orders
         Orders h.
     firing_orders
-        The best ones first.
+        Best firing orders of the star, best first.
     order_count
-        How many firing orders belong to the star.
+        Number of firing orders of the star.
     even
-        Whether all firing intervals are equal.
+        True if all firing intervals are equal.
     """
 
     throws: tuple[float, ...]
@@ -101,18 +101,18 @@ class RankedStar:
 
 @dataclass(frozen=True)
 class TradePoint:
-    """Point on the trade of objective against unevenness [rad, SI].
+    """Point on the trade-off between objective and uneven firing.
 
     Attributes
     ----------
     allowed, deviation
-        Largest deviation of an interval from even that was allowed, and that is used [rad].
+        Largest deviation of a firing interval from even firing: the limit, and the value of the design [rad].
     value, lower_bound
-        Objective, and its bound over all designs with this freedom [SI].
+        Objective, and its lower bound over all designs within the limit [SI].
     throws
-        Angles [rad].
+        Throw angles [rad].
     kkt_residual
-        Residual of the nonlinear program.
+        KKT residual of the nonlinear program.
     """
 
     allowed: float
@@ -125,24 +125,24 @@ class TradePoint:
 
 @dataclass(frozen=True)
 class PhasingResult:
-    """Stars and firing orders that were decided, and how.
+    """Ranking of stars and firing orders, and the method of the search.
 
     Attributes
     ----------
     ranking
-        Best first; the first one is the design of the result.
+        Best stars, best first; the first is the design of the result.
     places, banks
-        Places of the throws along x [m], and banks of the cylinders [rad], for pictures.
+        Axial positions of the throws [m], and bank angles of the cylinders [rad], for pictures.
     designs
-        Number of stars, times sets of shafts, to choose from.
+        Number of stars times number of sets of shafts.
     looked_at
-        Partial and whole stars that the search looked at, or cone programs solved.
+        Number of partial and complete stars that the search evaluated, or of cone programs.
     method
         Method in words.
     trade
-        Objective against the largest deviation from even firing.
+        Objective as a function of the largest deviation from even firing.
     even_value
-        Objective of the best even star, where the design is uneven [SI].
+        Objective of the best even star if the design fires unevenly [SI], else None.
     """
 
     ranking: tuple[RankedStar, ...]
@@ -158,10 +158,14 @@ class PhasingResult:
 def ranked_orders(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Return firing orders of a star that keep the intervals, best first (S8).
+    """Return the firing orders of a star that keep the limits of firing intervals, best first (S8).
 
     Parameters
     ----------
+    phasing
+        Limits of intervals, criteria, and the firing order if it is fixed.
+    candidate
+        Throws and geometry of the star.
     steps
         Steps of an even star; None for throws at any angle.
     """
@@ -173,43 +177,53 @@ def ranked_orders(
         orders = firing.even_orders(phasing.cycle, layout, steps)
     else:
         orders = firing.lap_orders(phasing.cycle, layout, throws)
-    ranked = []
+    entries = []
     for order in itertools.islice(orders, firing.MOST_ORDERS):
         turns = firing.firing_turns(layout, throws, order)
         intervals = firing.intervals_of(phasing.cycle, turns)
         if phasing.intervals.holds(intervals, 1e-6):
             gap = firing.longest_bank_gap(phasing.cycle, layout, order, turns)
             content = firing.order_content(phasing.cycle, turns)
-            ranked.append(RankedOrder(order, firing.successive_neighbours(layout, order), gap, content, intervals))
-    ranked.sort(key=lambda o: (*(o.score(criterion) for criterion in phasing.criteria), o.order))
-    return tuple(ranked)
+            entries.append(RankedOrder(order, firing.successive_neighbours(layout, order), gap, content, intervals))
+    entries.sort(key=lambda o: (*(o.score(criterion) for criterion in phasing.criteria), o.order))
+    return tuple(entries)
 
 
 def why_no_order(phasing: Phasing, throws: Sequence[float]) -> str:
-    """Return why throws as given [rad] have no firing order; empty where they have one."""
+    """Return the reason if fixed throws [rad] have no firing order, in words; empty if they have one."""
     candidate = Candidate(tuple(throws), phasing.firing_order, *phasing.minimum_geometry)
     if ranked_orders(phasing, candidate):
         return ""
     orders = ranked_orders(replace(phasing, intervals=Intervals(0.0, math.inf)), candidate)
     angles = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
     if not orders:
-        return f"throws [{angles}] deg let cylinders fire at once, and in a firing order each has its turn"
+        return f"throws [{angles}] deg let several cylinders fire at once, so they have no firing order"
     nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
     text = f"throws [{angles}] deg contradict the firing intervals allowed, {phasing.intervals.text}"
     return f"{text}; the most even order of these throws has intervals {interval_range(nearest.intervals)}"
 
 
 def interval_range(intervals: Sequence[float]) -> str:
-    """Return the shortest and longest of some firing intervals [rad], in words."""
+    """Return shortest and longest firing interval in words [deg], from intervals [rad]."""
     return f"from {abs(math.degrees(min(intervals))):.6g} to {math.degrees(max(intervals)):.6g} deg"
 
 
 def distinct_orders(
     problem: Problem, phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Return firing orders of a star that the loads tell apart: one, unless gas is felt and they are uneven (S8).
+    """Return the firing orders of a star that have different loads, best first (S8).
 
-    Each of them twists the crankshaft in a way of its own (V6).
+    All orders are returned if a measure depends on the firing order, such as torsion (V6), or if gas acts and firing
+    is uneven. Otherwise, only the first is returned.
+
+    Parameters
+    ----------
+    problem, phasing
+        The problem and its open phasing.
+    candidate
+        Throws and geometry of the star.
+    steps
+        Steps of an even star; None for throws at any angle.
     """
     orders = ranked_orders(phasing, candidate, steps)
     if problem.depends_on_firing_order:
@@ -218,7 +232,15 @@ def distinct_orders(
 
 
 def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return |F_h| and |C_h| of the orders of a ranking, for one force a throw and unit spacing (S1)."""
+    """Return |F_h| and |C_h| of every order h in `ORDERS`, for unit force per throw and unit throw spacing (S1).
+
+    Parameters
+    ----------
+    places
+        Axial positions of the throws [m].
+    throws
+        Throw angles [rad].
+    """
     x = np.array(places)
     spacing = float(np.abs(np.diff(x)).max()) if len(x) > 1 else 1.0
     weights = np.stack([np.ones_like(x), x / spacing], axis=1)
@@ -229,7 +251,19 @@ def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tupl
 def ranked_star(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
-    """Return one entry of a ranking."""
+    """Build the entry of a star in a ranking.
+
+    Parameters
+    ----------
+    phasing, candidate
+        Open phasing, and throws, geometry and shafts of the star.
+    steps
+        Steps of an even star; None for throws at any angle.
+    value, bound
+        Objective, and its lower bound over all designs of this star [SI].
+    proven
+        True if no design outside the ranking is better.
+    """
     orders = ranked_orders(phasing, candidate, steps)
     forces, couples = free_balance(phasing.layout_of(candidate).throw_positions, candidate.throws)
     return RankedStar(
@@ -239,20 +273,34 @@ def ranked_star(
 
 
 def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int = 1) -> list[Candidate]:
-    """Return the designs of a ranking, each star with the first few of its firing orders."""
+    """Return the candidates of a ranking: each star with its first `orders` firing orders."""
     return [
         Candidate(
-            s.throws, fired.order, s.bank_angle, s.split_pin,
-            tuple(name for names in phasing.shafts.optional for name in names if name not in s.shafts),
+            star.throws, firing.order, star.bank_angle, star.split_pin,
+            tuple(name for names in phasing.shafts.optional for name in names if name not in star.shafts),
         )
-        for s in ranking
-        for fired in s.firing_orders[:orders]
+        for star in ranking
+        for firing in star.firing_orders[:orders]
     ]  # fmt: skip
 
 
 def ranking_result(
     phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
 ) -> PhasingResult:
-    """Return the stars that were decided, the best design first."""
+    """Build the result of a search over stars.
+
+    Parameters
+    ----------
+    phasing, best
+        Open phasing, and candidate of the best design.
+    ranking
+        Entries of the ranking, best first.
+    designs
+        Number of stars times number of sets of shafts.
+    looked_at
+        Number of stars that the search evaluated.
+    method
+        Method in words.
+    """
     layout = phasing.layout_of(best)
     return PhasingResult(tuple(ranking), layout.throw_positions, layout.banks, designs, looked_at, method)

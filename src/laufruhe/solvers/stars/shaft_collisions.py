@@ -1,4 +1,4 @@
-"""Sets of optional shafts that collide where they stand: with the engine, or with each other."""
+"""Exclude sets of optional shafts that collide with the engine or with each other."""
 
 from __future__ import annotations
 
@@ -13,18 +13,21 @@ from laufruhe.solvers.conclusion import broken_limits
 
 
 def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
-    """Exclude sets of optional shafts that break limits on their places.
+    """Exclude sets of optional shafts that violate limits on their positions.
 
     Parameters
     ----------
+    problem
+        Problem with optional shafts.
     limits
-        Limits that nothing open moves, but for the choice of shafts.
+        Limits that depend on the choice of shafts alone.
     initial
         Evaluation with all shafts.
 
     Returns
     -------
-    The problem, and the evaluation with as few shafts as may be: every design breaks the limits that it breaks.
+    The problem without these sets, and the evaluation without optional shafts; every design violates the limits that
+    this evaluation violates.
     """
     placing = tuple(limit for limit in limits if limit.measure.channel.is_placing)
     phasing = problem.phasing
@@ -37,7 +40,7 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
         return replace(initial, engine=replace(initial.engine, rotors=rotors))
 
     clashes: list[tuple[int, ...]] = []
-    # every distance is that of one shaft, or of two
+    # a distance involves one shaft or two
     for count in (1, 2):
         for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
             is_known = any(set(clash) <= set(sets) for clash in clashes)

@@ -1,4 +1,4 @@
-"""Cone program of one star with one set of shafts, and the cut that it gives for all stars (S13, S14)."""
+"""Solve the cone program of one star with one set of shafts, and derive a cut for all stars (S13, S14)."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from laufruhe.solvers.cones.conic import solve_cones
 
 COARSE = 48
 FINER = 4
-"""Times as many angles, where a limit is nearly at its edge."""
+"""Factor of samples to check a limit that is nearly violated."""
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """Design of one star with one set of shafts, everything else at its optimum.
+class SolvedStar:
+    """Design of one star with one set of shafts, and unbalances at their optimum.
 
     Attributes
     ----------
     star
         Steps of the throws.
     built
-        Numbers of the sets of optional shafts that are built.
+        Indices of the sets of optional shafts that are built.
     value, bound
-        Objective of the design, and its bound over all designs of this star [SI].
+        Objective of the design, and its lower bound over all designs of this star [SI].
     """
 
     star: tuple[int, ...]
@@ -42,7 +42,7 @@ class Solved:
 
 
 def shaft_owners(model: StarModel) -> tuple[int, ...]:
-    """Return the set of optional shafts that every decision belongs to, -1 for none."""
+    """Return for every decision the index of its set of optional shafts, -1 for none."""
     shaft_of = {rotor.name: rotor.shaft.name for rotor in model.problem.engine.rotors}
     sets = model.phasing.shafts.optional
     shafts = [shaft_of[decision.rotor_drives[0].rotor] for decision in model.problem.unbalances]
@@ -56,42 +56,51 @@ def solve_design(
     owners: Sequence[int],
     tolerance: float,
     zero_level: float = 0.0,
-) -> tuple[Solved | None, Cut | None]:
-    """Find the optimum of one star with one set of shafts, and its bound of all others.
+) -> tuple[SolvedStar | None, Cut | None]:
+    """Find the optimum of one star with one set of shafts, and a cut that bounds all other stars.
 
     Parameters
     ----------
+    model
+        Rows of every star.
+    star
+        Steps of the throws.
     built
-        Numbers of the sets of optional shafts that are built.
+        Indices of the sets of optional shafts that are built.
     owners
-        Set of optional shafts that every decision belongs to, -1 for none.
+        Index of the set of optional shafts of every decision, -1 for none.
+    tolerance
+        Relative gap that counts as closed.
+    zero_level
+        Objective that counts as zero [SI].
 
     Returns
     -------
-    No design where none of this star keeps the limits, with a cut that shows it of others too (S45), if any does.
+    Design and cut. The design is None if this star has none; the cut then excludes other stars too (S45). The cut is
+    None if nothing is proven about other stars.
     """
     full, proves = model.samples, model.problem.search.proves
-    # what bounds averaged means bounds the whole cycle (P7)
-    fine, sound = model.at(full), model.at(full, averaged=True)
-    fine_rows, averaged = (_with_shafts(rows.at(star), owners, built) for rows in (fine, sound))
+    # a lower bound of sample averages is a lower bound of the means (P7)
+    fine, relaxed = model.at(full), model.at(full, averaged=True)
+    fine_rows, averaged = (_with_shafts(rows.at(star), owners, built) for rows in (fine, relaxed))
     fixed = [not norm.slope.any() for _, norm in fine_rows.limits]
-    if _breaks_fixed_limit(model, star, fine_rows, fixed):
+    if _violates_fixed_limit(model, star, fine_rows, fixed):
         return None, None
     if not fine_rows.size:
-        # nothing to decide: the star's rows are its proof
-        every = sound.at(star)
-        zero = np.zeros(every.size)
-        terms = tuple(norm.subgradient(zero) for _, norm in every.terms)
-        limits = tuple(np.zeros_like(norm.constant) for _, norm in every.limits)
+        # without decisions, the rows of the star prove its value
+        star_rows = relaxed.at(star)
+        zero = np.zeros(star_rows.size)
+        terms = tuple(norm.subgradient(zero) for _, norm in star_rows.terms)
+        limits = tuple(np.zeros_like(norm.constant) for _, norm in star_rows.limits)
         value = fine_rows.objective(np.zeros(0))
-        return Solved(star, built, value, every.objective(zero)), cut_of(sound, Multipliers(terms, limits))
-    best: tuple[Solved, Bound, Array] | None = None
+        return SolvedStar(star, built, value, star_rows.objective(zero)), cut_of(relaxed, Multipliers(terms, limits))
+    best: tuple[SolvedStar, Bound, Array] | None = None
     for samples in _sample_counts(full):
         solution = solve_cones(_without_fixed_limits(_with_shafts(model.at(samples).at(star), owners, built), fixed))
         if solution.x is None:
-            # a mean at a few angles may be more than over the cycle, averages never are (P7)
-            rough = model.at(samples, averaged=True)
-            wide = replace(rough, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in rough.limits))
+            # at few samples, a mean may exceed its value over the cycle; sample averages never do (P7)
+            averages = model.at(samples, averaged=True)
+            wide = replace(averages, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in averages.limits))
             cut = _limit_cut(wide, solution.multipliers, fixed)
             if cut.excludes(np.array([star]), [built], owners).all():
                 return None, cut
@@ -105,22 +114,34 @@ def solve_design(
             fine_rows.objective(solution.x),
             _without_fixed_limits(fine_rows, fixed).violation(solution.x),
         )
-        best = (Solved(star, built, value, bound.value), bound, solution.x)
-        # what averages fall short by, no grid of this fidelity gains; a design alone is as good at few angles
+        best = (SolvedStar(star, built, value, bound.value), bound, solution.x)
+        # more samples cannot close the gap between averages and means; without a proof, few samples suffice
         is_close = gap_of(averaged.objective(solution.x), bound.value, zero_level) <= 0.25 * tolerance or not proves
         if is_close and violation <= FEASIBLE:
             break
     if best is None:
         return None, None
     design, bound, x = best
-    cut = cut_of(sound, _with_fixed_multipliers(bound.multipliers, sound, fixed))
-    bound_here = float(cut.bounds(np.array([star]), [built], owners)[0, 0])
-    check_dual("cuts of stars, at their own star", bound_here, _without_fixed_limits(averaged, fixed), x, bound)
+    cut = cut_of(relaxed, _with_fixed_multipliers(bound.multipliers, relaxed, fixed))
+    cut_bound = float(cut.bounds(np.array([star]), [built], owners)[0, 0])
+    check_dual("cuts of stars, at their own star", cut_bound, _without_fixed_limits(averaged, fixed), x, bound)
     return design, cut
 
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
-    """Return the least objective of one star with one set of shafts at few angles, infinite where it breaks limits."""
+    """Return the optimal objective of one star with one set of shafts at few samples [SI]; infinite if infeasible.
+
+    Parameters
+    ----------
+    model
+        Rows of every star.
+    star
+        Steps of the throws.
+    built
+        Indices of the sets of optional shafts that are built.
+    owners
+        Index of the set of optional shafts of every decision, -1 for none.
+    """
     affine = _with_shafts(model.at(_sample_counts(model.samples)[0]).at(star), owners, built)
     if not affine.size:
         return affine.objective(np.zeros(0))
@@ -128,21 +149,21 @@ def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]
     return math.inf if x is None else affine.objective(x)
 
 
-def _breaks_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineProblem, fixed: Sequence[bool]) -> bool:
-    # a limit without open decisions; its mean is checked again at more angles
+def _violates_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineProblem, fixed: Sequence[bool]) -> bool:
+    # limits that no decision changes; check their means again at more samples
     x = np.zeros(affine.size)
-    over = [
+    violated = [
         k for k, (maximum, norm) in enumerate(affine.limits) if fixed[k] and norm.value(x) > maximum * (1.0 + FEASIBLE)
     ]
-    if not over:
+    if not violated:
         return False
     finer = model.at(FINER * model.samples, averaged=True).at(star).limits
     return any(norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + KEPT) for maximum, norm in
-               (finer[k] for k in over))  # fmt: skip
+               (finer[k] for k in violated))  # fmt: skip
 
 
 def _limit_cut(wide: StarProblem, multipliers: Multipliers, fixed: Sequence[bool]) -> Cut:
-    # multipliers of the limits alone may show that stars cannot keep them (S45)
+    # multipliers of the limits may prove that stars violate them (S45)
     zero = tuple(np.zeros_like(norm.constant) for _, norm in wide.terms)
     return cut_of(wide, Multipliers(zero, _with_fixed_multipliers(multipliers, wide, fixed).limits))
 
@@ -150,40 +171,44 @@ def _limit_cut(wide: StarProblem, multipliers: Multipliers, fixed: Sequence[bool
 def _without_fixed_limits(affine: AffineProblem, fixed: Sequence[bool]) -> AffineProblem:
     if not any(fixed):
         return affine
-    return replace(affine, limits=tuple(limit for limit, out in zip(affine.limits, fixed, strict=True) if not out))
+    return replace(
+        affine, limits=tuple(limit for limit, is_fixed in zip(affine.limits, fixed, strict=True) if not is_fixed)
+    )
 
 
 def _with_fixed_multipliers(multipliers: Multipliers, problem: StarProblem, fixed: Sequence[bool]) -> Multipliers:
     rows = iter(multipliers.limits)
     limits = tuple(
-        np.zeros_like(norm.constant) if out else next(rows)
-        for (_, norm), out in zip(problem.limits, fixed, strict=True)
+        np.zeros_like(norm.constant) if is_fixed else next(rows)
+        for (_, norm), is_fixed in zip(problem.limits, fixed, strict=True)
     )
     return replace(multipliers, limits=limits)
 
 
 def _sample_counts(full: int) -> list[int]:
     divisors = [n for n in range(1, full + 1) if full % n == 0 and n >= min(COARSE, full)]
-    chosen = [divisors[0]]
+    counts = [divisors[0]]
     for n in divisors:
-        if n >= 3 * chosen[-1] and n % chosen[-1] == 0:
-            chosen.append(n)
-    return chosen
+        if n >= 3 * counts[-1] and n % counts[-1] == 0:
+            counts.append(n)
+    return counts
 
 
 def _with_shafts(affine: AffineProblem, owners: Sequence[int], built: tuple[int, ...]) -> AffineProblem:
-    """Leave out the decisions of shafts that are not built."""
-    used = [owner < 0 or owner in built for owner in owners]
-    if all(used):
+    """Remove the decisions of shafts that are not built."""
+    is_built = [owner < 0 or owner in built for owner in owners]
+    if all(is_built):
         return affine
-    columns = np.concatenate([np.full(d.width, keep) for d, keep in zip(affine.domains, used, strict=True)])
+    columns = np.concatenate(
+        [np.full(d.width, has_shaft) for d, has_shaft in zip(affine.domains, is_built, strict=True)]
+    )
     terms, limits = (
         tuple((number, replace(norm, slope=norm.slope[..., columns])) for number, norm in pairs)
         for pairs in (affine.terms, affine.limits)
     )
     domains, start = [], 0
-    for domain, keep in zip(affine.domains, used, strict=True):
-        if keep:
+    for domain, has_shaft in zip(affine.domains, is_built, strict=True):
+        if has_shaft:
             domains.append(replace(domain, start=start))
             start += domain.width
     return AffineProblem(terms, limits, tuple(domains), affine.samples)

@@ -1,4 +1,4 @@
-"""Designs with one star each, and the result of the best star as that of the search."""
+"""Designs of single stars, and conversion of the best star's result into the result of the search."""
 
 from __future__ import annotations
 
@@ -20,18 +20,20 @@ from laufruhe.solvers.values import DecisionValue, ObjectiveValue
 
 @dataclass(frozen=True, eq=False)
 class StarDesign:
-    """A star and firing order, everything else decided.
+    """A star and firing order, with the result of its problem.
 
     Attributes
     ----------
+    candidate
+        Throws, firing order, geometry and shafts.
     result
         Result of the problem with this star.
     steps
-        Steps of the throws where it fires evenly.
+        Steps of the throws if it fires evenly, else None.
     kkt_residual
-        Residual of the program that moved its throws.
+        KKT residual of the program that moved its throws.
     moved
-        Whether the throws left the star that they were started from.
+        True if the throws moved from those of the start.
     """
 
     candidate: Candidate
@@ -41,13 +43,13 @@ class StarDesign:
     moved: bool = False
 
     @cached_property
-    def is_met(self) -> bool:
-        """True if it is a design within its limits."""
+    def is_feasible(self) -> bool:
+        """True if the star has a design that keeps its limits."""
         return self.result.status.has_design and self.result.final.violation(self.result.problem.limits) <= KEPT
 
     @property
-    def is_excluded(self) -> bool:
-        """True if no design of this star keeps the limits: a mean at few angles may be more than it is (P7)."""
+    def is_infeasible(self) -> bool:
+        """True if no design of this star keeps the limits, with fine sampling (P7)."""
         result = self.result
         if not result.status.has_design:
             return result.status is Status.INFEASIBLE
@@ -55,8 +57,8 @@ class StarDesign:
 
     @property
     def value(self) -> float:
-        """Objective by the exact model [SI]; infinite where there is none."""
-        return math.inf if self.result.objective is None or not self.is_met else self.result.objective.value
+        """Objective by the exact model [SI]; infinite without a feasible design."""
+        return math.inf if self.result.objective is None or not self.is_feasible else self.result.objective.value
 
     @property
     def bound(self) -> float:
@@ -65,7 +67,7 @@ class StarDesign:
 
 
 def solve_fixed(problem: Problem) -> Result:
-    """Solve a problem with nothing of its phasing open, its unbalances at their optimum."""
+    """Solve a problem with fixed phasing for its unbalances, or evaluate it if it has no decisions."""
     return solve_unbalances(problem) if problem.decisions else state(problem)
 
 
@@ -73,21 +75,25 @@ def with_star(
     problem: Problem, phasing: Phasing, best: Result, candidate: Candidate, certificate: Certificate | None,
     details: PhasingResult,
 ) -> Result:  # fmt: skip
-    """Turn the best star's result into the result of the search.
+    """Convert the result of the best star into the result of the search.
 
     Parameters
     ----------
-    problem
-        The problem with its phasing open.
-    best
-        Result of the star, nothing of the phasing open.
+    problem, phasing
+        The problem with open phasing, and its phasing.
+    best, candidate
+        Result of the best star, and its throws, firing order, geometry and shafts.
+    certificate
+        Certificate of the search; None without a design.
+    details
+        Ranking of the search.
     """
-    given = evaluate(problem)
+    baseline = evaluate(problem)
     is_proven = certificate is not None and certificate.kind is Proof.GLOBAL
     status = best.status
     if status.has_design:
         status = Status.OPTIMAL if is_proven else Status.FEASIBLE
-    initial = replace(given, samples=best.final.samples)
+    initial = replace(baseline, samples=best.final.samples)
     value = best.objective.value if best.objective else objective_value(problem, best.final)
     return replace(
         best,
@@ -102,38 +108,60 @@ def with_star(
 
 
 def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) -> tuple[DecisionValue, ...]:
-    """Return throws, banks and shafts as entries of the result."""
+    """Return throws, bank angle, split pin and shafts as decisions of the result.
+
+    Parameters
+    ----------
+    problem, phasing
+        The problem with open phasing, and its phasing.
+    candidate
+        Throws, geometry and shafts of the design.
+    """
     parts, layout = problem.engine.slider_cranks, phasing.layout_of(candidate)
-    out = []
+    decisions = []
     if phasing.throws is None:
         firsts = [layout.pins.index(pin) for pin in set(layout.pins)]
-        before = [parts[first].throw - layout.pin_offsets[first] for first in firsts]
-        for k, (angle, was) in enumerate(zip(candidate.throws, before, strict=True)):
+        start_angles = [parts[first].throw - layout.pin_offsets[first] for first in firsts]
+        for k, (angle, start) in enumerate(zip(candidate.throws, start_angles, strict=True)):
             low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
-            out.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, was % math.tau, False))
-    # angles as the engine has them
+            decisions.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, start % math.tau, False))
+    # bank and split pin angle of the baseline engine
     bank = split = 0.0
     for left, right in itertools.permutations(range(len(layout.sides)), 2):
         if layout.side(left) > layout.side(right):
             bank = (parts[left].bank - parts[right].bank) % math.tau
             if layout.pins[left] == layout.pins[right]:
                 split = math.remainder(parts[right].throw - parts[left].throw, math.tau)
-    for name, bounds, value, given in (
+    for name, bounds, value, initial in (
         ("bank angle", phasing.bank, candidate.bank_angle, bank),
         ("split pin angle", phasing.split, candidate.split_pin, split),
     ):
         if bounds is not None and value is not None and bounds[0] < bounds[1]:
             at_bound = min(value - bounds[0], bounds[1] - value) <= 1e-9
-            out.append(DecisionValue(name, value, "rad", *bounds, given, at_bound))
-    out += [
+            decisions.append(DecisionValue(name, value, "rad", *bounds, initial, at_bound))
+    decisions += [
         DecisionValue(f"{name} built", float(name not in candidate.left_out), "", 0.0, 1.0, 1.0, False)
         for names in phasing.shafts.optional
         for name in names
     ]
-    return tuple(out)
+    return tuple(decisions)
 
 
-def no_star(problem: Problem, why: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()) -> Result:
-    """Return the result without any star, and why there is none."""
-    given = evaluate(problem)
-    return Result(problem=problem, status=status, initial=given, final=given, message=why, conflict=conflict)
+def no_star(
+    problem: Problem, reason: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()
+) -> Result:
+    """Return a result without a design.
+
+    Parameters
+    ----------
+    problem
+        The problem with open phasing.
+    reason
+        Reason in words.
+    status
+        Infeasible if that is proven, else failed.
+    conflict
+        Names of the limits that contradict each other.
+    """
+    baseline = evaluate(problem)
+    return Result(problem=problem, status=status, initial=baseline, final=baseline, message=reason, conflict=conflict)

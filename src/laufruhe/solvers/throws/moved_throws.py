@@ -1,6 +1,6 @@
-"""Throws that leave the even steps as numbers of a problem: the engine is put together anew for each crank.
+"""Solve for throws that leave the even steps, as numbers of a problem; every crank needs a new engine.
 
-A local program (`solvers.general`) then decides throws together with whatever else is open.
+A local search (`solvers.general`) optimises throws together with all other decisions.
 """
 
 from __future__ import annotations
@@ -20,22 +20,30 @@ from laufruhe.solvers.conclusion import quoted
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import no_star, with_star
-from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, why_none_fires
+from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
 MOST_STARTS, MOST_SEARCHES = 4, 4
-"""Cranks that throws leave, and starts of the search for each."""
+"""Largest number of start cranks, and number of starts of the search from each."""
 CRANK, BANK, SPLIT = "crank", "bank angle", "split pin angle"
 
 
 @dataclass(frozen=True)
 class _MovedCrank:
-    """Drawing of a crank whose throws, bank angle and split pins are moved."""
+    """Function from angles of a crank to the drawing of its engine.
+
+    Attributes
+    ----------
+    phasing
+        Open phasing.
+    candidate
+        Crank with its start angles.
+    """
 
     phasing: Phasing
     candidate: Candidate
 
     def at(self, changes: Mapping[Path, str | float]) -> Candidate:
-        """Return the crank with these angles."""
+        """Return the crank with changed angles [rad]."""
         crank = self.candidate
         bank, split = (
             None if angle is None else float(changes.get((CRANK, name), angle))
@@ -45,26 +53,28 @@ class _MovedCrank:
         return replace(crank, throws=throws, bank_angle=bank, split_pin=split)
 
     def __call__(self, changes: Mapping[Path, str | float]) -> Drawing:
-        """Return the drawing, or raise `ModelError` if the crank does not keep the firing intervals allowed."""
+        """Return the drawing with changed values; raise `ModelError` if the crank violates the firing intervals."""
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
             raise ModelError(f"these throws do not fire {self.phasing.intervals.text} apart")
         realised = self.phasing.realise(candidate)
-        others = {path: value for path, value in changes.items() if path[0] != CRANK}
-        if others:
-            return realised.rebuild(others)
+        other_changes = {path: value for path, value in changes.items() if path[0] != CRANK}
+        if other_changes:
+            return realised.rebuild(other_changes)
         return Drawing(realised.engine, realised.points, realised.decisions, realised.mount_numbers)
 
 
 def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Problem], Result]) -> Result:
-    """Return the best of the local optima that a few cranks lead to, everything that is open moved together.
+    """Return the best local optimum from several start cranks, over throws and all other decisions together.
 
     Parameters
     ----------
+    problem, phasing
+        The problem and its open phasing.
     search
-        A local search over numbers.
+        Local search over the numbers of a problem.
     """
-    starts = starts_of(phasing, None, problem.depends_on_gas)[:MOST_STARTS]
+    starts = start_candidates(phasing, None, problem.depends_on_gas)[:MOST_STARTS]
     if not starts:
         return no_star(problem, why_none_fires(phasing)[0])
     results: list[tuple[Candidate, Result]] = []
@@ -79,31 +89,31 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
         values = {entry.name: entry.value for entry in result.decisions}
         changes = {drive.path: values[d.name] for d in angles for drive in d.address_drives if d.name in values}
         names = {decision.name for decision in angles}
-        others = tuple(decision for decision in result.problem.decisions if decision.name not in names)
+        remaining = tuple(decision for decision in result.problem.decisions if decision.name not in names)
         result = replace(
             result,
             decisions=tuple(entry for entry in result.decisions if entry.name not in names),
-            problem=replace(result.problem, decisions=others, rebuild=realised.rebuild),
+            problem=replace(result.problem, decisions=remaining, rebuild=realised.rebuild),
         )
         results.append((crank.at(changes), result))
-    allowed = [
+    feasible = [
         (objective.value, certificate, candidate, result)
         for candidate, result in results
         if result.status.has_design and (objective := result.objective) and (certificate := result.certificate)
     ]
-    if not allowed:
+    if not feasible:
         limits = quoted(limit.name for limit in problem.limits) or "the firing intervals"
-        return no_star(problem, f"no crank was found that keeps {limits}, and none is excluded", Status.FAILED)
-    value, proof, candidate, best = min(allowed, key=lambda one: one[0])
+        return no_star(problem, f"no crank was found that keeps {limits}, but none is excluded", Status.FAILED)
+    value, proof, candidate, best = min(feasible, key=lambda design: design[0])
     method = f"{proof.method}; throws moved from {counted(len(results), 'crank')}"
-    ordered = replace(phasing, firing_order=candidate.firing_order)
-    ranking = [ranked_star(ordered, candidate, None, value, 0.0, False)]
-    details = ranking_result(phasing, candidate, ranking, len(results), len(allowed), method)
+    phasing_of_order = replace(phasing, firing_order=candidate.firing_order)
+    ranking = [ranked_star(phasing_of_order, candidate, None, value, 0.0, False)]
+    details = ranking_result(phasing, candidate, ranking, len(results), len(feasible), method)
     return with_star(problem, phasing, best, candidate, replace(proof, method=method), details)
 
 
 def _angle_decisions(phasing: Phasing, start: Candidate) -> Iterator[Decision]:
-    """Yield throws, bank angle and split pins of a crank as numbers, where they may move."""
+    """Yield throws, bank angle and split pin of a crank as decisions, if they are open."""
     even, allowed = phasing.even_interval, phasing.intervals
     freedom = min(max(even - allowed.minimum, allowed.maximum - even), math.pi)
     angles: list[tuple[str, Path, float, float, float]] = []
@@ -111,7 +121,7 @@ def _angle_decisions(phasing: Phasing, start: Candidate) -> Iterator[Decision]:
         if phasing.throw_bounds is not None:
             low, high = phasing.throw_bounds[k]
         else:
-            # the first throw stays: a crank turned as a whole is the same crank
+            # fix the first throw, because rotating the whole crank changes nothing
             low, high = (angle, angle) if k == 0 else (angle - freedom, angle + freedom)
         angles.append((f"throw {k + 1}", (CRANK, k), low, high, angle))
     for name, bounds, value in ((BANK, phasing.bank, start.bank_angle), (SPLIT, phasing.split, start.split_pin)):

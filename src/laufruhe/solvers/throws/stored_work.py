@@ -1,7 +1,7 @@
-"""Degree of irregularity beside throws that leave the even steps, by the work stored at even speed (S39, T11).
+"""Replace the degree of irregularity by the work stored at constant speed, for open throws (S39, T11).
 
-Work adds up over the cylinders as all loads do, so the smooth program and boxes know it. One problem with work in
-place of the degree proposes designs, another bounds them. The exact model finds the degree itself.
+Work is a sum over the cylinders like all loads, so the smooth program and the boxes of throws can model it. One
+replacement serves local searches, another one lower bounds. The exact model computes the degree itself.
 """
 
 from __future__ import annotations
@@ -20,19 +20,27 @@ from laufruhe.prove.throws.irregularity_bound import StoredWorkBound
 
 
 def with_problem(phasing: Phasing, change: Callable[[Problem], Problem]) -> Phasing:
-    """Return the phasing with another problem for every crank."""
+    """Return the phasing with a changed problem for every crank.
+
+    Parameters
+    ----------
+    phasing
+        Open phasing.
+    change
+        Function from the problem of a crank to the changed problem.
+    """
     return replace(phasing, realise=lambda candidate: change(phasing.realise(candidate)))
 
 
-def proposing(problem: Problem) -> Problem:
-    """Put work in place of the degree of irregularity, worth what it is worth in the design as given."""
+def with_work_for_search(problem: Problem) -> Problem:
+    """Replace the degree of irregularity by work, with weights that keep its value in the baseline design."""
     if not _has_degree(problem):
         return problem
     initial, bounds = evaluate(problem), _bounds(problem)
 
     def degree(measure: Measure, name: str) -> float:
         value = initial.value(replace(measure, points=(name,)))
-        # a crank that would stop has the degree of its work
+        # if the crank would stop, use the degree that its work implies
         return value if math.isfinite(value) else bounds[name].degree(_stored(initial, name))
 
     def slope(measure: Measure, name: str) -> float:
@@ -41,30 +49,36 @@ def proposing(problem: Problem) -> Problem:
     return _exchange(problem, degree, slope, lambda m, name, maximum: maximum / (slope(m, name) or 1.0))
 
 
-def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
-    """Return how to put work in place of the degree so that no design better than a value is worth more.
+def work_for_bounds(problem: Problem, value: float) -> Callable[[Problem], Problem]:
+    """Return a function that replaces the degree of irregularity by work and never raises the objective.
 
-    Work is worth a straight line under the degree that it leaves at least (T11), up to the work that a design
-    which is better than the value may store.
+    The replacement is linear in the work. It is a lower bound of the degree (T11) for all designs better than `value`.
+
+    Parameters
+    ----------
+    problem
+        Problem with open throws.
+    value
+        Objective of the best design [SI]; infinite if there is none.
     """
     if not _has_degree(problem):
         return lambda problem: problem
     bounds, initial = _bounds(problem), evaluate(problem)
-    # the degree has all orders of the pistons
+    # the bound of the degree needs all orders of the pistons
     is_exact = problem.fidelity.kinematics == "exact" and problem.fidelity.orders is None
-    alone = [
+    cylinder_evaluations = [
         evaluate(problem, replace(problem.engine, slider_cranks=(part,), rotors=()))
         for part in problem.engine.slider_cranks
     ]
     slopes: dict[tuple[Measure, str], float] = {}
     for term in problem.objective:
         for name in _points(problem, term.measure) if term.measure.channel.depends_on_torque else ():
-            maximum = sum(_stored(one, name) for one in alone)
+            maximum = sum(_stored(evaluation, name) for evaluation in cylinder_evaluations)
             if value < math.inf and term.weight > 0.0:
                 maximum = min(maximum, bounds[name].work(value / term.weight))
             slopes[term.measure, name] = bounds[name].degree(maximum) / maximum if maximum > 0.0 and is_exact else 0.0
-    return lambda other: _exchange(
-        other,
+    return lambda crank_problem: _exchange(
+        crank_problem,
         lambda measure, name: slopes[measure, name] * _stored(initial, name),
         lambda measure, name: slopes[measure, name],
         lambda _, name, maximum: bounds[name].work(maximum),
@@ -77,16 +91,18 @@ def _exchange(
     slope: Callable[[Measure, str], float],
     maximum: Callable[[Measure, str, float], float],
 ) -> Problem:
-    """Put work in place of every degree: of a term a share of the work at one point, of a limit the work at each.
+    """Replace every degree by work: in the objective at one operating point, in limits at every point.
 
     Parameters
     ----------
+    problem
+        The problem.
     size
-        Size of a measure at an operating point: that of the largest stands for the term.
+        Size of a measure at an operating point; the point with the largest size represents the term.
     slope
-        Degree that counts as one joule of work at a point.
+        Degree of irregularity per work at a point [1/J].
     maximum
-        Work at a point that a limit on a degree allows.
+        Largest work at a point for a limit on the degree [J].
     """
     terms: list[Term] = []
     limits: list[Limit] = []

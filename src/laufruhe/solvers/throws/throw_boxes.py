@@ -1,8 +1,8 @@
-"""Boxes of throw angles, each bounded by a cone program over what its arcs may load (S26-S28).
+"""Bound boxes of throw angles by cone programs (S26-S28).
 
-In a box every throw's waves e^{i h theta} are a mixture of those at a few of its angles: a second-order cone program.
-Its dual rows leave for every throw one function of its angle. The least value of that over the box bounds the box, and
-cuts off the angles that cannot be better than the best design.
+In a box, the waves e^{i h theta} of every throw are a mixture of those at a few angles, in a second-order cone program.
+With its dual rows, the bound is a sum of one function of the angle per throw. The minimum of this sum over the box is
+a lower bound. The functions also cut off angles that cannot be better than the best design.
 """
 
 from __future__ import annotations
@@ -29,54 +29,64 @@ from laufruhe.prove.throws.arcs import ArcBox, Arcs
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.throws.riding_weights import BoxColumns, Riders
 
-# rounds in which one box shrinks, and the share of its sides that has to be left for another
-_ROUNDS, _WORTH = 6, 0.8
-# a side that is cut no more [rad]
+# rounds in which a box shrinks, and the share of its sides from which another round does not pay
+_ROUNDS, _SHRINKAGE = 6, 0.8
+# width of a side that is not divided any more [rad]
 NARROWEST = 1e-9
-# multipliers that are tried on other boxes
-_KNOWN = 8
-# angles of an arc that a program mixes, by the number of shared angles: at least, at most of shared ones and of throws;
-# and how far two of them may be apart for the highest order that counts [rad]
+# number of multipliers to try on other boxes
+_MOST_PROOFS = 8
+# number of angles of an arc in a mixture: smallest; largest for shared angles and for throws, by the number of shared
+# angles; and the largest phase between two angles in the highest order that counts [rad]
 _FEWEST, _MOST_SHARED, _MOST, _APART = 3, (1, 5, 3), (12, 6, 5), 0.6
-# share of the heaviest order under which one counts for nothing in how many angles an arc needs
-_FAINT = 0.02
+# relative size of an order that does not count for the number of angles of an arc
+_NEGLIGIBLE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class ThrowProgram:
-    """Norms of one firing window, rows affine in unbalances, waves of the throws, and the throws.
+    """Norms of one firing window, with rows affine in unbalances, waves of the throws, and throws.
 
     Attributes
     ----------
+    window
+        The firing window.
     rows
-        Columns: those of unbalances, then of every throw the cosines and sines of all waves and theta, then the shared
-        angles.
-    heavy
-        The same without the columns of negligible orders, for the program that proposes multipliers.
+        Norms with all columns: unbalances; for every throw the cosines and sines of all waves, then theta; and the
+        shared angles.
+    reduced
+        Norms without the columns of negligible orders, for the program that proposes multipliers.
     names
         Names of the limits; empty for the firing intervals.
-    weights, pulls
-        Sizes of every throw's orders in objective and limits, shape (throws, orders), and of the columns of unbalances.
+    order_sizes
+        Size of every throw's orders in objective and limits, shape (throws, orders).
+    unbalance_sizes
+        Size of the columns of unbalances in objective and limits, shape (columns,).
     """
 
     window: FiringWindow
     rows: AffineProblem
-    heavy: AffineProblem
+    reduced: AffineProblem
     names: tuple[str, ...]
-    weights: Array
-    pulls: Array
+    order_sizes: Array
+    unbalance_sizes: Array
 
 
 @dataclass(frozen=True, eq=False)
 class ThrowBox:
-    """Throws and shared angles between bounds, and the lower bound of the objective there.
+    """Box of throws and shared angles, with a lower bound of the objective.
 
     Attributes
     ----------
+    program
+        Norms of the firing window.
+    lower, upper
+        Bounds of throws, then of shared angles [rad].
+    bound
+        Lower bound of the objective in the box [SI].
     middle
-        Angles at which the program puts the throws [rad].
+        Mean angles of the mixtures [rad].
     spread
-        Distance of the mixture of every throw from standing at one angle, as it weighs.
+        Distance of every mixture from the waves at its mean angle, weighted by the sizes of the orders.
     """
 
     program: ThrowProgram
@@ -88,7 +98,7 @@ class ThrowBox:
 
     @property
     def is_exact(self) -> bool:
-        """True if there is nothing left to cut."""
+        """True if every side is too narrow to divide."""
         return bool(np.all(self.upper - self.lower <= NARROWEST))
 
 
@@ -100,38 +110,38 @@ class ThrowPrograms:
     waves
         Waves of the loads.
     riders
-        Open unbalances on the throws.
+        Open unbalances, with those on the throws.
     firing
-        Bounds that firing has to keep.
+        Bounds of firing intervals, throws and open angles.
     samples
-        Steps over the period for norms that are no sums of squares.
+        Samples over the period for norms that are no sums of squares.
 
     Attributes
     ----------
     conflict
-        Limits that boxes without a design cannot keep.
+        Names of limits that boxes without a design violate.
     """
 
     def __init__(self, waves: ThrowWaves, riders: Riders, firing: FiringBounds, samples: int) -> None:
         self.waves, self._riders, self._firing = waves, riders, firing
         problem = waves.problem
         self._terms = [
-            (t.weight, compressed(waves.norm(t.measure, waves.samples(t.measure, samples)))) for t in problem.objective
+            (t.weight, compress(waves.norm(t.measure, waves.samples(t.measure, samples)))) for t in problem.objective
         ]
         self._limits = [
-            (x, compressed(waves.norm(x.measure, waves.samples(x.measure, samples))))
+            (x, compress(waves.norm(x.measure, waves.samples(x.measure, samples))))
             for x in problem.limits
             if math.isfinite(x.maximum)
         ]
-        every = [norm for _, norm in (*self._terms, *self._limits)]
-        count = 2 * sum(norm.waves[0].size * waves.throws for norm in every)
+        norms = [norm for _, norm in (*self._terms, *self._limits)]
+        count = 2 * sum(norm.waves[0].size * waves.throws for norm in norms)
         if count > MOST_NUMBERS:
             raise ModelError(f"{1e-6 * count:.0f} million numbers at once")
-        if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in every):
+        if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in norms):
             raise ModelError("a load on an undamped resonance has no finite response")
-        # how many orders are followed along an arc: of the rest, which is next to nothing, the size counts
+        # orders with a function of the angle; for higher orders, which are negligible, only their size counts
         sizes = np.zeros(len(waves.orders))
-        for norm in every:
+        for norm in norms:
             by_order = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
             sizes += by_order / (float(by_order.max()) or 1.0)
         self._followed = int(np.flatnonzero(sizes > waves.followed * sizes.max()).max(initial=0)) + 1
@@ -140,12 +150,12 @@ class ThrowPrograms:
         self.conflict: set[str] = set()
 
     @property
-    def left_out(self) -> float:
-        """Share of the objective that the orders left out may have [SI]."""
+    def truncation(self) -> float:
+        """Largest part of the objective that the truncated orders may have [SI]."""
         return sum(weight * norm.left_out for weight, norm in self._terms)
 
     def program(self, window: FiringWindow) -> ThrowProgram:
-        """Return the program of one order of firing."""
+        """Return the norms of a firing window."""
         if window.laps not in self._by_laps:
             self._by_laps[window.laps] = self._with_laps(window)
         program = self._by_laps[window.laps]
@@ -153,27 +163,29 @@ class ThrowPrograms:
             return replace(program, window=window)
         intervals = self._intervals(window)
         rows = replace(program.rows, limits=(*program.rows.limits, (1.0, intervals)))
-        heavy = replace(program.heavy, limits=(*program.heavy.limits, (1.0, self._without_faint_orders(intervals))))
-        return replace(program, window=window, rows=rows, heavy=heavy, names=(*program.names, ""))
+        reduced_limits = replace(
+            program.reduced, limits=(*program.reduced.limits, (1.0, self._without_faint_orders(intervals)))
+        )
+        return replace(program, window=window, rows=rows, reduced=reduced_limits, names=(*program.names, ""))
 
     def _with_laps(self, window: FiringWindow) -> ThrowProgram:
-        """Return the program of all orders of firing with the same whole turns, without limits on intervals."""
+        """Return the norms of all firing orders with the same whole turns (laps), without limits on intervals."""
         terms = tuple((weight, self._rows(norm, window.laps)) for weight, norm in self._terms)
         limits = tuple((limit.maximum + norm.left_out, self._rows(norm, window.laps)) for limit, norm in self._limits)
         count = len(self.waves.orders)
-        weights, pulls = np.zeros((self.waves.throws, count)), np.zeros(self._riders.size)
+        order_sizes, unbalance_sizes = np.zeros((self.waves.throws, count)), np.zeros(self._riders.size)
         for _, norm in (*terms, *limits):
             size = np.linalg.norm(norm.slope.reshape(norm.constant.size, -1), axis=0)
             by_order = self._columns_by_throw(size)
             by_order = np.hypot(by_order[:, :count], by_order[:, count : 2 * count])
-            weights += by_order / (float(by_order.max()) or 1.0)
-            pulls += size[: self._riders.size] / (float(by_order.max()) or 1.0)
-        heavy = AffineProblem(
+            order_sizes += by_order / (float(by_order.max()) or 1.0)
+            unbalance_sizes += size[: self._riders.size] / (float(by_order.max()) or 1.0)
+        reduced = AffineProblem(
             tuple((weight, self._without_faint_orders(norm)) for weight, norm in terms),
             tuple((maximum, self._without_faint_orders(norm)) for maximum, norm in limits), (), 1,
         )  # fmt: skip
         names = tuple(limit.name for limit, _ in self._limits)
-        return ThrowProgram(window, AffineProblem(terms, limits, (), 1), heavy, names, weights, pulls)
+        return ThrowProgram(window, AffineProblem(terms, limits, (), 1), reduced, names, order_sizes, unbalance_sizes)
 
     def _without_faint_orders(self, norm: AffineNorm) -> AffineNorm:
         count, followed = len(self.waves.orders), np.arange(self._followed)
@@ -188,22 +200,22 @@ class ThrowPrograms:
         return columns[self._riders.size :][: self.waves.throws * width].reshape(self.waves.throws, width)
 
     def _rows(self, norm: WaveNorm, laps: tuple[int, ...]) -> AffineNorm:
-        """Return the rows of a norm with whole turns of its cylinders."""
+        """Return the rows of a norm for given whole turns (laps) of the cylinders."""
         orders, throws, fixed = self.waves.orders[:, 0], self.waves.throws, norm.fixed
         k, d = fixed.constant.shape
-        turned = np.zeros((throws, len(orders), k, d), complex)
+        turned_waves = np.zeros((throws, len(orders), k, d), complex)
         for part, wave in zip(self.waves.parts, norm.waves, strict=True):
             lap = 0 if part.cylinder is None else laps[part.cylinder]
-            turned[part.pin] += wave * np.exp(-1j * math.tau * lap * orders)[:, None, None]
+            turned_waves[part.pin] += wave * np.exp(-1j * math.tau * lap * orders)[:, None, None]
         slope = np.zeros((k, d, throws, 2 * len(orders) + 1))
-        slope[..., : len(orders)] = np.moveaxis(turned.real, (0, 1), (2, 3))
-        slope[..., len(orders) : -1] = -np.moveaxis(turned.imag, (0, 1), (2, 3))
+        slope[..., : len(orders)] = np.moveaxis(turned_waves.real, (0, 1), (2, 3))
+        slope[..., len(orders) : -1] = -np.moveaxis(turned_waves.imag, (0, 1), (2, 3))
         shared = np.zeros((k, d, self.waves.orders.shape[1] - 1))
-        together = np.concatenate([fixed.slope, slope.reshape(k, d, -1), shared], axis=-1)
-        return AffineNorm(fixed.norm, fixed.constant, together, fixed.grid)
+        all_slopes = np.concatenate([fixed.slope, slope.reshape(k, d, -1), shared], axis=-1)
+        return AffineNorm(fixed.norm, fixed.constant, all_slopes, fixed.grid)
 
     def _intervals(self, window: FiringWindow) -> AffineNorm:
-        """Return firing intervals, counted from the middle of their bounds in halves of these."""
+        """Return firing intervals as a norm: deviation from the middle of their bounds over half their range."""
         matrix, constants = self._firing.rows(window)
         firing = self._firing
         maximum = min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)
@@ -220,91 +232,101 @@ class ThrowPrograms:
     def box(
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
     ) -> ThrowBox | FathomedPart:
-        """Bound a box, cut down to where a design may be better than `cut`; `FathomedPart` where none is.
+        """Shrink a box to the angles where a design may be better than `cut`, and bound it.
 
         Parameters
         ----------
+        program
+            Norms of the firing window.
         lower, upper
             Bounds of throws and shared angles [rad].
         floor
-            Bound that holds already.
+            Known lower bound of the objective in the box [SI].
+        cut
+            Objective that a design must be below [SI].
         is_new
-            Whether multipliers of other boxes are tried first.
+            True to try multipliers of other boxes first.
+
+        Returns
+        -------
+        The box, or `FathomedPart` if it has no such design.
         """
         result: ThrowBox | FathomedPart = INFEASIBLE_PART
         for _ in range(_ROUNDS):
-            within = program.window.within(lower, upper)
-            if within is None:
+            window_bounds = program.window.within(lower, upper)
+            if window_bounds is None:
                 return INFEASIBLE_PART
-            lower, upper = within
-            result = self._bounded(program, lower, upper, floor, cut, is_new)
+            lower, upper = window_bounds
+            result = self._bound_box(program, lower, upper, floor, cut, is_new)
             if isinstance(result, FathomedPart):
                 return result
-            if float(np.sum(result.upper - result.lower)) > _WORTH * float(np.sum(upper - lower)):
+            if float(np.sum(result.upper - result.lower)) > _SHRINKAGE * float(np.sum(upper - lower)):
                 return result
             lower, upper, floor = result.lower, result.upper, result.bound
         return result
 
     def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | FathomedPart]:
-        """Yield halves of a box, cut where its mixture is farthest from standing at one angle."""
+        """Yield the parts of a box, divided at the mean angle of the mixture with the largest spread."""
         width = box.upper - box.lower
         spread = np.where(width > NARROWEST, box.spread, 0.0)
         side = int(np.argmax(spread if spread.any() else width))
         for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
             yield self.box(box.program, *half, box.bound, cut)
 
-    def _bounded(
+    def _bound_box(
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
     ) -> ThrowBox | FathomedPart:
-        """Bound a box by one program."""
+        """Bound a box by multipliers of other boxes or by its cone program."""
         columns = self._riders.columns(*self.waves.arcs(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._followed], lower, upper)
-        for known in self._proofs if is_new else ():
-            value, _ = self._bound(program.rows, columns, known, arc_box)
-            if value - self.left_out >= cut or self._is_excluded(program, columns, known, arc_box):
-                self._remember(known)
+        for proof in self._proofs if is_new else ():
+            value, _ = self._bound(program.rows, columns, proof, arc_box)
+            if value - self.truncation >= cut or self._prove_infeasible(program, columns, proof, arc_box):
+                self._store_proof(proof)
                 return FathomedPart(cut)
         mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._followed])
         solution = solve_cones(mixture.problem)
         multipliers = solution.multipliers
         if solution.x is None:
-            if self._is_excluded(program, columns, multipliers, arc_box):
-                self._remember(multipliers)
+            if self._prove_infeasible(program, columns, multipliers, arc_box):
+                self._store_proof(multipliers)
                 return INFEASIBLE_PART
             return ThrowBox(program, lower, upper, floor, 0.5 * (lower + upper), upper - lower)
         value, arcs = self._bound(program.rows, columns, multipliers, arc_box)
-        value -= self.left_out
+        value -= self.truncation
         if value >= cut:
-            self._remember(multipliers)
+            self._store_proof(multipliers)
             return FathomedPart(value)
         ends = arcs.cut(cut - value)
         if ends is None:
             return FathomedPart(cut)
         middle, spread = mixture.middle(solution.x)
         middle = np.clip(middle, *ends)
-        at, _ = self.waves.arcs(middle, middle)
-        for pin, column, distance in self._riders.spread(columns, solution.x[: mixture.unbalances], at):
-            spread[pin] += float(program.pulls[column]) * distance
+        arcs_at_middle, _ = self.waves.arcs(middle, middle)
+        for pin, column, distance in self._riders.spread(columns, solution.x[: mixture.unbalances], arcs_at_middle):
+            spread[pin] += float(program.unbalance_sizes[column]) * distance
         return ThrowBox(program, *ends, max(value, floor), middle, spread)
 
     def _bound(
         self, rows: AffineProblem, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox
     ) -> tuple[float, Arcs]:
-        """Return the bound that multipliers give of a box, and the functions of its throws (S27)."""
+        """Return the lower bound of a box by multipliers, and the functions of its throws (S27)."""
         count = len(rows.limits)
-        under = minorant(rows, Multipliers(multipliers.terms if rows.terms else (), multipliers.limits[:count]))
-        value, pull = under.constant, under.gradient[: self._riders.size] @ columns.matrix
+        lower_function = minorant(
+            rows, Multipliers(multipliers.terms if rows.terms else (), multipliers.limits[:count])
+        )
+        value, gradient = lower_function.constant, lower_function.gradient[: self._riders.size] @ columns.matrix
         if columns.limits:
             ties = AffineProblem((), columns.limits, columns.domains, 1)
-            tied = minorant(ties, Multipliers((), multipliers.limits[count : count + len(columns.limits)]))
-            value, pull = value + tied.constant, pull + tied.gradient
-        value += sum(domain.minimum(pull) for domain in columns.domains)
-        count, by_throw = len(self.waves.orders), self._columns_by_throw(under.gradient)
-        shared = under.gradient[len(under.gradient) - self.waves.orders.shape[1] + 1 :]
+            tie_function = minorant(ties, Multipliers((), multipliers.limits[count : count + len(columns.limits)]))
+            value, gradient = value + tie_function.constant, gradient + tie_function.gradient
+        value += sum(domain.minimum(gradient) for domain in columns.domains)
+        count, by_throw = len(self.waves.orders), self._columns_by_throw(lower_function.gradient)
+        shared = lower_function.gradient[len(lower_function.gradient) - self.waves.orders.shape[1] + 1 :]
         arcs = arc_box.functions(by_throw[:, :count] - 1j * by_throw[:, count:-1], by_throw[:, -1], shared)
         return float(value + arcs.minimum), arcs
 
-    def _is_excluded(
+    def _prove_infeasible(
         self, program: ThrowProgram, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox
     ) -> bool:
         limits = replace(program.rows, terms=())
@@ -318,20 +340,20 @@ class ThrowPrograms:
         self.conflict |= {name for name, price in zip(program.names, prices, strict=True) if price > 0.0}
         return True
 
-    def _remember(self, multipliers: Multipliers) -> None:
-        self._proofs = [multipliers, *(other for other in self._proofs if other is not multipliers)][:_KNOWN]
+    def _store_proof(self, multipliers: Multipliers) -> None:
+        self._proofs = [multipliers, *(proof for proof in self._proofs if proof is not multipliers)][:_MOST_PROOFS]
 
 
-def compressed(norm: WaveNorm) -> WaveNorm:
-    """Return a root mean square in as few rows as there are columns (S12), other norms without idle components."""
+def compress(norm: WaveNorm) -> WaveNorm:
+    """Reduce the rows of a root mean square to the number of columns (S12), and drop zero components of other norms."""
     fixed = norm.fixed
     if not fixed.norm.is_euclidean:
-        acts = np.flatnonzero(
+        is_nonzero = np.flatnonzero(
             fixed.constant.any(axis=0) | fixed.slope.any(axis=(0, 2)) | norm.waves.any(axis=(0, 1, 2))
         )
-        acts = acts if len(acts) else np.arange(1)
-        fewer = replace(fixed, constant=fixed.constant[:, acts], slope=fixed.slope[:, acts])
-        return WaveNorm(fewer, norm.waves[..., acts], norm.left_out)
+        is_nonzero = is_nonzero if len(is_nonzero) else np.arange(1)
+        reduced = replace(fixed, constant=fixed.constant[:, is_nonzero], slope=fixed.slope[:, is_nonzero])
+        return WaveNorm(reduced, norm.waves[..., is_nonzero], norm.left_out)
     scaled = np.sqrt(fixed.grid.weights)[:, None]
     waves = norm.waves * scaled
     rows = compress_rows([fixed.constant * scaled, np.moveaxis(fixed.slope * scaled[..., None], -1, 0),
@@ -339,28 +361,29 @@ def compressed(norm: WaveNorm) -> WaveNorm:
     if rows is None:
         return norm
     constant, slope, real, imaginary = rows
-    fewer = AffineNorm(fixed.norm, constant, np.moveaxis(slope, 0, -1), Grid(np.ones(len(constant)), len(constant)))
-    return WaveNorm(fewer, real + 1j * imaginary, norm.left_out)
+    reduced = AffineNorm(fixed.norm, constant, np.moveaxis(slope, 0, -1), Grid(np.ones(len(constant)), len(constant)))
+    return WaveNorm(reduced, real + 1j * imaginary, norm.left_out)
 
 
 class Mixture:
-    """Throws of a box as mixtures of a few angles of every arc: the program that proposes multipliers (S27).
+    """Cone program of a box in which every throw is a mixture of a few angles of its arc (S27).
 
-    Shared angles are mixed first, and for each of theirs every throw by itself.
+    The shared angles have one mixture; for each of its points, every throw has its own mixture. The program proposes
+    multipliers.
 
     Attributes
     ----------
     problem
-        The cone program; its columns are those of unbalances, then shares of the angles.
+        Cone program; its columns are unbalances, then shares of the angles.
     unbalances
         Number of columns of unbalances.
     """
 
     def __init__(self, program: ThrowProgram, columns: BoxColumns, lower: Array, upper: Array, orders: Array) -> None:
         self.unbalances, self._orders = columns.matrix.shape[1], orders
-        throws, shared_count = len(program.weights), orders.shape[1] - 1
-        rows, self._weights = program.heavy, program.weights[:, : len(orders)]
-        is_heavy = self._weights > _FAINT * self._weights.max()
+        throws, shared_count = len(program.order_sizes), orders.shape[1] - 1
+        rows, self._weights = program.reduced, program.order_sizes[:, : len(orders)]
+        is_heavy = self._weights > _NEGLIGIBLE * self._weights.max()
         step_limits = (_MOST[shared_count],) * throws + (_MOST_SHARED[shared_count],) * shared_count
         side_orders = [
             *(np.where(row, orders[:, 0], 0.0) for row in is_heavy),
@@ -372,8 +395,8 @@ class Mixture:
             else 1
             for row, width, limit in zip(side_orders, upper - lower, step_limits, strict=True)
         ]
-        every = [np.linspace(a, b, n) for a, b, n in zip(lower, upper, steps, strict=True)]
-        self._angles, shared = every[:throws], list(product(*every[throws:]))
+        side_angles = [np.linspace(a, b, n) for a, b, n in zip(lower, upper, steps, strict=True)]
+        self._angles, shared = side_angles[:throws], list(product(*side_angles[throws:]))
         self._shared = np.array(shared).reshape(len(shared), shared_count)
         places = np.concatenate([[0], np.cumsum([len(shared) - 1, *(len(shared) * (n - 1) for n in steps[:throws])])])
         self._places, size = self.unbalances + places, int(self.unbalances + places[-1])
@@ -392,21 +415,21 @@ class Mixture:
         self.problem = AffineProblem(terms, (*limits, *ties, *self._share_limits(size)), domains, 1)
 
     def _wave_points(self, angles: Array) -> Array:
-        turned = np.add.outer(self._shared @ self._orders[:, 1:].T, np.zeros(len(angles))).swapaxes(1, 2)
-        turned = turned + np.outer(angles, self._orders[:, 0])
-        at = np.broadcast_to(angles[None, :, None], (*turned.shape[:2], 1))
-        return np.concatenate([np.cos(turned), np.sin(turned), at], axis=2)
+        phases = np.add.outer(self._shared @ self._orders[:, 1:].T, np.zeros(len(angles))).swapaxes(1, 2)
+        phases = phases + np.outer(angles, self._orders[:, 0])
+        theta = np.broadcast_to(angles[None, :, None], (*phases.shape[:2], 1))
+        return np.concatenate([np.cos(phases), np.sin(phases), theta], axis=2)
 
     def _through(self, norm: AffineNorm, matrix: Array, points: Sequence[Array]) -> AffineNorm:
-        """Return a norm of rows in the columns of a box, and in shares of the angles."""
+        """Return a norm in columns of the box, from its rows in columns of the model."""
         k, d, n = norm.slope.shape
-        flat, at = norm.slope.reshape(k * d, n), len(matrix)
+        flat, first = norm.slope.reshape(k * d, n), len(matrix)
         shared = flat[:, n - self._shared.shape[1] :] @ self._shared.T
         slopes = []
         for waves in points:
             shape, width = waves.shape[:2], waves.shape[2]
-            values = (flat[:, at : at + width] @ waves.reshape(-1, width).T).reshape(k * d, *shape)
-            at += width
+            values = (flat[:, first : first + width] @ waves.reshape(-1, width).T).reshape(k * d, *shape)
+            first += width
             shared += values[:, :, 0]
             slopes.append((values[:, :, 1:] - values[:, :, :1]).reshape(k * d, -1))
         constant = norm.constant.ravel() + shared[:, 0]
@@ -414,49 +437,55 @@ class Mixture:
         return AffineNorm(norm.norm, constant.reshape(k, d), slope.reshape(k, d, -1), norm.grid)
 
     def _share_limits(self, size: int) -> list[tuple[float, AffineNorm]]:
-        """Limit shares of shared angles to one, and those of a throw to that of its shared angles."""
+        """Limit the sum of shares of shared angles to 1, and the sum for a throw to the share of its shared angle."""
         count, first = len(self._shared), self._places[0]
         slopes, constants = [np.zeros((0, size))], [np.zeros(0)]
         if count > 1:
             slopes.append(np.zeros((1, size)))
             slopes[-1][0, first : first + count - 1] = -1.0
             constants.append(np.ones(1))
-        for at, angles in zip(self._places[1:], self._angles, strict=False):
+        for start, angles in zip(self._places[1:], self._angles, strict=False):
             if len(angles) == 1:
                 continue
             slope = np.zeros((count, size))
             slope[0, first : first + count - 1] = -1.0
             slope[np.arange(1, count), first + np.arange(count - 1)] = 1.0
             for b in range(count):
-                slope[b, at + b * (len(angles) - 1) : at + (b + 1) * (len(angles) - 1)] = -1.0
+                slope[b, start + b * (len(angles) - 1) : start + (b + 1) * (len(angles) - 1)] = -1.0
             slopes.append(slope)
             constants.append(np.arange(count) == 0)
         slope, constant = np.concatenate(slopes), np.concatenate(constants)
         if not len(slope):
             return []
-        # each is left between 0 and 1, counted from the middle
+        # every remainder lies between 0 and 1
         grid = Grid(np.ones(len(slope)), len(slope))
         return [(0.5, AffineNorm(NORMS["maximum"], constant[:, None] - 0.5, slope[:, None], grid))]
 
     def middle(self, x: Array) -> tuple[Array, Array]:
-        """Return the mean angle of every mixture [rad], and its distance from standing there."""
+        """Return the mean angle of every mixture [rad], and its weighted distance from the waves at that angle.
+
+        Parameters
+        ----------
+        x
+            Solution of the program, shape (columns,).
+        """
         count, first = len(self._shared), self._places[0]
         shares = x[first : first + count - 1]
         shares = np.concatenate([[1.0 - shares.sum()], shares])
         mean = shares @ self._shared
-        turned = np.exp(1j * self._shared @ self._orders[:, 1:].T)
+        shared_waves = np.exp(1j * self._shared @ self._orders[:, 1:].T)
         middle, spread = [], []
-        for at, angles, weights in zip(self._places[1:], self._angles, self._weights, strict=False):
-            part = x[at : at + count * (len(angles) - 1)].reshape(count, len(angles) - 1)
-            part = np.concatenate([(shares - part.sum(axis=1))[:, None], part], axis=1)
-            at_mean = float((part @ angles).sum())
+        for start, angles, weights in zip(self._places[1:], self._angles, self._weights, strict=False):
+            throw_shares = x[start : start + count * (len(angles) - 1)].reshape(count, len(angles) - 1)
+            throw_shares = np.concatenate([(shares - throw_shares.sum(axis=1))[:, None], throw_shares], axis=1)
+            angle = float((throw_shares @ angles).sum())
             waves = np.exp(1j * np.outer(angles, self._orders[:, 0]))
-            wave_at_mean = (shares @ turned) * np.exp(1j * self._orders[:, 0] * at_mean)
-            missing = ((part @ waves) * turned).sum(axis=0) - wave_at_mean
-            middle.append(at_mean)
-            spread.append(float(np.linalg.norm(weights * np.abs(missing))))
+            wave_at_mean = (shares @ shared_waves) * np.exp(1j * self._orders[:, 0] * angle)
+            difference = ((throw_shares @ waves) * shared_waves).sum(axis=0) - wave_at_mean
+            middle.append(angle)
+            spread.append(float(np.linalg.norm(weights * np.abs(difference))))
         for s in range(len(mean)):
             waves = np.exp(1j * np.outer(self._shared[:, s], self._orders[:, 1 + s]))
-            missing = shares @ waves - np.exp(1j * mean[s] * self._orders[:, 1 + s])
-            spread.append(float(np.linalg.norm(self._weights * np.abs(missing))))
+            difference = shares @ waves - np.exp(1j * mean[s] * self._orders[:, 1 + s])
+            spread.append(float(np.linalg.norm(self._weights * np.abs(difference))))
         return np.array([*middle, *mean]), np.array(spread)

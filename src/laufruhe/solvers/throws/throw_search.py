@@ -1,4 +1,4 @@
-"""Branch and bound over throws that leave the even steps: firing windows first, then boxes of angles (S29)."""
+"""Branch and bound over open throws: first over firing windows, then over boxes of angles (S29)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.witness import Witness, thin_box
-from laufruhe.solvers.boxes.search import BoxSearch, divided
+from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
 from laufruhe.solvers.conclusion import FEASIBLE, read_under
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
@@ -36,50 +36,50 @@ from laufruhe.solvers.throws.throw_windows import (
     design_at,
     firing_bounds,
     has_same_unbalances,
-    middle_of,
-    nearest,
+    middle_throws,
+    nearest_throws,
     place_in,
     turns_freely,
     windows_of,
 )
 
 Improve = Callable[[Candidate, bool], StarDesign | None]
-"""Return the best design near a candidate, or with its throws where they are; None if it breaks limits."""
+"""Function that returns the local optimum from a candidate (True) or the design at it (False); None if infeasible."""
 
 MOST_BOXES = 1500
-# share of the tolerance by which a design has to be better, for a box to be looked at
+# share of the tolerance by which a design must improve on the incumbent
 SHARE = 0.5
 FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
-# share of the best design that steps over the period may cost
+# largest sampling error of bounds, relative to the best objective
 STEPS_COST = 1e-3
-# of one open angle there are few boxes, so that steps may be many
+# with one open angle, boxes are few, so samples may be many
 MOST_OF_ONE_ANGLE, COST_OF_ONE_ANGLE = 6144, 2e-5
-# share of what steps cost within which a bound takes more of them
-_FINER = 1.5
-# windows that are tried for a crank that can be evaluated
+# factor of the sampling error within which a bound uses more samples
+_FINER_FACTOR = 1.5
+# windows to try for a crank that the model can evaluate
 _MOST_REALISED = 50
-# boxes whose middle is tried: the first few, and one of so many
-_TRIED_FIRST, _TRIED_EACH, _MOST_TRIED = 2, 100, 5
-# distance from standing at one angle up to which a mixture's middle is tried as it stands, and how often
-_STANDING, _MOST_STANDING = 1e-5, 12
+# boxes whose middle starts a local search: the first few, then every hundredth, and their largest number
+_SEARCHED_FIRST, _SEARCHED_EVERY, _MOST_SEARCHED = 2, 100, 5
+# spread up to which the middle of a box is evaluated as a design, and the largest number of such designs
+_SMALL_SPREAD, _MOST_EVALUATED = 1e-5, 12
 
 
 @dataclass(frozen=True)
 class ThrowBound:
-    """Bound that boxes of throws prove.
+    """Lower bound by branch and bound over throws.
 
     Attributes
     ----------
     bound
-        Bound of every design; infinite where none is allowed [SI].
+        Lower bound of the objective of all designs [SI]; infinite if no design is feasible.
     best
-        The best design, None where none was found.
+        Best design; None if no feasible design is known.
     boxes
         Number of boxes.
     conflict
-        Limits that no throws keep together, where none is allowed.
+        Names of limits that contradict each other, if no design is feasible.
     what
-        What was divided, in words.
+        Name of the boxes, in words.
     """
 
     bound: float
@@ -90,52 +90,56 @@ class ThrowBound:
 
 
 class Stage:
-    """Programs at one number of steps over the period, and those at twice as many (S29).
+    """Programs at one number of samples over the period, linked to the stage with twice as many (S29).
 
     Parameters
     ----------
-    make
-        Return programs at so many steps.
-    lost
-        Return what means and peaks of the best design lose by so many steps (P7).
+    build
+        Function from the number of samples to the programs.
+    samples
+        Number of samples.
+    loss
+        Function from the number of samples to the error of means and peaks of the best design (P7) [SI].
     value
-        Objective of the best design.
-    left_out
-        Return the part of the objective that the orders left out may have.
-    maximum, tolerable
-        Largest number of steps, and the share of the value that they may cost.
+        Objective of the best design [SI].
+    truncation
+        Function from the number of samples to the largest part of the objective in truncated orders [SI].
+    maximum
+        Largest number of samples.
+    target
+        Error relative to the objective at which samples suffice.
     """
 
     def __init__(
-        self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
-        left_out: Callable[[int], float], maximum: int = MOST_SAMPLES, tolerable: float = STEPS_COST,
+        self, build: Callable[[int], ThrowPrograms], samples: int, loss: Callable[[int], float], value: float,
+        truncation: Callable[[int], float], maximum: int = MOST_SAMPLES, target: float = STEPS_COST,
     ) -> None:  # fmt: skip
-        self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
-        self._maximum, self._enough = maximum, tolerable
+        self._build, self._samples, self._loss, self._value, self._truncation = build, samples, loss, value, truncation
+        self._maximum, self._target = maximum, target
 
     @cached_property
     def programs(self) -> ThrowPrograms:
-        """Programs at this number of steps."""
-        return self._make(self._samples)
+        """Programs at this number of samples."""
+        return self._build(self._samples)
 
     @cached_property
     def cost(self) -> float:
-        """Share of the best design that no bound gets back."""
-        return (self._lost(self._samples) + self._left_out(self._samples)) / self._value
+        """Error of bounds by sampling and truncation, relative to the best objective."""
+        return (self._loss(self._samples) + self._truncation(self._samples)) / self._value
 
     @cached_property
     def next(self) -> Stage | None:
-        """Stage with twice as many steps; None where these are enough."""
-        finer = 2 * self._samples
-        if self._lost(self._samples) <= self._enough * self._value or finer > self._maximum:
+        """Stage with twice as many samples; None if these suffice."""
+        samples = 2 * self._samples
+        if self._loss(self._samples) <= self._target * self._value or samples > self._maximum:
             return None
-        stage = Stage(self._make, finer, self._lost, self._value, self._left_out, self._maximum, self._enough)
-        # short averages know less of a pressure that jumps
+        stage = Stage(self._build, samples, self._loss, self._value, self._truncation, self._maximum, self._target)
+        # averages over short steps may truncate more of a pressure jump
         return stage if stage.cost < self.cost else None
 
     @cached_property
     def finer(self) -> Stage | None:
-        """Stage with twice as many steps, unless its numbers are too many to hold."""
+        """Stage with twice as many samples; None if these suffice now or exceed the memory."""
         if self.next is not None:
             with suppress(ModelError):
                 _ = self.next.programs
@@ -144,26 +148,44 @@ class Stage:
 
     @property
     def last(self) -> Stage:
-        """Stage with the most steps."""
+        """Stage with the most samples."""
         return self if self.next is None else self.next.last
 
     def is_exhausted(self, bound: float, value: float, box: ThrowBox) -> bool:
-        """Return True if steps cost more than a smaller box could gain."""
-        return bound > value * (1.0 - _FINER * self.cost) or float(box.spread.sum()) < self.cost
+        """Return True if more samples improve the bound of a box more than its division.
+
+        Parameters
+        ----------
+        bound, value
+            Lower bound in the box, and objective of the best design [SI].
+        box
+            The box.
+        """
+        return bound > value * (1.0 - _FINER_FACTOR * self.cost) or float(box.spread.sum()) < self.cost
 
 
-def missed_peak(measure: Measure, best: Result, samples: int) -> float:
-    """Return how much a peak of a design may be over its samples, wherever these stand (F7) [SI]."""
+def peak_error(measure: Measure, best: Result, samples: int) -> float:
+    """Return an upper bound of the difference between a peak and its samples at any phase (F7) [SI].
+
+    Parameters
+    ----------
+    measure
+        Measure of the peak.
+    best
+        Result of the design.
+    samples
+        Number of samples over the period.
+    """
     signals = best.final.signals(measure.load)
     rebased = with_common_base(common_base([signal.repeat_order() for signal in signals]), signals)
-    counted = [narrow_signal(measure, signal, best.final.engine) for signal in rebased]
+    spectra = [narrow_signal(measure, signal, best.final.engine) for signal in rebased]
     steps = max(samples // measure.norm.refinement, 1)
-    return measure.norm.sampling_bound(counted, measure.shares(best.problem.points), steps, 2 * samples)
+    return measure.norm.sampling_bound(spectra, measure.shares(best.problem.points), steps, 2 * samples)
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A box, the steps of its bound, and the shafts that are not built; all throws where it has no box."""
+    """A box with the stage of its bound, and the optional shafts that are not built; the root has no box."""
 
     bound: float
     box: ThrowBox | None = None
@@ -191,20 +213,22 @@ class _Best:
 def search_throws(
     problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
 ) -> ThrowBound | None:
-    """Bound all throws, and return the best design on the way; None where boxes prove nothing.
+    """Bound the objective over all throws by branch and bound; None if the method proves nothing.
 
     Parameters
     ----------
+    problem, phasing
+        The problem and its open phasing.
     best
-        The best design known.
+        Best known design; None if there is none.
     floor
-        A bound that holds.
+        Known lower bound of the objective [SI].
     improve
-        Local search from throws that look good.
+        Local search or evaluation from a candidate.
     """
     zero_level = numerical_zero(problem)
     is_proven = best is not None and best.value - floor <= gap_tolerance_of(best.value, problem.tolerance, zero_level)
-    # gas beside a shaft of a ratio that is no whole number does not repeat after a working cycle
+    # with gas and a shaft of non-integer ratio, loads do not repeat after a working cycle
     repeats = not problem.depends_on_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
     if is_proven or not repeats or not problem.objective:
         return None
@@ -216,97 +240,97 @@ def search_throws(
     try:
         search = ThrowSearch(problem, phasing, windows, improve, best)
         for stage, _, _ in search.roots:
-            # what is too much to hold shows at once, or that a throw alone drives what no mount carries
+            # raises ModelError at once if memory does not suffice or loads have no finite response
             _ = stage.programs
     except ModelError:
         return None
     maximum = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
-    incumbent, bound, boxes = divided(
-        search, _Part(floor), _Best(best), zero_level, search.reached, maximum, search.what
+    incumbent, bound, boxes = divide_boxes(
+        search, _Part(floor), _Best(best), zero_level, search.gap_target, maximum, search.what
     )
     return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
 
 
 class ThrowSearch(BoxSearch[_Part, _Best]):
-    """Windows and boxes of the throws of a problem."""
+    """Branch and bound search over firing windows and boxes of throws."""
 
     def __init__(
         self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
         best: StarDesign | None,
     ) -> None:  # fmt: skip
         self._problem, self._phasing, self._improve = problem, phasing, improve
-        self._seen = self._tried = self._stood = 0
-        self._best, self._not_met = _Best(best), set[str]()
+        self._box_count = self._search_count = self._evaluation_count = 0
+        self._best, self._violated = _Best(best), set[str]()
         self.what = "boxes of throws" + (" and angles" if any(phasing.is_geometry_open) else "")
         throws = phasing.layout(*phasing.minimum_geometry).throw_positions
         is_one_angle = sum(phasing.is_geometry_open) == 1 and len(throws) == 1 and phasing.throw_bounds is None
         self._most_samples = MOST_OF_ONE_ANGLE if is_one_angle else MOST_SAMPLES
-        tolerable = COST_OF_ONE_ANGLE if is_one_angle else STEPS_COST
+        target = COST_OF_ONE_ANGLE if is_one_angle else STEPS_COST
         self._finest: Stage | None = None
         self.roots: list[tuple[Stage, FiringWindow, tuple[str, ...]]] = []
         may_vanish = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         value = best.value if best is not None and best.value > 0.0 else math.inf
-        lost = cache(partial(self._lost_by_steps, best))
+        sampling_loss = cache(partial(self._sampling_loss, best))
         for built in phasing.shafts.largest if may_vanish else phasing.shafts.allowed:
             left_out = phasing.without(built)
-            make, loss = self._programs(windows, left_out)
-            stage = Stage(make, FEWEST_SAMPLES, lost, value, loss, self._most_samples, tolerable)
+            build, truncation = self._programs(windows, left_out)
+            stage = Stage(build, FEWEST_SAMPLES, sampling_loss, value, truncation, self._most_samples, target)
             self.roots += [(stage, window, left_out) for window in windows]
 
     @property
-    def reached(self) -> float:
-        """Gap at which dividing ends: the tolerance, or what no bound gets back beside it."""
+    def gap_target(self) -> float:
+        """Gap at which the search ends: the tolerance, or more if the error of bounds does not allow that."""
         tolerance = self._problem.tolerance
         cost = max(stage.last.cost for stage in {id(stage): stage for stage, _, _ in self.roots}.values())
         return max(tolerance, min(tolerance, cost) + cost)
 
     @property
     def conflict(self) -> tuple[str, ...]:
-        """Limits that were not met in boxes."""
-        return tuple(limit.name for limit in self._problem.limits if limit.name in self._not_met)
+        """Names of limits that boxes without a design violate."""
+        return tuple(limit.name for limit in self._problem.limits if limit.name in self._violated)
 
-    def _lost_by_steps(self, best: StarDesign | None, samples: int) -> float:
-        """Return what means averaged about the steps lose of a design (P7), and peaks may miss between them (F7)."""
+    def _sampling_loss(self, best: StarDesign | None, samples: int) -> float:
+        """Return the error of the best design's objective by averaged means (P7) and sampled peaks (F7) [SI]."""
         if best is None:
             return 0.0
         problem, final = best.result.problem, best.result.final
-        lost = 0.0
+        loss = 0.0
         for term in self._problem.objective:
             if averages(problem, term.measure):
                 signals = with_common_base(problem.engine.cycle.base_order, final.signals(term.measure.load))
-                short = [averaged(problem, term.measure, signal, samples) for signal in signals]
-                # of a mean the rows between are as good, of a peak they are not there
+                averaged_signals = [averaged(problem, term.measure, signal, samples) for signal in signals]
+                # averages have rows between the samples, peaks do not
                 steps = 4 * samples if term.measure.norm.averages else samples
-                rows = load_rows(term.measure, problem.points, short, final.engine, steps)
-                lost += term.weight * max(final.value(term.measure) - rows.value, 0.0)
+                rows = load_rows(term.measure, problem.points, averaged_signals, final.engine, steps)
+                loss += term.weight * max(final.value(term.measure) - rows.value, 0.0)
             elif term.measure.is_load and not term.measure.norm.is_euclidean and samples < self._most_samples:
-                lost += term.weight * missed_peak(term.measure, best.result, samples)
-        return lost
+                loss += term.weight * peak_error(term.measure, best.result, samples)
+        return loss
 
     def _programs(
         self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
     ) -> tuple[Callable[[int], ThrowPrograms], Callable[[int], float]]:
-        """Return programs at so many steps over the period, and what their orders leave out of the objective."""
+        """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
         phasing = self._phasing
         candidate, realised = self._first_crank(windows, left_out)
         rides = rides_of(phasing, candidate)
         riders = Riders(realised, rides, candidate.throws)
         waves = self._waves(riders.problem, candidate, rides)
 
-        def loss(samples: int) -> float:
+        def truncation(samples: int) -> float:
             return sum(term.weight * waves.left_out(term.measure, samples) for term in realised.objective)
 
-        return partial(ThrowPrograms, waves, riders, firing_bounds(phasing)), loss
+        return partial(ThrowPrograms, waves, riders, firing_bounds(phasing)), truncation
 
     def _first_crank(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> tuple[Candidate, Problem]:
-        # a crank with nearly simultaneous firings cannot be evaluated
-        tried = windows[:_MOST_REALISED]
-        for k, window in enumerate(tried):
-            candidate = replace(self.candidate(window, middle_of(window)), left_out=left_out)
+        # the model cannot evaluate a crank with nearly simultaneous firings
+        first_windows = windows[:_MOST_REALISED]
+        for k, window in enumerate(first_windows):
+            candidate = replace(self.candidate(window, middle_throws(window)), left_out=left_out)
             try:
                 return candidate, replace(self._phasing.realise(candidate), phasing=None)
             except ModelError:
-                if k + 1 == len(tried):
+                if k + 1 == len(first_windows):
                     raise
         raise ModelError("no crank fires")
 
@@ -316,13 +340,13 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         if not any(phasing.is_geometry_open):
             return ThrowWaves(problem, layout, rides)
         if not has_same_unbalances(phasing, candidate):
-            raise ModelError("what rides on a throw knows how far pins are apart")
-        # where nothing tells when the crank turns, its first throw stays where it is, and what rides on it
-        stands = phasing.throw_bounds is not None or turns_freely(phasing, candidate, rides)
-        return ThrowWaves(problem, layout, rides, phasing.is_geometry_open, 0.0 if stands else layout.side(0))
+            raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
+        # if the phase of the crank has no effect, its first throw keeps its angle
+        is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, rides)
+        return ThrowWaves(problem, layout, rides, phasing.is_geometry_open, 0.0 if is_fixed else layout.side(0))
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
-        """Return a design with these throws, and with a firing order that they keep."""
+        """Return the candidate with these throws [rad] and the firing order of the window, or else their best order."""
         design = replace(design_at(self._phasing, throws), firing_order=window.order or None)
         if window.order:
             return design
@@ -330,15 +354,15 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return replace(design, firing_order=orders[0].order if orders else None)
 
     def cut(self, value: float) -> float:
-        """Return the value that a design has to beat."""
+        """Return the objective that a design must be below, for the objective of the incumbent [SI]."""
         return value * (1.0 - SHARE * self._problem.tolerance)
 
     def level(self, value: float) -> float:
-        """Return the value under which no design lies in what is cut off boxes."""
+        """Return the smallest objective that designs in cut-off boxes may have, for that of the incumbent [SI]."""
         return self.cut(value)
 
-    def known(self, incumbent: _Best) -> Witness | None:
-        """Return the best design as a witness of bounds; None where there is none."""
+    def witness_of(self, incumbent: _Best) -> Witness | None:
+        """Return the best design as a witness of bounds; None without a feasible design."""
         best = incumbent.design
         if best is None or best.result.final.violation(best.result.problem.limits) > FEASIBLE:
             return None
@@ -350,7 +374,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return read.value + read.doubt + zero_level
 
     def around(self, incumbent: _Best) -> _Part | FathomedPart | None:
-        """Return a thin box of throws around a design, and its bound; None where it is an image of one that stays."""
+        """Return a thin box of throws around a design, with its bound; None if no window contains the design."""
         best, stage = incumbent.design, self._finest
         if best is None or stage is None:
             return None
@@ -363,7 +387,15 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return None
 
     def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, _Best | None]]:
-        """Yield windows of all throws, or halves of a box."""
+        """Yield the boxes of all windows for the root, else a box at more samples or its halves.
+
+        Parameters
+        ----------
+        part
+            The root or a box.
+        value
+            Objective of the incumbent [SI].
+        """
         box, stage, cut = part.box, part.stage, self.cut(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
@@ -372,7 +404,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
                 root = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
-            # more steps gain more than smaller boxes
+            # more samples improve the bound more than smaller boxes
             programs = stage.finer.programs
             finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
             yield self._examine(stage.finer, finer, part.left_out)
@@ -383,19 +415,21 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     def _examine(
         self, stage: Stage, box: ThrowBox | FathomedPart, left_out: tuple[str, ...]
     ) -> tuple[_Part | FathomedPart, _Best | None]:
-        """Return a box, and a better design near its middle."""
-        self._not_met |= stage.programs.conflict
+        """Return a box, and the best design if one near its middle was computed."""
+        self._violated |= stage.programs.conflict
         self._finest = stage
         if isinstance(box, FathomedPart):
             return box, None
-        self._seen += 1
-        moving = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
-        stands = self._stood < _MOST_STANDING and float(box.spread.max()) < _STANDING
-        if moving or stands:
-            self._tried += moving
-            self._stood += not moving
+        self._box_count += 1
+        uses_search = self._search_count < _MOST_SEARCHED and (
+            self._box_count <= _SEARCHED_FIRST or self._box_count % _SEARCHED_EVERY == 0
+        )
+        evaluates_middle = self._evaluation_count < _MOST_EVALUATED and float(box.spread.max()) < _SMALL_SPREAD
+        if uses_search or evaluates_middle:
+            self._search_count += uses_search
+            self._evaluation_count += not uses_search
             window = box.program.window
-            candidate = replace(self.candidate(window, nearest(window, box.middle)), left_out=left_out)
-            improved = self._improve(candidate, moving) if candidate.firing_order is not None else None
-            self._best = min(self._best, _Best(improved), key=lambda each: each.rank)
-        return _Part(box.bound, box, stage, left_out), self._best if moving or stands else None
+            candidate = replace(self.candidate(window, nearest_throws(window, box.middle)), left_out=left_out)
+            improved = self._improve(candidate, uses_search) if candidate.firing_order is not None else None
+            self._best = min(self._best, _Best(improved), key=lambda best: best.rank)
+        return _Part(box.bound, box, stage, left_out), self._best if uses_search or evaluates_middle else None

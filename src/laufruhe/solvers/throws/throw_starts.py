@@ -1,7 +1,7 @@
-"""Start points of the search of uneven throws (S20, S25).
+"""Choose start points for the search of uneven throws (S20, S25).
 
-They are ranked even stars, throws within bounds of their own, or the best cranks of every way to fire within the
-intervals.
+Start points are ranked even stars, throws within their bounds, or the best cranks of every firing pattern within the
+limits of firing intervals.
 """
 
 from __future__ import annotations
@@ -27,33 +27,34 @@ from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import candidates_of, interval_range, ranked_orders, why_no_order
 
 ORDERS_WITH_GAS = 2
-# cranks that are compared by order alone, and by the exact model
+# largest number of cranks to compare by amplitudes of orders, and by the exact model
 _MOST_CRANKS = 200_000
 _MOST_EVALUATED = 300
 _FEWEST = 8
-# throws within bounds of their own, where neither middle nor even stars can fire
-_DRAWN = 4
+# random throws within bounds, if neither their middle nor even stars have a firing order
+_RANDOM_STARS = 4
 _STARTS = 12
-# a rounding of the program that times firings [rad]
+# rounding error of firing patterns [rad]
 _ROUNDING = 1e-7
 
 
 def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...]:
-    """Return crank angles from firing to firing of a design [rad]."""
+    """Return the firing intervals of a design [rad]."""
     turns = firing_turns(phasing.layout_of(candidate), candidate.throws, candidate.firing_order or ())
     return intervals_of(phasing.cycle, turns)
 
 
-def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Candidate]:
-    """Return designs to start from, the most promising first.
+def start_candidates(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Candidate]:
+    """Return start candidates for the search of uneven throws, best first.
 
     Parameters
     ----------
+    phasing
+        Open phasing.
     even
-        Result of the even stars, ranked; None where none exists or throws have bounds of their own.
+        Result of the even stars, with its ranking; None if there are none or throws have bounds.
     with_gas
-        Whether gas is felt: firing orders of one star then differ, and so does the star that
-        turns the other way, which inertia alone cannot tell from it.
+        True if gas acts. Firing orders of one star, and both directions of rotation, then have different loads.
     """
     if even is not None and even.phasing is not None:
         candidates = candidates_of(phasing, even.phasing.ranking, ORDERS_WITH_GAS if with_gas else 1)
@@ -69,24 +70,24 @@ def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> 
         sets = phasing.shafts.largest
         candidates = [replace(crank, left_out=phasing.without(built)) for crank in cranks for built in sets]
     if with_gas and phasing.throw_bounds is None and phasing.firing_order is None:
-        candidates = [image for candidate in candidates for image in (candidate, turning_back(phasing, candidate))]
+        candidates = [image for candidate in candidates for image in (candidate, reverse_rotation(phasing, candidate))]
     return candidates
 
 
 def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
-    """Return why no crank and firing order keeps the intervals allowed, and whether that is proven."""
-    allowed = phasing.intervals.text
+    """Return the reason if no crank keeps the firing intervals allowed, in words, and True if it is proven."""
+    allowed_text = phasing.intervals.text
     if not phasing.intervals.holds([phasing.even_interval]):
-        even = f"{math.degrees(phasing.even_interval):g}"
+        interval = f"{math.degrees(phasing.even_interval):g}"
         return (
-            f"no star can meet the intervals: {phasing.cylinders} cylinders fire {even} deg apart on average, "
-            f"phasing.intervals allows {allowed}"
+            f"no star can meet the intervals: {phasing.cylinders} cylinders fire {interval} deg apart on average, "
+            f"phasing.intervals allows {allowed_text}"
         ), True
     if phasing.throws is not None:
         return why_no_order(phasing, phasing.throws), True
     if not phasing.continuous:
         return f"no star exists: {families_of(phasing)[1]}", True
-    text = f"no crank and firing order keeps the firing intervals allowed, {allowed}"
+    text = f"no crank and firing order keeps the firing intervals allowed, {allowed_text}"
     patterns, complete = _firing_patterns(phasing)
     if not patterns or patterns[0].broken <= _ROUNDING:
         return text, False
@@ -102,7 +103,7 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
 
 
 def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
-    """Return ways to fire, the most even first, and whether these are all."""
+    """Return firing patterns, most even first, and True if the list is complete."""
     layout = phasing.layout(*phasing.minimum_geometry)
     first = [k for k, pin in enumerate(layout.pins) if pin == 0]
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
@@ -112,7 +113,7 @@ def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
     )  # fmt: skip
     members = None
     if phasing.firing_order is not None:
-        # firings of every throw's cylinders
+        # slots of every throw's cylinders
         slot = {number - 1: s for s, number in enumerate(phasing.firing_order)}
         members = [
             [slot[k] for k, pin in enumerate(layout.pins) if pin == throw] for throw in range(max(layout.pins) + 1)
@@ -124,46 +125,46 @@ def _best_cranks(phasing: Phasing, patterns: Sequence[FiringPattern]) -> list[Ca
     cranks: list[tuple[float, Candidate]] = []
     allowed = [pattern for pattern in patterns if pattern.broken <= _ROUNDING]
     for number, pattern in enumerate(allowed):
-        # the most even ones come first, and are looked at the closest
+        # even patterns come first, and get the most cranks
         cranks += _cranks_of_pattern(phasing, pattern, number + 1)
     cranks.sort(key=lambda pair: pair[0])
     unit = max((value for value, _ in cranks), default=0.0) or 1.0
-    # images of one crank are worth the same
-    different = {round(value / unit, 9): crank for value, crank in reversed(cranks)}
-    return [different[key] for key in sorted(different)][:_STARTS]
+    # mirror images of a crank have equal objectives
+    by_value = {round(value / unit, 9): crank for value, crank in reversed(cranks)}
+    return [by_value[key] for key in sorted(by_value)][:_STARTS]
 
 
 def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) -> list[tuple[float, Candidate]]:
-    """Return the best cranks of one way to fire, with their objectives."""
+    """Return the best cranks of a firing pattern, with their objectives [SI]."""
     bank = split = None
     if phasing.bank is not None:
-        # bank angle and split pin of the pattern's sum, as near to the middle as their bounds allow
+        # split the sum of bank and split pin angle near the middle of their bounds
         (low, high), (narrowest, widest) = phasing.bank, phasing.split or (0.0, 0.0)
         bank = min(max(pattern.angle - 0.5 * (narrowest + widest), low), high)
         split = min(max(pattern.angle - bank, narrowest), widest)
         bank = min(max(pattern.angle - split, low), high)
     layout, count = phasing.layout(bank, split), len(pattern.members)
-    plain = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
-    simple = amplitude_objective(replace(phasing.realise(plain), limits=()), phasing, layout)
-    orders = _throw_orders(phasing, count, (_MOST_CRANKS if simple else _MOST_EVALUATED) // number**2)
-    # a throw stands as far back as its first cylinder fires late (C5)
+    zero_crank = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
+    objective = amplitude_objective(replace(phasing.realise(zero_crank), limits=()), phasing, layout)
+    orders = _throw_orders(phasing, count, (_MOST_CRANKS if objective else _MOST_EVALUATED) // number**2)
+    # a throw lags by the crank angle at which its first cylinder fires (C5)
     firsts = np.array([pattern.moments[members[0]] for members in pattern.members])[orders]
     throws = angle_of(layout.dead_centre_turn(0)) + firsts[:, :1] - firsts
-    if simple is not None:
-        values = simple.of_angles(layout.throw_positions, throws)
+    if objective is not None:
+        values = objective.of_angles(layout.throw_positions, throws)
         best = np.argsort(values, kind="stable")[: 4 * _STARTS]
     else:
         values, best = np.zeros(len(orders)), np.arange(len(orders))
     cranks = []
     for k in best:
-        # cylinders as they fire, the first one first
+        # cylinder of every slot
         cylinder = {}
         for pin, share in enumerate(orders[k]):
-            cylinders = [c for c, at in enumerate(layout.pins) if at == pin]
+            cylinders = [c for c, cylinder_pin in enumerate(layout.pins) if cylinder_pin == pin]
             cylinder.update(dict(zip(pattern.members[share], cylinders, strict=True)))
         order = from_one([cylinder[slot] + 1 for slot in range(len(cylinder))])
         crank = Candidate(tuple(float(a) % math.tau for a in throws[k]), order, bank, split)
-        if simple is not None:
+        if objective is not None:
             value = float(values[k])
         else:
             try:
@@ -187,36 +188,39 @@ def _throw_orders(phasing: Phasing, count: int, maximum: int) -> NDArray[np.intp
 
 
 def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
-    """Return throws within bounds of their own, in firing orders that they can keep."""
-    free = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
+    """Return throws within their bounds, with firing orders that these throws allow."""
+    unlimited = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
     allowed = phasing.intervals
 
     def violation(intervals: Sequence[float]) -> float:
         return round(sum(max(allowed.minimum - i, 0.0) + max(i - allowed.maximum, 0.0) for i in intervals), 9)
 
     low, high = np.array(phasing.throw_bounds).T
-    drawn = np.random.default_rng(1964).uniform(low, high, (_DRAWN, len(low)))
-    for stars in (bounded_stars(phasing, phasing.layout(bank, split)), [tuple(map(float, own)) for own in drawn]):
+    random_stars = np.random.default_rng(1964).uniform(low, high, (_RANDOM_STARS, len(low)))
+    for stars in (
+        bounded_stars(phasing, phasing.layout(bank, split)),
+        [tuple(map(float, throws)) for throws in random_stars],
+    ):
         cranks = []
         for throws in stars:
-            orders = ranked_orders(free, Candidate(throws, None, bank, split))
-            fired = [order for order in orders if min(order.intervals) > SOONEST]
-            # the orders whose intervals are nearest to those allowed
-            fired.sort(key=lambda order: violation(order.intervals))
-            cranks += [Candidate(throws, order.order, bank, split) for order in fired[:2]]
+            orders = ranked_orders(unlimited, Candidate(throws, None, bank, split))
+            distinct_orders = [order for order in orders if min(order.intervals) > SOONEST]
+            # smallest violation of the limits of intervals first
+            distinct_orders.sort(key=lambda order: violation(order.intervals))
+            cranks += [Candidate(throws, order.order, bank, split) for order in distinct_orders[:2]]
         if cranks:
             break
     return cranks
 
 
-def turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
-    """Return the star of a crank that turns the other way: banks change sides, and firings their order."""
+def reverse_rotation(phasing: Phasing, candidate: Candidate) -> Candidate:
+    """Return the equivalent of a candidate with reversed rotation: banks swap sides, and the firing order reverses."""
     layout = phasing.layout_of(candidate)
     number = {(pin, layout.side(k)): k + 1 for k, pin in enumerate(layout.pins)}
     partners = [number[pin, -layout.side(k)] for k, pin in enumerate(layout.pins)]
     order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
     throws = [-angle for angle in candidate.throws]
-    # cylinder 1 at its dead centre when phi = 0 (C5)
+    # cylinder 1 is at its dead centre at phi = 0 (C5)
     shift = angle_of(layout.dead_centre_turn(0)) - throws[layout.pins[0]]
     turned = tuple((angle + shift) % math.tau for angle in throws)
     return replace(candidate, throws=turned, firing_order=from_one(order) if order else None)

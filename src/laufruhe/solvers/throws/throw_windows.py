@@ -1,4 +1,7 @@
-"""Firing windows of a problem: orders in which its throws may fire, and throws that keep one (S26)."""
+"""List the firing windows of a problem, and convert designs to angles of a window (S26).
+
+A firing window is a firing order with bounds of all throws.
+"""
 
 from __future__ import annotations
 
@@ -24,15 +27,15 @@ MOST_WINDOWS = 6_000
 
 
 def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
-    """Return every way to fire within the bounds, one of images that are worth the same; None if there are too many."""
+    """Return all firing windows of a problem, one of each set of equivalent mirror images; None if too many."""
     layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     firing = firing_bounds(phasing)
     is_free = allowed.minimum <= 0.0 and allowed.maximum >= phasing.cycle.angle
     if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.depends_on_gas:
-        # in which order they fire makes no difference
+        # without gas and limits on intervals, the firing order has no effect
         return [firing.anywhere]
-    # of four images one stays
-    images = 4 if _has_images(problem, phasing) else 1
+    # one of four mirror images suffices
+    images = 4 if _has_mirror_images(problem, phasing) else 1
     windows = list(itertools.islice(firing.windows(), images * MOST_WINDOWS + 1))
     if images > 1 and len(windows) <= images * MOST_WINDOWS:
         last = len(layout.positions) + 1
@@ -51,21 +54,21 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     return windows
 
 
-def _has_images(problem: Problem, phasing: Phasing) -> bool:
-    # S2
+def _has_mirror_images(problem: Problem, phasing: Phasing) -> bool:
+    # True if mirror images of a crank have equal objectives (S2)
     if phasing.throw_bounds is not None or phasing.firing_order is not None or phasing.bank is not None:
         return False
     layout = phasing.layout(None, None)
     places = sorted(layout.throw_positions)
     if any(abs(a + b) > 1e-9 * places[-1] for a, b in zip(places, places[::-1], strict=True)):
         return False
-    limited = [Term(limit.measure) for limit in problem.limits]
-    without_limits = replace(problem, phasing=None, objective=(*problem.objective, *limited), limits=())
+    limit_terms = [Term(limit.measure) for limit in problem.limits]
+    without_limits = replace(problem, phasing=None, objective=(*problem.objective, *limit_terms), limits=())
     return amplitude_objective(without_limits, phasing, layout) is not None
 
 
 def firing_bounds(phasing: Phasing) -> FiringBounds:
-    """Return the bounds that firing has to keep."""
+    """Return the bounds of firing intervals, throws and open angles."""
     layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     pairs = zip((phasing.bank, phasing.split), phasing.is_geometry_open, strict=True)
     return FiringBounds(
@@ -75,7 +78,15 @@ def firing_bounds(phasing: Phasing) -> FiringBounds:
 
 
 def design_at(phasing: Phasing, angles: Array) -> Candidate:
-    """Return throws, bank angle and split pins at the throws and shared angles of a box, without a firing order."""
+    """Return the candidate at angles of a box, without a firing order.
+
+    Parameters
+    ----------
+    phasing
+        Open phasing.
+    angles
+        Throws, then open bank and split pin angles [rad].
+    """
     layout = phasing.layout(*phasing.minimum_geometry)
     count = len(layout.throw_positions)
     shared = iter(angles[count:])
@@ -83,23 +94,37 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
         float(np.clip(next(shared), *pair)) if is_open and pair is not None else (None if pair is None else pair[0])
         for pair, is_open in zip((phasing.bank, phasing.split), phasing.is_geometry_open, strict=True)
     ]
-    # throws that are open are counted from cylinder 1 at its dead centre
-    turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
-    throws = tuple(float(angle + turned) % math.tau for angle in angles[:count])
+    # open throws are relative to the crank with cylinder 1 at its dead centre
+    shift = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
+    throws = tuple(float(angle + shift) % math.tau for angle in angles[:count])
     return Candidate(throws, None, geometry[0], geometry[1])
 
 
 def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Array | None:
-    """Return throws and shared angles of a design as boxes of a window have them; None if it does not keep that."""
+    """Return the angles of a design as in boxes of a window; None if the design is outside the window.
+
+    Parameters
+    ----------
+    phasing
+        Open phasing.
+    window
+        Firing window.
+    candidate
+        Throws, firing order and geometry of the design.
+
+    Returns
+    -------
+    Throws, then open bank and split pin angles [rad].
+    """
     if window.order and window.order != candidate.firing_order:
         return None
     layout = phasing.layout(*phasing.minimum_geometry)
     geometry = (candidate.bank_angle, candidate.split_pin)
     shared = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.is_geometry_open, strict=True) if is_open]
-    turned = layout.side(0) * sum(shared) if phasing.throw_bounds is None else 0.0
+    shift = layout.side(0) * sum(shared) if phasing.throw_bounds is None else 0.0
     low, high = window.box
-    throws = np.array(candidate.throws) - turned
-    # the same throw, at the turn that is nearest to the middle of its box
+    throws = np.array(candidate.throws) - shift
+    # equivalent angle nearest to the middle of the box
     first = slice(0, len(throws))
     throws = throws + math.tau * np.round((0.5 * (low[first] + high[first]) - throws) / math.tau)
     place = np.append(throws, shared)
@@ -108,24 +133,26 @@ def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Ar
 
 
 def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
-    """Return True if unbalances are the same at all open angles: a share of what turns on offset pins is not."""
+    """Return True if unbalances do not depend on bank and split pin angles; on offset pins, rotating masses do."""
     ends = [(pair, 0.5 * (pair[0] + pair[1])) if pair else ((None,), None) for pair in (phasing.bank, phasing.split)]
-    every = [
+    states = [
         rotor_states(
             phasing.realise(replace(candidate, firing_order=None, bank_angle=b, split_pin=s, without_gas=True))
         )
         for b, s in product((*ends[0][0], ends[0][1]), (*ends[1][0], ends[1][1]))
     ]
-    return all(states == every[0] for states in every)
+    return all(state == states[0] for state in states)
 
 
 def turns_freely(phasing: Phasing, candidate: Candidate, rides: dict[str, int]) -> bool:
-    """Return True if all unbalances that ride on no throw follow where the crank stands when cylinder 1 fires.
+    """Return True if all unbalances off the throws have free angles, so that the crank's phase has no effect.
 
     Parameters
     ----------
+    phasing, candidate
+        Open phasing, and a design.
     rides
-        Throw that every rotor turns with.
+        Index of the throw of every rotor that turns with one.
     """
     problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
     free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in rides}
@@ -138,16 +165,16 @@ def turns_freely(phasing: Phasing, candidate: Candidate, rides: dict[str, int]) 
     )
 
 
-def middle_of(window: FiringWindow) -> Array:
-    """Return throws inside a window, each in the middle of what those before it leave to it [rad]."""
+def middle_throws(window: FiringWindow) -> Array:
+    """Return throws inside a window, each in the middle of the range that the previous throws leave [rad]."""
     low, high = window.box
     for k in range(len(low)):
         low, high = _fix(window, low, high, k, 0.5 * (low[k] + high[k]))
     return np.asarray(0.5 * (low + high))
 
 
-def nearest(window: FiringWindow, throws: Array) -> Array:
-    """Return throws that keep a window, each as near to the given ones as those before it allow [rad]."""
+def nearest_throws(window: FiringWindow, throws: Array) -> Array:
+    """Return throws inside a window, each as near to `throws` as the previous throws allow [rad], shape (throws,)."""
     low, high = window.box
     for k, angle in enumerate(throws):
         low, high = _fix(window, low, high, k, float(np.clip(angle, low[k], high[k])))
@@ -155,5 +182,5 @@ def nearest(window: FiringWindow, throws: Array) -> Array:
 
 
 def _fix(window: FiringWindow, low: Array, high: Array, throw: int, angle: float) -> tuple[Array, Array]:
-    here = np.arange(len(low)) == throw
-    return window.within(np.where(here, angle, low), np.where(here, angle, high)) or (low, high)
+    is_throw = np.arange(len(low)) == throw
+    return window.within(np.where(is_throw, angle, low), np.where(is_throw, angle, high)) or (low, high)

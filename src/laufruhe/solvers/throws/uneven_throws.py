@@ -1,8 +1,7 @@
-"""Throws that leave the even steps within bounded firing intervals (S19-S21).
+"""Solve for throws that leave the even steps within limits of firing intervals (S19-S21).
 
-From every good even star a smooth program seeks a local optimum with its firing order fixed: intervals are then linear
-in the angles. The design returned is never worse than the even star it started from, because the exact model compares
-the two.
+From every good even star, a smooth program finds a local optimum with a fixed firing order, so that intervals are
+linear in the angles. The exact model compares both, so the result is never worse than the even star.
 """
 
 from __future__ import annotations
@@ -35,40 +34,41 @@ from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
-from laufruhe.solvers.throws.stored_work import bounding, proposing, with_problem
+from laufruhe.solvers.throws.stored_work import with_problem, with_work_for_search, work_for_bounds
 from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
-from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, why_none_fires
+from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
 STARTS = 6
-# smallest share of the objective as given in which a search counts
+# smallest unit of the objective in a search, relative to the baseline objective
 SMALLEST_UNIT = 1e-3
-# share that keeps a design that stands on a limit from breaking it by a rounding
+# relative margin of limits in the smooth program, against rounding
 SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
-# share by which two ends of a search are one optimum
+# relative difference of objectives at which two local optima are equal
 SAME = 1e-6
-# angle that tells two cranks apart in a ranking [rad]
-SHOWN = 1e-4
-# how often limits are tightened that the best design breaks, by what share of its excess, and up to which
+# smallest difference of angles between two cranks of a ranking [rad]
+SAME_ANGLE = 1e-4
+# searches with tighter limits, margin relative to the violation, and largest violation that a margin may remove
 _ATTEMPTS, _TIGHTENED, _MOST_TIGHTENED = 3, 1.2, 0.2
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
 
 def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
-    """Return the best of the local optima that the even stars lead to, with a bound of all throws.
+    """Return the best local optimum from the even stars, with a lower bound over all throws.
 
     Parameters
     ----------
+    problem, phasing
+        The problem and its open phasing.
     even
-        Result of the even stars, ranked; None where none exists or throws have bounds of
-        their own.
+        Result of the even stars, with its ranking; None if there are none or throws have bounds.
     """
-    starts = starts_of(phasing, even, problem.depends_on_gas)
+    starts = start_candidates(phasing, even, problem.depends_on_gas)
     if not starts:
-        why, proven = why_none_fires(phasing)
-        if proven:
-            return no_star(problem, why)
+        reason, is_proven = why_none_fires(phasing)
+        if is_proven:
+            return no_star(problem, reason)
     shares = TRADE_STEPS if phasing.thorough and even is not None and phasing.intervals.maximum < math.inf else (1.0,)
     designs: list[StarDesign] = []
     trade: list[TradePoint] = []
@@ -76,36 +76,32 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         report_progress("shares of the deviation allowed", k, len(shares), designs[0].value if designs else math.inf)
         mean, allowed = phasing.even_interval, phasing.intervals
         allowed = Intervals(mean - share * (mean - allowed.minimum), mean + share * (allowed.maximum - mean))
-        # what is best with less freedom is a start, so that more of it is never worse
-        chosen = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]
-        cranks = dict.fromkeys([*(design.candidate for design in designs[:1]), *chosen])
-        optima = [
-            answer
-            for crank in until_time_limit(cranks)
-            if (answer := local_optimum(phasing, crank, allowed)) is not None
-        ]
-        designs = sorted(optima, key=lambda answer: answer.value)
+        # the optimum with less freedom is a start, so that more freedom is never worse
+        selected = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]
+        cranks = dict.fromkeys([*(design.candidate for design in designs[:1]), *selected])
+        optima = [x for crank in until_time_limit(cranks) if (x := local_optimum(phasing, crank, allowed)) is not None]
+        designs = sorted(optima, key=lambda optimum: optimum.value)
         if designs and len(shares) > 1:
             trade.append(_trade_point(problem, phasing, allowed, designs[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
-    bounded = None
+    box_bound = None
     if not designs or phasing.thorough:
-        bounded = _search_boxes(problem, phasing, designs[0] if designs else None, floor)
-    if bounded is not None:
-        floor, source = max(floor, bounded.bound), f"{bounded.boxes} {bounded.what}"
-        if bounded.best is not None and bounded.best not in designs:
-            designs = [bounded.best, *designs]
+        box_bound = _search_boxes(problem, phasing, designs[0] if designs else None, floor)
+    if box_bound is not None:
+        floor, source = max(floor, box_bound.bound), f"{box_bound.boxes} {box_bound.what}"
+        if box_bound.best is not None and box_bound.best not in designs:
+            designs = [box_bound.best, *designs]
             trade = [*trade[:-1], _trade_point(problem, phasing, phasing.intervals, designs[0])] if trade else []
-    if not designs and not starts and bounded is None:
-        return no_star(problem, why, Status.FAILED)
+    if not designs and not starts and box_bound is None:
+        return no_star(problem, reason, Status.FAILED)
     if not designs:
-        return _none(problem, phasing, bounded)
+        return _without_design(problem, phasing, box_bound)
     trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
     zero_level = numerical_zero(problem)
     result, doubt = result_under(designs[0].result, floor, zero_level)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
-    # no norm lies under zero: a design that reaches it is optimal
+    # zero is a lower bound of every norm
     certificate = make_certificate(
         best.value, floor, zero_level, problem.tolerance, ProofStrength.PARTIAL, best.kkt_residual, method, doubt
     )
@@ -128,12 +124,12 @@ def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, 
             return local_optimum(phasing, candidate, phasing.intervals)
         return evaluate_crank(phasing, candidate)
 
-    with_work = bounding(problem, first.value if first is not None else math.inf)
+    with_work = work_for_bounds(problem, first.value if first is not None else math.inf)
     return search_throws(with_work(problem), with_problem(phasing, with_work), first, floor, improve)
 
 
 def evaluate_crank(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
-    """Return the design with these throws, if it keeps limits and firing intervals."""
+    """Return the design with these throws; None if it violates limits or firing intervals."""
     return _if_allowed(phasing, phasing.intervals, _evaluate(phasing, candidate, 0.0, moved=True))
 
 
@@ -147,60 +143,65 @@ def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: S
 
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
-    """Return a lower bound of all designs with these intervals [SI], and its source in words (S22, S24)."""
+    """Return a lower bound of all designs with these limits of intervals [SI], and its source in words (S22, S24)."""
     families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
     if len(families) == 1 and families[0].fixed is None:
-        # a limit only takes designs away
+        # without limits, the bound is still valid
         first = replace(phasing.realise(families[0].candidate(phasing, families[0].first)), limits=())
         objective = amplitude_objective(first, phasing, families[0].layout)
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
     if phasing.is_geometry_open[0]:
-        # what stands still inside the crankcase leans with its bank
-        outside = tuple(term for term in problem.objective if not term.measure.is_inside)
-        problem = replace(problem, objective=outside)
+        # measures inside the crankcase depend on the open bank angle
+        load_terms = tuple(term for term in problem.objective if not term.measure.is_inside)
+        problem = replace(problem, objective=load_terms)
     problem = replace(problem, objective=problem.load_terms)
     return steady_bound(problem), "the steady part of the loads"
 
 
-def _none(problem: Problem, phasing: Phasing, bounded: ThrowBound | None) -> Result:
-    """Return that no start led to a design: infeasible only where boxes, or a bound of what is limited, prove it."""
-    if bounded is not None and bounded.bound == math.inf:
-        names = quoted(bounded.conflict) or "the bounds on firing intervals"
-        return no_star(problem, f"no crank keeps {names}, whatever else is decided", conflict=bounded.conflict)
+def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | None) -> Result:
+    """Return a result without a design: infeasible if branch and bound or the bound of a limited measure proves it."""
+    if box_bound is not None and box_bound.bound == math.inf:
+        names = quoted(box_bound.conflict) or "the bounds on firing intervals"
+        return no_star(problem, f"no crank keeps {names}, whatever else is decided", conflict=box_bound.conflict)
     for limit in problem.load_limits:
-        alone = replace(problem, objective=(Term(limit.measure),))
-        if _bound(alone, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
+        single_term = replace(problem, objective=(Term(limit.measure),))
+        if _bound(single_term, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
             why = f"no crank keeps '{limit.name}', whatever else is decided"
             return no_star(problem, why, conflict=(limit.name,))
     names = quoted(limit.name for limit in problem.limits) or "the bounds"
-    left = "" if bounded is None else f", and {bounded.boxes} boxes of throws do not exclude one; raise search.boxes"
-    return no_star(problem, f"no crank was found that keeps {names}{left}; relax them, or open more", Status.FAILED)
+    remedy = (
+        "" if box_bound is None else f", and {box_bound.boxes} boxes of throws do not exclude one; raise search.boxes"
+    )
+    return no_star(problem, f"no crank was found that keeps {names}{remedy}; relax them, or open more", Status.FAILED)
 
 
 def local_optimum(
     phasing: Phasing, start: Candidate, intervals: Intervals, nudged: bool = True
 ) -> StarDesign | None:  # fmt: skip
-    """Return the local optimum that one star leads to, or the star itself where nothing is better (S20).
+    """Return the local optimum from a start star, or the star itself if nothing is better; None if neither is feasible.
 
     Parameters
     ----------
+    phasing
+        Open phasing.
+    start
+        Start star.
     intervals
-        Firing intervals allowed.
+        Limits of firing intervals.
     nudged
-        Whether points beside the star are started from too, for a star may be a saddle. The optimum of a problem that
-        differs little is none.
+        True to start from perturbed stars too, because a star may be a saddle point (S20).
     """
     best = _if_allowed(phasing, intervals, _evaluate(phasing, start, 0.0, moved=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
-    problem = proposing(replace(phasing.realise(start), phasing=None))
-    # what is a number of each crank by itself is judged, and in no program
+    problem = with_work_for_search(replace(phasing.realise(start), phasing=None))
+    # the exact model checks limits on numbers of the crank, which are not in the program
     problem = replace(problem, limits=problem.load_limits)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size:
         return best
-    # no norm lies under zero
+    # zero is a lower bound of every norm
     has_value = best is not None and best.result.objective is not None
     if best is not None and has_value and best.value <= numerical_zero(best.result.problem, best.result.final.engine):
         return best
@@ -228,20 +229,20 @@ def local_optimum(
                 best, prices = design, smooth.prices(optimum)
             elif prices is None and design.value < best.value * (1.0 + SAME):
                 prices = smooth.prices(optimum)
-        # the program knows a peak by fewer angles than the exact model, and a degree of irregularity by its work
+        # the program has fewer samples of a peak than the exact model, and work in place of a degree of irregularity
         if not FEASIBLE < minimum_violation < _MOST_TIGHTENED:
             break
         margin += _TIGHTENED * minimum_violation
     if best is None:
         return None
-    # limits cost less while throws may move than with fixed ones; unknown where the program has no price
+    # prices with open throws, which are lower than with fixed throws; unknown without a price of the program
     result = best.result
     limits = limit_values(replace(result.problem, phasing=phasing), result.final, prices or {}, best.value)
     return replace(best, result=replace(result, limits=limits))
 
 
 def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]:
-    # a star that is its own mirror image may be a saddle
+    # a star that equals its mirror image may be a saddle point
     columns = np.zeros(smooth.columns)
     if best is not None and smooth.columns:
         columns = projected_vector(smooth.domains, unbalances_of(smooth.problem, best.result))
@@ -269,15 +270,15 @@ def _if_allowed(phasing: Phasing, intervals: Intervals, design: StarDesign | Non
 
 
 def _distinct(designs: Sequence[StarDesign]) -> list[StarDesign]:
-    different: list[StarDesign] = []
+    distinct: list[StarDesign] = []
     for design in designs:
-        if not any(_is_same_crank(design.candidate, other.candidate) for other in different):
-            different.append(design)
-    return different
+        if not any(_is_same_crank(design.candidate, x.candidate) for x in distinct):
+            distinct.append(design)
+    return distinct
 
 
-def _is_same_crank(one: Candidate, other: Candidate) -> bool:
-    if replace(one, throws=other.throws, bank_angle=other.bank_angle, split_pin=other.split_pin) != other:
+def _is_same_crank(first: Candidate, second: Candidate) -> bool:
+    if replace(first, throws=second.throws, bank_angle=second.bank_angle, split_pin=second.split_pin) != second:
         return False
-    first, second = ((*each.throws, each.bank_angle or 0.0, each.split_pin or 0.0) for each in (one, other))
-    return bool(np.abs(np.angle(np.exp(1j * np.subtract(first, second)))).max() < SHOWN)
+    angles = [(*crank.throws, crank.bank_angle or 0.0, crank.split_pin or 0.0) for crank in (first, second)]
+    return bool(np.abs(np.angle(np.exp(1j * np.subtract(angles[0], angles[1])))).max() < SAME_ANGLE)
