@@ -2,8 +2,8 @@
 Main bearings of a three-cylinder
 =================================
 
-Six webs, free in mass and angle, halve the mean force on the main bearings. The polar diagrams show where block and
-journals wear.
+Six counterweights with open mass and angle halve the mean force on the main bearings. The polar diagrams show where
+block and journals wear.
 """
 
 import laufruhe

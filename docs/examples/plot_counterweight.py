@@ -2,8 +2,8 @@
 A single-cylinder and its counterweight
 =======================================
 
-A counterweight for about half of the reciprocating mass trades vertical for lateral force. The pictures show the path
-of the force on each mount, and loads over the crank angle, as given and as decided.
+A counterweight for about half of the reciprocating mass reduces vertical force and adds lateral force. The pictures
+show the path of the force on each mount, and loads over the crank angle, before and after.
 """
 
 import laufruhe

@@ -2,7 +2,7 @@
 The lightest flywheel of a diesel engine
 ========================================
 
-Torque over the cycle, the work that the flywheel stores, and the crank speed that results.
+Torque over the cycle, work that the flywheel stores, and crank speed.
 """
 
 import laufruhe

@@ -2,7 +2,7 @@
 Soft mounts
 ===========
 
-The least sag with which the bounce mode stays below a wanted frequency, and the force that such mounts transmit.
+The smallest sag that keeps the bounce mode below a given frequency, and the force that such mounts transmit.
 """
 
 import laufruhe

@@ -2,8 +2,8 @@
 Balancer shafts of a tractor engine
 ===================================
 
-Two shafts at twice crank speed take the mean mount force of a four-cylinder to a quarter. Bars: mean and maximum force
-on each mount. Spectrum: what orders of crank speed the loads are made of.
+Two shafts at twice crank speed reduce the mean mount force of a four-cylinder to a quarter. Bars: mean and maximum
+force on each mount. Spectrum: amplitude of the loads by order of crank speed.
 """
 
 import laufruhe

@@ -2,8 +2,8 @@
 A locomotive's wheels
 =====================
 
-Weights in the driving wheels of a two-cylinder locomotive, for the least hammer blow on the rails while the engine
-neither surges nor sways more than allowed.
+Weights in the driving wheels of a two-cylinder locomotive, for the least hammer blow on the rails under limits on
+surging and swaying.
 """
 
 import laufruhe

@@ -2,8 +2,8 @@
 A radial engine
 ===============
 
-Seven cylinders, one master rod and six articulated rods: the pistons move a little differently, and the engine keeps
-a rest that no single counterweight balances.
+Seven cylinders, one master rod and six articulated rods. The pistons move a little differently, so a small force
+remains that no single counterweight balances.
 """
 
 import laufruhe

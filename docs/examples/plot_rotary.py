@@ -2,7 +2,7 @@
 A rotary engine
 ===============
 
-Two rotors on eccentrics: end weights of least mass that leave no force and no couple, and the volume of the chambers.
+Two rotors on eccentrics. The lightest end weights that leave no force and no couple, and the volume of the chambers.
 """
 
 import laufruhe

@@ -2,7 +2,7 @@
 Start and shut-down on soft mounts
 ==================================
 
-On its way through the resonances of soft mounts the engine moves most, and bump stops act.
+A start takes the engine through the resonances of its soft mounts. There it moves most, and bump stops act.
 """
 
 import laufruhe

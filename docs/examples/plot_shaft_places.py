@@ -2,7 +2,7 @@
 Where balancer shafts should stand
 ==================================
 
-Sizes, places and heights of two shafts are decided together. The drawing is to scale; what was decided is marked.
+Sizes, places and heights of two shafts are decided together. The drawing is to scale, with decided parts in blue.
 """
 
 import laufruhe

@@ -2,7 +2,7 @@
 A waterworks engine
 ===================
 
-Steam and pumps on one rod: indicator diagrams of the chambers, and the least flywheel.
+Steam piston and pumps on one rod. Indicator diagrams of the chambers, and the smallest flywheel.
 """
 
 import laufruhe

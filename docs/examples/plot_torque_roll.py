@@ -2,7 +2,7 @@
 Mounts on the torque-roll axis
 ==============================
 
-Nine stiffnesses of three mounts are decided so that torque excites one mode alone. Bars: share of each motion in the
+Nine stiffnesses of three mounts are decided so that torque excites one mode only. Bars: share of each motion in the
 kinetic energy of each natural mode.
 """
 

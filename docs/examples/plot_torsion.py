@@ -2,8 +2,8 @@
 A torsional damper
 ==================
 
-Inertia and damping of a viscous damper are decided for the least shaft stress in two resonances: how the crankshaft
-swings in its modes, and the torque over crank speed.
+Inertia and damping of a viscous damper are decided for the least shaft stress in two resonances. The pictures show the
+modes of the crankshaft and the torque over crank speed.
 """
 
 import laufruhe

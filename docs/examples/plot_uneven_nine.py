@@ -1,9 +1,8 @@
 """
-What uneven firing buys
-=======================
+Uneven firing of a nine-cylinder
+================================
 
-If firing intervals may differ by a few degrees, the throws of a nine-cylinder can stand where its rocking couple
-vanishes.
+If firing intervals may differ by a few degrees, throws of a nine-cylinder exist whose rocking couple vanishes.
 """
 
 import laufruhe

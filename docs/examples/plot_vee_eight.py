@@ -2,7 +2,7 @@
 The crank of a V8
 =================
 
-Throws and firing order of a 90 degree V8 are open. Every crank star that fires evenly is ranked, each with its own best
+Throws and firing order of a 90 degree V8 are open. Every crank star with even firing is ranked, each with its own best
 counterweights.
 """
 
