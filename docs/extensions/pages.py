@@ -24,10 +24,9 @@ Every key of problem and study files, from the schemas that editors use. *Number
 a number with a unit; *may be open* means that `{ between = [low, high] }` may stand in place of the number.
 """
 GALLERY = """\
-# Gallery
+# Programs of the gallery
 
-What the ready problems solve. Each program makes the pictures of its problem; the documentation site (`make docs`)
-shows them.
+Each program solves a ready problem and draws its pictures. The documentation site (`make docs`) shows them.
 
 | example | program |
 | --- | --- |
