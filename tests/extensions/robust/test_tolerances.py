@@ -145,9 +145,9 @@ def test_grades(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "more", "rule"),
     [
-        (" ±", "", "sign of a tolerance and none behind it"),
-        (" ± two", "", "no number of its kind"),
-        (" ± 2 mm", "", "no number of its kind"),
+        (" ±", "", "tolerance sign without a tolerance"),
+        (" ± two", "", "not a number of the same kind"),
+        (" ± 2 mm", "", "not a number of the same kind"),
         (" ± 120 %", "", "whole number or more"),
         (" ± 1.3 kg", "", "whole mass or more"),
         (" ± 2 % normal uniform", "", "two laws"),
@@ -156,7 +156,7 @@ def test_grades(tmp_path: Path) -> None:
         (" ± 1 %", '[robust]\nover = "95"\n', "neither the worst case nor a share"),
         (" ± 1 %", '[robust]\nover = "40 %"\n', "neither the worst case nor a share"),
         (" ± 1 %", '[robust]\nover = "99.9 %"\nengines = 100\n', "leaves none"),
-        ("", '[tolerances]\nresidual_unbalance = "G 6.3"\n', "is missing, and a grade is of a mass"),
+        ("", '[tolerances]\nresidual_unbalance = "G 6.3"\n', "is missing, and a grade needs the mass of the rotor"),
         ("", '[tolerances]\nresidual_unbalance = "6.3"\n', "neither a grade nor an unbalance"),
         ("", '[tolerances]\nrotor_mass = "60 kg"\n', "needs a grade"),
         ("", shaft("s", 2, "0 mm", 'unbalance = { between = ["0 kg m", "1 kg m"], tolerance = "1 g" }'), "percent"),

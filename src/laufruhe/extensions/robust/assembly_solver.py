@@ -63,7 +63,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
         raise ValueError("there are no parts to choose among")
     refuse(problem)
     started, spent = time.perf_counter(), time.thread_time()
-    report_progress("what every part adds")
+    report_progress("effect of each part")
     terms, lots = _terms(problem), assembly.lots
     search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
     bound = search.run()
@@ -76,7 +76,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     if witness is None:
         certificate = make_certificate(
             value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0,
-            f"branch and bound over assignments, {search.node_count} parts bounded by dual rows",
+            f"branch and bound over assignments, {search.node_count} nodes bounded by multipliers",
         )  # fmt: skip
     is_feasible = final.violation(problem.limits) <= KEPT
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
@@ -84,7 +84,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
         problem=problem, status=status if is_feasible else Status.FAILED,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
         limits=limit_values(problem, final), initial=initial, final=final,
-        message="" if is_feasible else "the best assembly breaks a limit, and limits do not choose parts; relax it",
+        message="" if is_feasible else "the best assembly violates a limit, which the choice of parts ignores; relax it",
         error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
         details=search.result(chosen, [part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
@@ -124,9 +124,7 @@ def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
 def refuse(problem: Problem) -> None:
     """Raise ModelError for problems that [assembly] cannot solve."""
     if problem.decisions or problem.phasing is not None:
-        raise ModelError(
-            "[assembly] chooses parts of an engine that is fixed; fix what is open, or leave [assembly] out"
-        )
+        raise ModelError("[assembly] needs an engine without open numbers; fix them, or leave [assembly] out")
     if len(problem.extras) > 1:
         raise ModelError("[assembly] takes measured parts, [robust] unmeasured ones; leave one of them out")
     if problem.fidelity.is_uneven:

@@ -129,7 +129,7 @@ class Mark:
         one_unit = f"1 {self.unit}"
         dimension = units.dimension_of(one_unit)
         if dimension is None:
-            raise self.refused("is no number with a unit known here", _EXAMPLE)
+            raise self.refused("is not a number with a known unit", _EXAMPLE)
         is_plain = _NUMBER.fullmatch(self.size) is not None
         return self._parsed(f"{self.size} {self.unit}" if is_plain else self.size, dimension) / units.parse(
             one_unit, dimension
@@ -139,9 +139,11 @@ class Mark:
         try:
             value = units.parse(text, dimension)
         except units.UnitError:
-            raise self.refused(f"has a tolerance '{self.size}' that is no number of its kind", _EXAMPLE) from None
+            raise self.refused(
+                f"has a tolerance '{self.size}' that is not a number of the same kind", _EXAMPLE
+            ) from None
         if value < 0.0:
-            raise self.refused("has a negative tolerance", "both ways are meant; leave the sign out")
+            raise self.refused("has a negative tolerance", "it applies in both directions; leave the sign out")
         return value
 
 
@@ -176,7 +178,7 @@ def _strip_marks(node: Any, path: Path, marks: list[Mark]) -> Any:
             marks.append(_parse_mark(tolerance if any(sign in tolerance for sign in SIGNS) else f"± {tolerance}", path))
             node = {key: value for key, value in node.items() if key != "tolerance"}
             if marks[-1].number is not None:
-                raise marks[-1].refused("gives a number beside its bounds", 'write for example "± 2 %"')
+                raise marks[-1].refused("gives a number in addition to its bounds", 'write for example "± 2 %"')
         return {key: _strip_marks(value, (*path, key), marks) for key, value in node.items()}
     if isinstance(node, str) and any(sign in node for sign in SIGNS) and path[-1] not in ("name", "names"):
         mark = _parse_mark(node, path)
@@ -191,7 +193,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
     match = _TOLERANCE.match(text)
     where = key_path(path)
     if match is None or not match["size"]:
-        raise Refused(where, text, "has a sign of a tolerance and none behind it", _EXAMPLE)
+        raise Refused(where, text, "has a tolerance sign without a tolerance after it", _EXAMPLE)
     words = match["words"].split()
     laws, scopes = ([word for word in words if word in list(kind)] for kind in (Law, Scope))
     if len(laws) > 1 or len(scopes) > 1:
@@ -206,7 +208,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
 def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Population:
     """Return the engines of the objective: the worst case, or a share."""
     if not tolerances:
-        raise Refused("robust", None, "has no tolerances to stand", 'give a number one, for example "1.25 kg ± 2 %"')
+        raise Refused("robust", None, "has no tolerances", 'give one to a number, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
         return Population(None, table.engines, table.seed)
     try:
@@ -280,7 +282,7 @@ def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
     elif mark.number:
         share = mark.error / abs(mark.number)
     else:
-        rule = "is open, and an error in its own unit points where it does"
+        rule = "is open, and an open number has its tolerance in percent"
         raise mark.refused(rule, "give the tolerance in percent")
     if share >= 1.0:
         raise mark.refused("is a tolerance of the whole number or more", "give less")
@@ -288,7 +290,7 @@ def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
     if not any(
         rotor.name in names and (rotor.unbalance != 0.0 or rotor.name in decided) for rotor in problem.engine.rotors
     ):
-        raise mark.refused("has nothing that could be off", "leave the tolerance out")
+        raise mark.refused("has a tolerance, but its unbalance is zero", "leave the tolerance out")
     return errors, share, ""
 
 
@@ -304,7 +306,9 @@ def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
 def _file_tolerance(mark: Mark) -> Tolerance:
     # any other number: the problem is rebuilt from the file
     if mark.number is None:
-        raise mark.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
+        raise mark.refused(
+            "is open, and among open numbers only masses and unbalances may have a tolerance", "fix it, or leave it out"
+        )
     if mark.scope is Scope.PIECE and not any(isinstance(part, int) for part in mark.path):
         raise mark.refused("is one number of the whole engine", "write batch, or leave the word out")
     gain = mark.error * (abs(mark.number) if mark.is_share else 1.0)
@@ -331,7 +335,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
         if table.rotor_mass is not None:
             raise Refused("tolerances.rotor_mass", None, "needs a grade, not an unbalance", "leave it out")
     elif table.rotor_mass is None:
-        rule = "is missing, and a grade is of a mass"
+        rule = "is missing, and a grade needs the mass of the rotor"
         raise Refused("tolerances.rotor_mass", None, rule, "add that of crankshaft, flywheel and clutch")
     else:
         permitted = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
@@ -362,7 +366,7 @@ def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext)
     """Return the problem with the lots of parts from CSV files."""
     engine = problem.engine
     if context.file.geared_inertias:
-        raise Refused("geared_inertias", None, "are not known of [assembly]", "leave one of the two out")
+        raise Refused("geared_inertias", None, "are not supported with [assembly]", "leave one of the two out")
     unit = measured(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
     lots = []
     for key, columns in COLUMNS.items():

@@ -143,6 +143,6 @@ TOLERANCES_PICTURE = ResultPicture(
 )
 ASSEMBLY_PICTURE = ResultPicture(
     "assembly",
-    "The best assembly of measured parts beside those at random.",
+    "The best assembly of measured parts, and random assemblies.",
     "laufruhe.extensions.robust.assembly_picture",
 )

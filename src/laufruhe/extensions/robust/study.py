@@ -177,8 +177,8 @@ _WORDS = {
     "mount": ("mean mount force of the drawing", "N"),
 }
 _RANDOM = {
-    "random": "added free force that this share of random engines keeps",
-    "mount_random": "mean mount force that this share of built engines keeps",
+    "random": "added free force that this share of random engines does not exceed",
+    "mount_random": "mean mount force that this share of built engines does not exceed",
 }
 
 

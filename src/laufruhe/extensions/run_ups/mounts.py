@@ -98,5 +98,5 @@ def _infeasible(problem: Problem, search: MountSearch, best: SearchResult | None
         names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, best.design.evaluation))
         nearest = f" (nearest misses by {best.design.violation:.3g} of a limit)"
     starts = sum(optimum.starts for optimum in search.optima)
-    message = f"no design found: from {starts} starts none keeps {names}{nearest}; relax it, or open more"
+    message = f"no design found: from {starts} starts none satisfies {names}{nearest}; relax it, or open more"
     return replace(result, status=Status.FAILED, message=message)

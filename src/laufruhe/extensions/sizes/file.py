@@ -102,12 +102,12 @@ def _with_gear_masses(
 
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
     if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
-        rule = "weighs running gear of plain slider-cranks on one crankshaft"
+        rule = "needs plain slider-cranks on one crankshaft"
         raise Refused(
             "running_gear.density", units.quantity_text(table.density, "kg/m^3"), rule, "give the masses in [engine]"
         )
     if any(part.master_bank is not None for part in parts):
-        rule = "sizes rods that work on the crank pin, and these are hinged to a master rod"
+        rule = "needs rods on the crank pin, and these are hinged to a master rod"
         raise Refused("running_gear", None, rule, "leave it out")
     with blamed_on("running_gear"):
         return RunningGear(
@@ -178,11 +178,13 @@ def _decisions(
     for name, size, value in _sizes_in_file(table, engine, bearings, bearing_parts):
         decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
-        raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
+        raise Refused("engine.rod_length", None, "is open, and [engine.rod] has a fixed length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in decisions):
         shortest = Open.from_value(engine.rod_length or math.inf).lower
         if engine.kind.is_free or engine.offset:
-            raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
+            raise Refused(
+                "engine.rod_length", None, "can be open only in layouts without offset", "fix it, or use a layout"
+            )
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
             length = units.quantity_text(shortest, "m")
             raise Refused("engine.rod_length", length, "does not let the crank turn", "raise its lower bound")

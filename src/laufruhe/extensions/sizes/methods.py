@@ -42,7 +42,7 @@ def _solve_mounted_sizes(problem: Problem) -> Result:
 ALONE = Method(
     "boxes of sizes", _ALONE, ProofStrength.EXACT, _solve_sizes, True, OF_SIZES_ALONE, _is_of_row_lengths,
     is_no_number, before="linear matrix inequalities",
-    proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move with it (Z13)",
+    proves="the optimum (Z12, Z14); with an open rod length within a gap, if kinks of a load move with it (Z13)",
 )  # fmt: skip
 WITH_STARS = Method(
     "stars, each with boxes of sizes", {Kind.STAR: BUILT, **_ALONE}, ProofStrength.EXACT,

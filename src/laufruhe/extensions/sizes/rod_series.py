@@ -149,7 +149,7 @@ def _with_remainder(series_at: RodSeries, lengths: Sequence[float], exact: Seque
             )
             remainder = max(remainder, size(pairs[0] - pairs[1]))
         if SAFETY * remainder > CONVERGED * max(map(size, series)):
-            raise ValueError("a bend of a load moves with the length of the rod")
+            raise ValueError("a kink of a load moves with the rod length")
         remainders.append(SAFETY * remainder)
     return replace(series_at, rest=np.array(remainders))
 

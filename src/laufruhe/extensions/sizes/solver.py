@@ -123,7 +123,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     if boxes is not None:
         words = f"local programs; lower bound on {outcome.divided.boxes} boxes of sizes"
     else:
-        rod = "; nothing bounds what the length of the rod makes of a load"
+        rod = "; no bound, because kinks of a load move with the rod length"
         words = f"local programs{rod if model.moves_rod else ''}"
     strength = (
         ProofStrength.RELAXED if boxes is None else ProofStrength.EXACT if boxes.is_whole else ProofStrength.PARTIAL

@@ -34,7 +34,7 @@ def solve_star_sizes(problem: Problem) -> Result:
         raise ValueError("nothing of the phasing is open")
     started = time.perf_counter()
     if phasing.continuous or phasing.throw_bounds is not None:
-        rule = "sizes are decided with even firing or with throws that are given"
+        rule = "open sizes need even firing or fixed throws"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
     if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MOST_STARS:
         many = f"more than {MOST_STARS} stars are open together with sizes"

@@ -77,7 +77,7 @@ def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
             ):
                 raise ModelError(
                     f"{part.name} and {neighbour.name} have no main bearing between them; "
-                    "webs are sized between two each"
+                    "stresses of webs need one on either side"
                 )
         shares += [partial(_lever, front.x, rear.x), partial(_lever, rear.x, front.x)]
     return _shared(engine, point, fidelity, shares)
@@ -109,7 +109,7 @@ def _shared(
 ) -> Spectrum:
     """Return sums of loads of rods, webs and weights, each times a function of its position along the crankshaft."""
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
-        raise ModelError("sections are sized of engines with one crankshaft")
+        raise ModelError("stresses are computed for engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
     by_rod = by_rod.reshape(len(shares), len(engine.slider_cranks))
     total = crank_forces(engine, point, fidelity).mapped(partial(np.einsum, "kc,ncd->nkd", by_rod))
@@ -124,7 +124,7 @@ def _shared(
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: Sequence[float]) -> Spectrum:
     total = Spectrum(engine.cycle.base_order, np.zeros((1, len(places)), dtype=complex))
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
-        raise ModelError("sections are sized of engines with one crankshaft")
+        raise ModelError("stresses are computed for engines with one crankshaft")
     for part in engine.slider_cranks:
         behind = np.array([float(part.x > x) for x in places])
         if behind.any():
@@ -138,7 +138,7 @@ def _span(engine: Engine, part: SliderCrank) -> tuple[Bearing, Bearing]:
     rear = [b for b in engine.bearings if b.shaft == part.shaft and b.x < part.x]
     if not front or not rear:
         raise ModelError(
-            f"the throw of {part.name} has no main bearing on one side; webs and pins are sized between two"
+            f"the throw of {part.name} has no main bearing on one side; stresses of webs and pins need two"
         )
     return min(front, key=lambda b: b.x), max(rear, key=lambda b: b.x)
 
@@ -171,7 +171,7 @@ def gear_of(engine: Engine) -> RunningGear:
     """Return the running gear of an engine; raise ModelError if it has none."""
     gear = engine.extra(RunningGear)
     if gear is None:
-        raise ModelError("sizes of the running gear are asked for, and none are given; add [running_gear]")
+        raise ModelError("a measure needs sizes of the running gear; add [running_gear]")
     return gear
 
 
@@ -272,7 +272,7 @@ def gear_mass(engine: Engine) -> float:
     """Return the mass of all crank pins, webs, shanks and piston pins [kg] (Z2)."""
     gear = gear_of(engine)
     if gear.density is None:
-        raise ModelError("the mass of the running gear is asked for, and its density is not given")
+        raise ModelError("the mass of the running gear needs a density; add running_gear.density")
     pins = {(part.shaft, part.x, round(part.throw, 9)): part for part in engine.slider_cranks}
     total = 0.0
     for part in pins.values():
