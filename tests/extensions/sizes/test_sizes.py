@@ -305,9 +305,9 @@ def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str, tmp_path
 @pytest.mark.parametrize(
     ("quantity", "rule"),
     [
-        ("maximum web stress", "none are given; add .running_gear."),
-        ("maximum rod stress", "none are given"),
-        ("running-gear mass", "none are given"),
+        ("maximum web stress", "needs sizes of the running gear; add .running_gear."),
+        ("maximum rod stress", "needs sizes of the running gear"),
+        ("running-gear mass", "needs sizes of the running gear"),
         ("maximum crank-pin bending stress", "cylinder 1 has no big end"),
         ("maximum journal stress", "bearing .* has no diameter or no width"),
     ],

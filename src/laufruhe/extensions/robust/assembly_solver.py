@@ -84,7 +84,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
         problem=problem, status=status if is_feasible else Status.FAILED,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
         limits=limit_values(problem, final), initial=initial, final=final,
-        message="" if is_feasible else "the best assembly violates a limit, which the choice of parts ignores; relax it",
+        message="" if is_feasible else "the best assembly violates a limit, which the choice ignores; relax it",
         error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
         details=search.result(chosen, [part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
