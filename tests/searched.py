@@ -5,7 +5,7 @@ from __future__ import annotations
 import laufruhe
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Result
 
 
@@ -18,7 +18,7 @@ def searched(problem: Problem, seconds: float | None = None) -> Result:
     assert result.certificate.lower_bound == 0.0
     assert result.certificate.method.startswith("local programs")
     assert result.objective is not None
-    assert result.final.violation(result.problem.limits) <= KEPT
-    if result.initial.violation(result.problem.limits) <= KEPT:
+    assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL
+    if result.initial.violation(result.problem.limits) <= FEASIBILITY_TOL:
         assert result.objective.value <= result.objective.initial
     return result

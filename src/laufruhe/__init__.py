@@ -132,14 +132,14 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
         If the engine cannot be evaluated, or has no operating point.
     """
     from laufruhe.machine import Engine
-    from laufruhe.solvers import state
+    from laufruhe.solvers import evaluate_only
 
     if isinstance(design, Engine):
-        return state(_engine_problem(design, points))
+        return evaluate_only(_engine_problem(design, points))
     if len(points):
         rule, remedy = "stand beside a problem, which has its own", "leave them out, or give the problem's engine"
         raise wrong_call("points", points, rule, remedy)
-    return state(_problem(design))
+    return evaluate_only(_problem(design))
 
 
 def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem:

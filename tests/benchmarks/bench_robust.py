@@ -13,7 +13,7 @@ from laufruhe.extensions.robust.tolerance import Law, Tolerances, tolerances_of
 from laufruhe.files.reader import load
 from laufruhe.present.tables import markdown_table
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import unbalances_of
+from laufruhe.solvers.conclusion import unbalance_values
 
 OUT = PAGES / "robust.md"
 ENGINES, PIECE = 1_000_000, 50_000
@@ -43,7 +43,7 @@ def main() -> None:
     started = time.process_time()
     result = solve(problem)
     spent = time.process_time() - started
-    built = BuiltEngines(problem, unbalances_of(problem, result), result.final.samples)
+    built = BuiltEngines(problem, unbalance_values(problem, result), result.final.samples)
     worst, rows = result.objective.value, []
     for how in LAWS:
         random, started, maximum, over = np.random.default_rng(2026), time.process_time(), 0.0, 0

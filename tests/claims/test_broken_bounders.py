@@ -26,7 +26,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cuts import Cut
 from laufruhe.solvers.boxes import places
-from laufruhe.solvers.conclusion import evaluate_design, known_of
+from laufruhe.solvers.conclusion import evaluate_design, witness_of
 from laufruhe.solvers.mounts import convex
 from laufruhe.solvers.mounts.bounds import mount_numbers
 from laufruhe.solvers.result import Status
@@ -98,7 +98,7 @@ def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None
     problem = laufruhe.load(INPUTS / "zero-width.toml")
     problem = replace(problem, search=replace(problem.search, boxes=None))
     design = evaluate_design(problem, [250e3])
-    known = known_of(design, mount_numbers(design))
+    known = witness_of(design, mount_numbers(design))
     found = divided_bound(problem, design.value, 1e-4 * design.value, known)
     assert 0.999 * design.value <= found.bound <= design.value * (1.0 + 1e-9)
     scaled(StiffnessBoxes, "_bounds", first_times(1.001))(monkeypatch)

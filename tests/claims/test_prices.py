@@ -252,4 +252,4 @@ def test_sides_within_two_percent_are_one_price() -> None:
     assert Price(3.0, 3.05).other is None
     assert Price(3.0, 3.1).other == 3.1
     assert (Price(1.0, 2.0) + Price.both(3.0)) == Price(4.0, 5.0)
-    assert Price(1e-9, 2.0).felt(1e-6) == Price(0.0, 2.0)
+    assert Price(1e-9, 2.0).floored(1e-6) == Price(0.0, 2.0)

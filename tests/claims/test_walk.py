@@ -26,7 +26,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve, walk
-from laufruhe.solvers.conclusion import decision_values, state
+from laufruhe.solvers.conclusion import decision_values, evaluate_only
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import with_star
@@ -95,11 +95,11 @@ def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
     result = solved(name)
     assert result.objective is not None
     lie = told_as_optimum(result)
-    found = walk.walked(result.problem, lie, 1.0)
+    found = walk.check_by_walk(result.problem, lie, 1.0)
     assert is_withheld(found, result.objective.value)
     assert found.objective is not None
     assert found.objective.value < 0.9999 * result.objective.initial
-    assert walk.walked(result.problem, result, 1.0) is result
+    assert walk.check_by_walk(result.problem, result, 1.0) is result
 
 
 @pytest.mark.slow
@@ -111,7 +111,7 @@ def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
         result, status=Status.INFEASIBLE, objective=None, certificate=None, decisions=(), final=result.initial,
         conflict=tuple(limit.name for limit in result.problem.limits), message="no design exists",
     )  # fmt: skip
-    found = walk.walked(result.problem, lie, 10.0)
+    found = walk.check_by_walk(result.problem, lie, 10.0)
     assert result.objective is not None
     assert is_withheld(found, result.objective.value)
     assert found.conflict == ()
@@ -128,7 +128,7 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     assert star.objective is not None
     claim = Certificate(Proof.GLOBAL, star.objective.value, 0.0, 0.0, "a false bound")
     lie = with_star(result.problem, phasing, star, candidate, claim, replace(ranked, ranking=ranked.ranking[rank:]))
-    found = walk.walked(result.problem, lie, 1.0)
+    found = walk.check_by_walk(result.problem, lie, 1.0)
     assert result.objective is not None
     assert is_withheld(found, result.objective.value)
     assert found.phasing is not None
@@ -143,24 +143,24 @@ def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> Non
     phasing, throws = problem.phasing, tuple(math.tau * k / 7 for k in range(7))
     layout = phasing.layout_of(Candidate(throws))
     candidate = Candidate(throws, next(lap_orders(phasing.cycle, layout, throws)))
-    star = state(replace(phasing.realise(candidate), phasing=None))
+    star = evaluate_only(replace(phasing.realise(candidate), phasing=None))
     assert star.objective is not None
     ranked = ranked_star(phasing, candidate, None, star.objective.value, 0.0, False)
     details = ranking_result(phasing, candidate, [ranked], 1, 1, "one star")
     result = with_star(problem, phasing, star, candidate, star.certificate, details)
-    start = walk._start(result)
+    start = walk._start_point(result)
     assert start.candidate is not None
     assert start.candidate.throws == pytest.approx(throws)
     assert start.candidate.firing_order == ranked.firing_orders[0].order
-    own = walk._Walk(result, start)
-    assert len(own._angles()) == 7 + 2
+    own = walk._LocalSearch(result, start)
+    assert len(own._angle_moves()) == 7 + 2
     # 21 pairs, alone; two of three pairs of ends in two ways, with their mirror images; and other firing orders
-    assert len(own._stars()) == 21 + 3 * 2 + walk.ORDERS
+    assert len(own._star_moves()) == 21 + 3 * 2 + walk.ORDERS
     unlisted = replace(details, ranking=(replace(ranked, firing_orders=()),))
     for without in (replace(result, phasing=None), replace(result, phasing=unlisted)):
-        start = walk._start(without)
+        start = walk._start_point(without)
         assert start.candidate is None
-        assert walk._Walk(without, start)._angles() == walk._Walk(without, start)._stars() == []
+        assert walk._LocalSearch(without, start)._angle_moves() == walk._LocalSearch(without, start)._star_moves() == []
 
 
 # --- channels and norms that nobody knows

@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import Result, solve, state
+from laufruhe.solvers import Result, evaluate_only, solve
 from problem_files import FOUR, MOUNTS, PROBLEMS, SECOND_ORDER_SHAFTS, loaded
 
 READY = PROBLEMS / "tractor-four-lanchester.toml"
@@ -193,4 +193,4 @@ def solved(text: str) -> Result:
 @cache
 def stated(text: str) -> Result:
     """The design of a text as given."""
-    return state(problem_of(text))
+    return evaluate_only(problem_of(text))

@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
-from laufruhe.solvers import state
+from laufruhe.solvers import evaluate_only
 from problem_files import FOUR, MOUNTS, PROBLEMS, open_unbalance, shaft
 
 NORMS = ("mean", "maximum", "rms", "peak to peak", "worst mean")
@@ -88,12 +88,12 @@ def problem_of(name: str) -> Problem:
 
 def model_of(problem: Problem) -> LiveModel:
     """Of the problem as it is given."""
-    return live_model(problem, state(problem))
+    return live_model(problem, evaluate_only(problem))
 
 
 def page_of(problem: Problem, folder: Path) -> Path:
     """A report with the live page, without pictures."""
-    result = state(problem)
+    result = evaluate_only(problem)
     path = folder / "report.html"
     path.write_text(as_html(result_document(result, [], "laufruhe"), {}, live_model(problem, result)), encoding="utf-8")
     return path

@@ -23,8 +23,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
-from laufruhe.solvers import state
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers import evaluate_only
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of, with_unknown_norm
 from problem_files import PROBLEMS
 
@@ -124,7 +124,7 @@ def test_a_problem_with_nothing_open_has_no_sliders():
 
 
 def test_headings_of_a_live_report_can_be_gone_to(every):
-    result = state(every[0])
+    result = evaluate_only(every[0])
     page = as_html(result_document(result, ["polar"], "laufruhe"), {"polar": "<svg/>"}, every[1])
     targets = re.findall('<h2 id="([^"]*)"', page)
     assert targets[1:3] == ["try", "pictures"]
@@ -200,7 +200,7 @@ def test_a_served_page_takes_its_reference_from_its_server(every):
 
 
 @pytest.mark.parametrize(
-    ("script", "name", "value"), [("signals.js", "BEHIND", JUMP_OFFSET), ("judge.js", "KEPT", KEPT)]
+    ("script", "name", "value"), [("signals.js", "BEHIND", JUMP_OFFSET), ("judge.js", "KEPT", FEASIBILITY_TOL)]
 )
 def test_scripts_have_the_constants_of_the_package(script: str, name: str, value: float) -> None:
     """A page reads jumps on the same side, and keeps limits as near, as the package."""

@@ -14,7 +14,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import state
+from laufruhe.solvers.conclusion import evaluate_only
 from laufruhe.solvers.mounts.stars import _method, _solve_best_again, _stars, _with_bounds
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
@@ -103,7 +103,7 @@ def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path)
 
 def test_how_stars_were_decided_is_counted(tmp_path):
     """Stars that stand, those of the ranking that were left out, and starts whose throws were moved."""
-    still = StarDesign(Candidate((0.0, math.pi)), state(problem_of(tmp_path, *parts(str(STARS[0])))))
+    still = StarDesign(Candidate((0.0, math.pi)), evaluate_only(problem_of(tmp_path, *parts(str(STARS[0])))))
     moved = replace(still, moved=True)
     each = "mounts and balance decided for each of"
     assert _method([still], 1) == f"{each} 1 star"
@@ -124,7 +124,7 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     monkeypatch.setattr("laufruhe.solvers.mounts.stars.with_mount_bounds", bounded)
     phasing = problem_of(tmp_path, *parts()).phasing
     found = [
-        StarDesign(Candidate(tuple(map(math.radians, star))), state(problem_of(tmp_path, *parts(str(star)))))
+        StarDesign(Candidate(tuple(map(math.radians, star))), evaluate_only(problem_of(tmp_path, *parts(str(star)))))
         for star in STARS
     ]
     found.sort(key=lambda star: star.value)
@@ -143,7 +143,7 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
 )
 def test_stars_that_may_still_be_the_best_are_searched_once_more(answer, names, tmp_path, monkeypatch):
     """Not those that had all starts, nor those whose bound is no better than the best; worse answers are not kept."""
-    given = state(problem_of(tmp_path, *parts(str(STARS[0]), search="[search]\nstarts = 2\n")))
+    given = evaluate_only(problem_of(tmp_path, *parts(str(STARS[0]), search="[search]\nstarts = 2\n")))
     problem = problem_of(tmp_path, *parts(search="[search]\nstarts = 8\n"))
 
     def star(name, value, bound, starts):

@@ -5,7 +5,7 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
-from laufruhe.solvers import solve, state
+from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.result import Status
 from phasing import engines
 
@@ -40,7 +40,7 @@ def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phas
     assert "\n" not in result.message
     if result.problem.phasing.throws is not None:
         # what cannot fire as given is no design to evaluate either
-        given = state(result.problem)
+        given = evaluate_only(result.problem)
         assert (given.status, given.message) == (result.status, result.message)
 
 

@@ -8,7 +8,7 @@ from lanes import first_fast
 from laufruhe.errors import InputError
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Status
 from phasing.random_problems import OPEN, RIGID, Writer
 from problem_files import loaded
@@ -35,7 +35,7 @@ def judge(problem):
     if result.status is Status.INFEASIBLE:
         assert result.message or result.conflict
         return
-    assert result.final.violation(result.problem.limits) <= KEPT
+    assert result.final.violation(result.problem.limits) <= FEASIBILITY_TOL
     assert phasing is None or phasing.intervals.holds(result.final.engine.firing_intervals, 1e-6)
     if given.violation(problem.limits) <= 0.0 and (phasing is None or phasing.throw_bounds is None):
         assert result.objective.value <= result.objective.initial * (1.0 + 1e-6) + 1e-9

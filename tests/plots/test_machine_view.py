@@ -17,7 +17,7 @@ from laufruhe.plots.machine_view import Scene, reaches
 from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
-from laufruhe.solvers import state
+from laufruhe.solvers import evaluate_only
 from picture_faults import faults_of
 from problem_files import PROBLEMS
 
@@ -68,7 +68,7 @@ def test_what_was_decided_is_marked() -> None:
     ],
 )  # fmt: skip
 def test_leads_masses_and_sizes_that_are_open_are_marked(name: str, cranks: int, pistons: int, rods: bool) -> None:
-    result = state(load(PROBLEMS / f"{name}.toml"))
+    result = evaluate_only(load(PROBLEMS / f"{name}.toml"))
     scene = Scene.from_result(result)
     assert (len(scene.cranks), len(scene.pistons), scene.rods) == (cranks, pistons, rods)
     labels = {text.get_text() for text in engine.figure(result).legends[0].get_texts()}
@@ -93,7 +93,7 @@ def test_the_engine_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 )
 def test_cylinders_are_numbered_where_they_do_not_cover_each_other(name: str, ahead: int, beside: int) -> None:
     problem = load(PROBLEMS / f"{name}.toml")
-    drawn = engine.figure(state(problem))
+    drawn = engine.figure(evaluate_only(problem))
     assert not faults_of(drawn, problem.title)
     front, side = drawn.axes
     for axes, count in ((front, ahead), (side, beside)):

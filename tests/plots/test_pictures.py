@@ -21,7 +21,7 @@ from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fit_line
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import channel_samples, place_measures
-from laufruhe.solvers import Result, state
+from laufruhe.solvers import Result, evaluate_only
 from picture_faults import drawn_texts, overlaps
 from problem_files import PROBLEMS, written
 
@@ -80,7 +80,7 @@ def test_polar_diagrams_are_the_samples() -> None:
 
 def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
     """Of a V engine that is not where the crank angle is zero (C5)."""
-    result = state(load(PROBLEMS / "vee-two-90.toml"))
+    result = evaluate_only(load(PROBLEMS / "vee-two-90.toml"))
     cycle, first = result.final.engine.cycle.angle, result.final.engine.cylinders[0]
     assert first.firing_angle > 0.1
     figure = polar.figure(result)
@@ -276,10 +276,10 @@ def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
     path = written(tmp_path, scenes.GIVEN)
     code = (
         "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
-        "from laufruhe.files.reader import load; from laufruhe.solvers import state\n"
+        "from laufruhe.files.reader import load; from laufruhe.solvers import evaluate_only\n"
         "from laufruhe.plots import figures, get_ready, save\n"
         "get_ready()\n"
-        "drawn = dict(figures(state(load(sys.argv[1]))))\n"
+        "drawn = dict(figures(evaluate_only(load(sys.argv[1]))))\n"
         "assert len(drawn) == 5\n"
         "save(drawn['bars'], Path(sys.argv[2]) / 'bars.png')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"

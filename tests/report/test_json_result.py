@@ -22,7 +22,7 @@ from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show
 from laufruhe.report.wording import fired
-from laufruhe.solvers import Result, state
+from laufruhe.solvers import Result, evaluate_only
 from problem_files import PROBLEMS
 from report.result_schema import SCHEMA
 
@@ -183,7 +183,7 @@ minimise = "mean shaking force"
 def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     path = tmp_path / "twin.toml"
     path.write_text(TWIN, encoding="utf-8")
-    result, text = state(load(path)), io.StringIO()
+    result, text = evaluate_only(load(path)), io.StringIO()
     show(result, text)
     words = "Firing order 1-2-3, intervals 0, 180, 540 deg. Cylinder 1 and cylinder 2 fire at once."
     assert fired(result) == words
@@ -196,7 +196,7 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
 
 
 def test_a_steam_engine_does_not_fire() -> None:
-    steam = state(load(PROBLEMS / "steam-two-crank.toml"))
+    steam = evaluate_only(load(PROBLEMS / "steam-two-crank.toml"))
     assert fired(steam) == "Dead centres at the head end in the order 1-2, intervals 270, 90 deg."
 
 

@@ -23,7 +23,7 @@ from laufruhe.report.files import TABLES, result_files
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.report.tables import number_tables, write_tables
-from laufruhe.solvers import Result, state
+from laufruhe.solvers import Result, evaluate_only
 from problem_files import PROBLEMS, loaded
 from ready import solved
 
@@ -127,7 +127,7 @@ def test_the_same_numbers_make_the_same_files(
 
 @pytest.mark.slow
 def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
-    found = number_tables(state(load(PROBLEMS / "study-soft-mounts.toml")))
+    found = number_tables(evaluate_only(load(PROBLEMS / "study-soft-mounts.toml")))
     assert {"modes", "transmissibility", "forces"} <= set(found)
     assert any(head.startswith("travel at front left") for head in found["forces"].head)
     assert len(found["modes"].rows) == 6
@@ -152,7 +152,7 @@ def test_ranked_stars_are_a_sheet() -> None:
 
 def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
     text = scenes.GIVEN.replace("positions", 'names = ["=1+1", "b", "c", "d"]\npositions')
-    write_all(state(loaded(tmp_path, text)), tmp_path)
+    write_all(evaluate_only(loaded(tmp_path, text)), tmp_path)
     book = openpyxl.load_workbook(tmp_path / "tables.xlsx")
     cells = [cell for row in book["measures"].iter_rows() for cell in row if cell.value and "1+1" in str(cell.value)]
     assert cells
@@ -186,7 +186,7 @@ def test_a_file_is_named_after_the_table_that_it_holds() -> None:
 
 @pytest.mark.slow
 def test_what_only_the_report_knows_is_a_file_too() -> None:
-    result = state(load(PROBLEMS / "inline-five-torsion.toml"))
+    result = evaluate_only(load(PROBLEMS / "inline-five-torsion.toml"))
     found = number_tables(result)
     assert "crankshaft-torque" in found
     assert set(found) <= {name.removesuffix(".csv") for name in result_files()}
@@ -237,7 +237,7 @@ def test_a_workbook_that_cannot_be_written_is_an_error_of_files(tmp_path: Path) 
 @pytest.mark.slow
 def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
     """What the forces on the rods do over a turn is what the torque of the gas does."""
-    result = state(load(PROBLEMS / "waterworks-steam-pump.toml"))
+    result = evaluate_only(load(PROBLEMS / "waterworks-steam-pump.toml"))
     sheet = number_tables(result)["indicator"]
     stroke = {part.name: part.stroke for part in result.final.engine.slider_cranks}
     work = 0.0
@@ -255,7 +255,7 @@ def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
 @pytest.mark.slow
 def test_a_willans_line_is_a_file_with_its_readings() -> None:
     """The line of the file is that of NumPy's least squares, and meets no fuel at the friction."""
-    result = state(load(PROBLEMS / "car-four-willans.toml"))
+    result = evaluate_only(load(PROBLEMS / "car-four-willans.toml"))
     sheet, test = number_tables(result)["willans"], result.problem.friction[0]
     rows = [row for row in sheet.rows if row[0] == test.at]
     measured_rows = np.array([row[2:] for row in rows if row[1] == "measured"], dtype=float)
@@ -271,7 +271,7 @@ def test_a_willans_line_is_a_file_with_its_readings() -> None:
 @pytest.mark.slow
 def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
     """Wear counted load by load, and lengths that no turn changes, against the forces of the other file."""
-    found = number_tables(state(load(PROBLEMS / "tractor-four-bearings.toml")))
+    found = number_tables(evaluate_only(load(PROBLEMS / "tractor-four-bearings.toml")))
     forces, crank, wear = found["forces"], found["bearings-on-crank"], found["wear"]
     name = wear.head[3].removeprefix("wear of ").removesuffix(" [-]")
     point = crank.rows[0][0]
@@ -301,7 +301,7 @@ def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
 @pytest.mark.slow
 def test_what_turns_with_and_against_the_crank_adds_up_to_the_order() -> None:
     """Largest and least length of an order's ellipse are the sum and the difference of its two circles."""
-    result = state(load(PROBLEMS / "twin-vee-offset-pins.toml"))
+    result = evaluate_only(load(PROBLEMS / "twin-vee-offset-pins.toml"))
     sheet = number_tables(result)["turning-parts"]
     loads = result.final.loads[0]
     row = next(row for row in sheet.rows if row[1] == loads.point.name and row[2] == "force" and row[3] == 1)

@@ -18,7 +18,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.attainable_limits import with_attainable_limits
-from laufruhe.solvers.conclusion import KEPT, broken_limits, state
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, evaluate_only, violated_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible
 from laufruhe.solvers.result import Result
@@ -106,7 +106,7 @@ def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
     }  # fmt: skip
     result = solve(load_tables(told, Path("single.toml")))
     assert result.status.has_design
-    assert 0.0 < with_fine_sampling(result.final).violation(result.problem.limits) <= KEPT
+    assert 0.0 < with_fine_sampling(result.final).violation(result.problem.limits) <= FEASIBILITY_TOL
 
 
 def out_of_reach() -> Problem:
@@ -141,7 +141,7 @@ def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, maximum:
         }  # fmt: skip
         result = solve(load_tables(told, Path("single.toml")))
         assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-        assert not met or with_fine_sampling(result.final).violation(result.problem.limits) <= KEPT
+        assert not met or with_fine_sampling(result.final).violation(result.problem.limits) <= FEASIBILITY_TOL
 
 
 def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -> None:
@@ -152,8 +152,8 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
 
     def decide(asked: Problem) -> Result:
         result = solve(asked)
-        met.append(not broken_limits(problem.limits, result.final))
-        assert broken_limits(problem.limits, with_fine_sampling(result.final))
+        met.append(not violated_limits(problem.limits, result.final))
+        assert violated_limits(problem.limits, with_fine_sampling(result.final))
         return result
 
     result = with_attainable_limits(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
@@ -193,7 +193,7 @@ def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
     }  # fmt: skip
     told["mounts"]["places"][0]["stiffness"] = ["100 N/mm", "100 N/mm", {"between": ["50 N/mm", "200 N/mm"]}]
     problem = load_tables(told, Path("mounted.toml"))
-    assert broken_limits(problem.limits, evaluate(problem))
+    assert violated_limits(problem.limits, evaluate(problem))
     result = solve(problem)
     assert result.status.has_design
     (limit,) = result.limits
@@ -205,7 +205,7 @@ def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) 
     """The cycle has 964.63 N of second order, 48 angles have 967.06 N."""
     limits = [{"limit": "mean shaking force", "orders": [2], "max": maximum}]
     told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [], "constraints": limits}
-    design = StarDesign(Candidate((0.0,)), state(load_tables(told, Path("single.toml"))))
+    design = StarDesign(Candidate((0.0,)), evaluate_only(load_tables(told, Path("single.toml"))))
     assert not design.is_feasible
     assert design.is_infeasible is excluded
 
@@ -245,7 +245,7 @@ def test_stiffness_is_excluded_by_what_the_cycle_has(throw: float, samples: int,
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
 
 
 @pytest.mark.parametrize("samples", [48, 60])

@@ -25,7 +25,7 @@ from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design
 from laufruhe.solvers.cones.equal_designs import FREE, free_decisions, ranges_of
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import meaningful
+from laufruhe.solvers.values import relevant_decisions
 from problem_files import PROBLEMS
 
 ENGINE = {
@@ -177,7 +177,7 @@ def test_prices_within_the_accuracy_are_none() -> None:
 
 def test_an_angle_of_nothing_is_not_shown() -> None:
     result = solve(problem_of("rms mount force", [web("web") | {"angle": {"between": [0, 360]}}], {"orders": [2]}))
-    assert [decision.name for decision in meaningful(result.decisions)] == ["web.mass"]
+    assert [decision.name for decision in relevant_decisions(result.decisions)] == ["web.mass"]
     assert "web.angle" not in repr(result)
     assert tables(result)[0].rows[1][2] == "-"
 

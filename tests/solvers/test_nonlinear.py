@@ -15,7 +15,7 @@ from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
 from laufruhe.solvers.smooth.ipopt import Task, _kkt_residual
-from laufruhe.solvers.smooth.local_optimum import Ending, distinct, ends_in_words, is_explored
+from laufruhe.solvers.smooth.local_optimum import Ending, describe_starts, distinct_optima, is_explored
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
 
 
@@ -56,12 +56,14 @@ def test_where_starts_ended_is_said_in_plain_words():
     starts = [np.array([-1.0, 1.0]), np.array([0.5, 0.5])]
     stopped = solve_nonlinear(rosenbrock(), starts, max_seconds=0.0)
     met = solve_nonlinear(rosenbrock(), starts)
-    assert ends_in_words(stopped, len(distinct(stopped, 1.0))) == "IPOPT from 2 starts, none of which converged"
-    assert ends_in_words(stopped[:1], 0) == "IPOPT from 1 start, which never converged"
-    assert ends_in_words(met, 1) == "IPOPT from 2 starts, 2 of which ended at one and the same optimum"
-    assert ends_in_words([*met, *stopped], 2) == "IPOPT from 4 starts, 2 of which ended at 2 different optima"
-    assert ends_in_words([replace(met[0], starts=1)], 1) == "IPOPT from 1 start, which ended at an optimum"
-    assert ends_in_words([], 0) == "a design to start from"
+    assert (
+        describe_starts(stopped, len(distinct_optima(stopped, 1.0))) == "IPOPT from 2 starts, none of which converged"
+    )
+    assert describe_starts(stopped[:1], 0) == "IPOPT from 1 start, which never converged"
+    assert describe_starts(met, 1) == "IPOPT from 2 starts, 2 of which ended at one and the same optimum"
+    assert describe_starts([*met, *stopped], 2) == "IPOPT from 4 starts, 2 of which ended at 2 different optima"
+    assert describe_starts([replace(met[0], starts=1)], 1) == "IPOPT from 1 start, which ended at an optimum"
+    assert describe_starts([], 0) == "a design to start from"
 
 
 def test_no_later_stage_is_begun_after_the_time():
@@ -171,7 +173,7 @@ def test_many_starts_find_the_best_of_several_optima_in_every_order():
     values = set()
     for seed in range(3):
         found = solve_nonlinear(program, spread_starts(program.lower, program.upper, 16, seed), workers=1)
-        apart = distinct(found, 1.0)
+        apart = distinct_optima(found, 1.0)
         assert len(apart) >= 3
         assert [o.value for o in apart] == sorted(o.value for o in apart)
         values.add(round(found[0].value, 8))
@@ -192,7 +194,7 @@ def test_of_starts_with_one_end_one_goes_on_and_no_better_optimum_is_lost():
     starts = spread_starts(np.array([-4.0]), np.array([4.0]), 24)
     found = solve_nonlinear(waves(0.3), starts, workers=1, stop_when=lambda optima: False)
     alone = [solve_nonlinear(waves(0.3), [start], workers=1)[0] for start in starts]
-    apart = distinct(alone, 1.0, 1e-9)
+    apart = distinct_optima(alone, 1.0, 1e-9)
     assert len(found) == len(apart)
     assert found[0].value == pytest.approx(apart[0].value, abs=1e-12)
     stayed = 0

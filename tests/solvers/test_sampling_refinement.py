@@ -15,7 +15,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import best_bound
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.conclusion import KEPT, broken_limits
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, violated_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.throws.uneven_throws import evaluate_crank
 
@@ -48,7 +48,7 @@ def test_leads_keep_limits_over_the_cycle(maximum: float, met: bool) -> None:
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
 
 
 def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> None:
@@ -56,7 +56,7 @@ def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> N
     limit = {"name": "second", "limit": "mean shaking force", "orders": [2], "max": "962 N"}
     told = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])
     assert evaluate(told).violation(told.limits) <= 0.0
-    assert broken_limits(told.limits, with_fine_sampling(evaluate(told))) == ("second",)
+    assert violated_limits(told.limits, with_fine_sampling(evaluate(told))) == ("second",)
 
 
 def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:

@@ -14,7 +14,7 @@ from cli import scenes
 from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.numerics.budget import is_time_over, limit_time, seconds_left, timed_rounds, until_time_limit
-from laufruhe.solvers.methods import CUT_SHORT, Status, solve
+from laufruhe.solvers.methods import TIME_LIMIT_NOTE, Status, solve
 from problem_files import PROBLEMS, written
 
 # a problem of every kind of search, and what its whole search finds
@@ -55,7 +55,7 @@ def test_the_best_so_far_with_a_bound_that_holds(name: str) -> None:
     assert result.certificate.lower_bound <= result.objective.value
     assert result.certificate.lower_bound <= OPTIMA[name]
     if result.status is Status.FEASIBLE:
-        assert CUT_SHORT in result.certificate.method
+        assert TIME_LIMIT_NOTE in result.certificate.method
 
 
 def test_a_limit_that_is_not_reached_changes_nothing() -> None:
@@ -81,7 +81,7 @@ def test_solve_by_command(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, words).exit_code == 0
     found = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert found["status"] == "feasible"
-    assert CUT_SHORT in found["certificate"]["method"]
+    assert TIME_LIMIT_NOTE in found["certificate"]["method"]
 
 
 SWEEP = f"""

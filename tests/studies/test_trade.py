@@ -20,8 +20,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
-from laufruhe.solvers.conclusion import decision_values, state
-from laufruhe.solvers.warm_start import NEAR_BOXES, _begun, _is_like, first_of, next_to
+from laufruhe.solvers.conclusion import decision_values, evaluate_only
+from laufruhe.solvers.warm_start import NEAR_BOXES, _is_similar, _started_at, first_search, reoptimise
 from laufruhe.studies.trade import Trade, TradeRow, trade
 from problem_files import PROBLEMS
 
@@ -57,10 +57,10 @@ def test_a_design_beyond_a_limit_is_no_decision() -> None:
 def test_a_cheap_model_may_take_another_star() -> None:
     """One that the reference ranks far behind: what a fidelity decides is what a whole search of it decides."""
     problem, cheap = load(PROBLEMS / "inline-five-torsion.toml"), Fidelity(samples=96, orders=4, gas_samples=1440)
-    known = first_of(problem.at(Fidelity()))
+    known = first_search(problem.at(Fidelity()))
     assert known is not None
     whole = laufruhe.solve(problem.at(cheap))
-    found = _worth(problem, next_to(problem.at(cheap), known))
+    found = _worth(problem, reoptimise(problem.at(cheap), known))
     assert found == pytest.approx(_worth(problem, whole.final.engine), rel=1e-6)
     assert found > 1.1 * _worth(problem, known.final.engine)
 
@@ -68,12 +68,12 @@ def test_a_cheap_model_may_take_another_star() -> None:
 def test_a_design_known_is_trusted_where_it_is_worth_about_the_same() -> None:
     """Its force goes with the square of the speed: 1.04 of it is 1.08 of the force, 1.1 of it 1.21."""
     problem = scenes.problem_of(scenes.TIGHT)
-    known = state(replace(problem, decisions=()))
+    known = evaluate_only(replace(problem, decisions=()))
     (point,) = problem.points
     for factor, is_like in ((1.0, True), (1.04, True), (0.96, True), (1.1, False), (0.9, False)):
         faster = replace(problem, points=(replace(point, speed=factor * point.speed),))
-        assert _is_like(faster, known) is is_like
-    assert not _is_like(problem, replace(known, objective=None))
+        assert _is_similar(faster, known) is is_like
+    assert not _is_similar(problem, replace(known, objective=None))
 
 
 def test_a_search_begins_at_the_design_known_and_nowhere_else() -> None:
@@ -82,16 +82,16 @@ def test_a_search_begins_at_the_design_known_and_nowhere_else() -> None:
     sides = [(d.set.lower + 0.25 * (d.set.upper - d.set.lower)) * d.set.directions[0] for d in problem.decisions]
     values = [v.real if d.place_drives else v for d, v in zip(problem.decisions, sides, strict=True)]
     moved = problem.fixed_at(values)
-    known = state(replace(moved, decisions=()))
+    known = evaluate_only(replace(moved, decisions=()))
     entries = tuple(e for d, v in zip(problem.decisions, values, strict=True) for e in decision_values(d, v))
-    begun = _begun(problem, replace(known, problem=problem, decisions=entries))
+    begun = _started_at(problem, replace(known, problem=problem, decisions=entries))
     assert [d.start for d in begun.decisions] == pytest.approx(values)
     assert begun.engine == moved.engine
     assert (begun.search.starts, begun.search.boxes, begun.search.proves) == (1, NEAR_BOXES, False)
     rigid = scenes.problem_of(scenes.TIGHT)
-    held = replace(state(replace(rigid, decisions=())), problem=rigid, decisions=())
+    held = replace(evaluate_only(replace(rigid, decisions=())), problem=rigid, decisions=())
     told = tuple(e for d in rigid.decisions for e in decision_values(d, d.start))
-    assert _begun(rigid, replace(held, decisions=told)).search.boxes == 0
+    assert _started_at(rigid, replace(held, decisions=told)).search.boxes == 0
 
 
 @pytest.mark.slow
@@ -99,9 +99,9 @@ def test_a_search_begins_at_the_design_known_and_nowhere_else() -> None:
 def test_nothing_is_lost_by_searching_nearby(name: str) -> None:
     """By its own measure a fidelity that is about right finds a design no worse than a search from nothing does."""
     problem, cheap = load(PROBLEMS / f"{name}.toml"), Fidelity(samples=360, orders=8, gas_samples=1440)
-    known, own = first_of(problem.at(Fidelity())), problem.at(cheap)
+    known, own = first_search(problem.at(Fidelity())), problem.at(cheap)
     assert known is not None
-    anew, near = first_of(own), next_to(own, known)
+    anew, near = first_search(own), reoptimise(own, known)
     assert anew is not None
     assert near is not None
     values = [objective_value(own, evaluate(own, engine)) for engine in (near, anew.final.engine)]

@@ -32,9 +32,9 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
     def as_given() -> str:
         from laufruhe.report.json_result import as_json
-        from laufruhe.solvers import state
+        from laufruhe.solvers import evaluate_only
 
-        return as_json(state(problem, to_start_from=True))
+        return as_json(evaluate_only(problem, to_start_from=True))
 
     return f"ok: {problem.summary}\n", as_given
 

@@ -36,9 +36,9 @@ def run(request: Request, answer: Answer) -> None:
 
 def evaluate(problem: Problem, _: Listener) -> Result:
     """Return the result of the design as given."""
-    from laufruhe.solvers import state
+    from laufruhe.solvers import evaluate_only
 
-    return state(problem)
+    return evaluate_only(problem)
 
 
 def solve(problem: Problem, listener: Listener) -> Result:
@@ -48,7 +48,7 @@ def solve(problem: Problem, listener: Listener) -> Result:
     try:
         return solvers.solve(replace(problem, sharply=True), listener, further=True)
     except SolverError as error:
-        return replace(solvers.state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
+        return replace(solvers.evaluate_only(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
 
 def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Callable[[], None]]:

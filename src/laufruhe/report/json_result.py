@@ -27,7 +27,7 @@ from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
-from laufruhe.solvers.values import AttainableLimit, Nearest, ObjectiveValue
+from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue
 
 Record = dict[str, Any]
 
@@ -291,5 +291,5 @@ def _reached(result: Result) -> Record:
     }
 
 
-def _values(design: AttainableLimit | Nearest) -> Record:
+def _values(design: AttainableLimit | NearestDesign) -> Record:
     return {"decisions": {d.name: _attributes(d, "value unit") for d in design.decisions}}

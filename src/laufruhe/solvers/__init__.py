@@ -9,12 +9,12 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from laufruhe.solvers.conclusion import state
+    from laufruhe.solvers.conclusion import evaluate_only
     from laufruhe.solvers.methods import METHODS, solve
     from laufruhe.solvers.result import Result, Status
 else:
     _HOMES = dict.fromkeys(("METHODS", "solve"), "methods")
-    _HOMES |= {"state": "conclusion", "Result": "result", "Status": "result"}
+    _HOMES |= {"evaluate_only": "conclusion", "Result": "result", "Status": "result"}
 
     def __getattr__(name: str) -> object:
         if name not in _HOMES:
@@ -22,4 +22,4 @@ else:
         return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
 
 
-__all__ = ["METHODS", "Result", "Status", "solve", "state"]
+__all__ = ["METHODS", "Result", "Status", "evaluate_only", "solve"]

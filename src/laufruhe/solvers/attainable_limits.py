@@ -23,18 +23,18 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import (
-    KEPT,
-    broken_limits,
-    contradiction,
+    FEASIBILITY_TOL,
+    conflict_message,
     infeasible_result,
     limit_values,
-    nearest_of,
-    quoted,
-    read_under,
+    nearest_record,
+    quote_names,
+    refine_objective,
+    violated_limits,
 )
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import AttainableLimit, Nearest, ObjectiveValue
+from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 LEAST_SECONDS = 10.0
@@ -46,11 +46,11 @@ LONG = "there was no time left for it; give more by a time limit"
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """Attainable value of one limit with its result; `is_none` is True if no design keeps the other limits."""
+    """Attainable value of one limit with its result; `is_infeasible` is True if no design keeps the other limits."""
 
-    told: AttainableLimit
+    attainable: AttainableLimit
     result: Result | None = None
-    is_none: bool = False
+    is_infeasible: bool = False
 
 
 def with_attainable_limits(
@@ -74,57 +74,57 @@ def with_attainable_limits(
     solve
         Solver of any problem.
     """
-    names = _wanted(result, problem)
+    names = _violated_names(result, problem)
     limits = [limit for limit in problem.limits if limit.name in names]
     # the largest violation of the nearest design comes first
     limits.sort(key=lambda limit: result.nearest is None or limit.name != result.nearest.name)
     if not limits or any(extra.open_names for extra in problem.extras):
         return result
     is_core = not problem.extras and not problem.ranks
-    solve, answers = partial(_surely, solve, problem) if is_core else solve, []
+    solve, answers = partial(_solve_with_fine_sampling, solve, problem) if is_core else solve, []
     # a time limit of the caller replaces the default
     seconds = None if math.isfinite(seconds_left()) else max(LEAST_SECONDS, spent)
     with limit_time(seconds), search_scope(result.message or str(result.status)):
         for k, limit in enumerate(limits):
             report_progress("what limits can reach", k, len(limits))
             with search_scope(f"what '{limit.name}' can reach"), limit_time(seconds_left() / (len(limits) - k)):
-                answers.append(_in_time(_answer(limit, problem, kinds, result, solve)))
-        if len(result.conflict) > 1 and any(answer.is_none for answer in answers):
-            result = _narrowed(result, problem, solve)
+                answers.append(_mark_time_limit(_find_attainable(limit, problem, kinds, result, solve)))
+        if len(result.conflict) > 1 and any(answer.is_infeasible for answer in answers):
+            result = _shrink_conflict(result, problem, solve)
     designs = [answer.result for answer in answers if answer.result is not None]
     for candidate in designs:
-        if is_core and candidate.final.violation(problem.limits) <= KEPT:
-            return _recovered(result, problem, candidate)
-    names = _wanted(result, problem)
-    result = replace(result, reached=tuple(answer.told for answer in answers if answer.told.name in names))
+        if is_core and candidate.final.violation(problem.limits) <= FEASIBILITY_TOL:
+            return _feasible_result(result, problem, candidate)
+    names = _violated_names(result, problem)
+    result = replace(result, reached=tuple(answer.attainable for answer in answers if answer.attainable.name in names))
     if result.status is Status.FAILED and is_core:
-        result = _excluded(result, problem)
-    near = _nearest(result, problem, designs) if is_core and result.status is Status.FAILED else None
+        result = _infeasible_by_bound(result, problem)
+    near = _nearest_design(result, problem, designs) if is_core and result.status is Status.FAILED else None
     return replace(result, nearest=near)
 
 
-def _surely(solve: Solve, problem: Problem, part: Problem) -> Result:
+def _solve_with_fine_sampling(solve: Solve, problem: Problem, part: Problem) -> Result:
     # P7: means of few samples are inexact, so more samples settle a doubt about feasibility
     result = solve(part)
     if not result.status.has_design or result.objective is None:
         return result
     load_limits, fine = [limit for limit in problem.limits if limit.measure.is_load], with_fine_sampling(result.final)
-    if (result.final.violation(load_limits) <= KEPT) is (fine.violation(load_limits) <= KEPT):
+    if (result.final.violation(load_limits) <= FEASIBILITY_TOL) is (fine.violation(load_limits) <= FEASIBILITY_TOL):
         return result
     value = objective_value(result.problem, fine)
     return replace(result, final=fine, objective=replace(result.objective, value=value))
 
 
-def _wanted(result: Result, problem: Problem) -> Collection[str]:
+def _violated_names(result: Result, problem: Problem) -> Collection[str]:
     if result.status is Status.INFEASIBLE:
         return result.conflict
     violated = (
-        broken_limits(problem.limits, result.final) if result.decisions else result.nearest and result.nearest.broken
+        violated_limits(problem.limits, result.final) if result.decisions else result.nearest and result.nearest.broken
     )
     return violated or [limit.name for limit in problem.limits]
 
 
-def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
+def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
     """Return the attainable value of a limit under the others; its lower side if the upper one is not the cause."""
     measure, default = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
@@ -150,24 +150,24 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Res
         )
         try:
             if measure.channel.minimised and side == "at most":
-                answer = _minimum(entry, _asking(problem, (Term(measure),), limits), solve)
+                answer = _minimise(entry, _subproblem(problem, (Term(measure),), limits), solve)
             else:
-                answer = _at_edges(entry, one_side, problem, limits, result.status, solve)
+                answer = _bisect(entry, one_side, problem, limits, result.status, solve)
         except LaufruheError as error:
             return _Answer(replace(entry, why=str(error)))
-        if not answer.is_none:
+        if not answer.is_infeasible:
             break
     return answer
 
 
-def _in_time(answer: _Answer) -> _Answer:
-    entry = answer.told
+def _mark_time_limit(answer: _Answer) -> _Answer:
+    entry = answer.attainable
     return replace(
-        answer, told=replace(entry, ended=is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL)
+        answer, attainable=replace(entry, ended=is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL)
     )
 
 
-def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
+def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
     # decisions that affect nothing here are left out
     part = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
     if problem.phasing is not None:
@@ -177,11 +177,11 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
     return part.changed(decisions=decisions)
 
 
-def _minimum(entry: AttainableLimit, part: Problem, solve: Solve) -> _Answer:
+def _minimise(entry: AttainableLimit, part: Problem, solve: Solve) -> _Answer:
     """Return the attainable value of a measure by minimising it under the other limits."""
     result = solve(part)
     if not result.status.has_design or result.objective is None:
-        return _none(entry, result)
+        return _answer_without_design(entry, result)
     proof = result.certificate
     return _Answer(
         replace(
@@ -195,63 +195,63 @@ def _minimum(entry: AttainableLimit, part: Problem, solve: Solve) -> _Answer:
     )
 
 
-def _none(entry: AttainableLimit, result: Result) -> _Answer:
+def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
     # the other limits have no design either
     if result.status is Status.INFEASIBLE:
-        names = quoted(result.conflict)
+        names = quote_names(result.conflict)
         reason = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
-        return _Answer(replace(entry, why=reason), is_none=True)
+        return _Answer(replace(entry, why=reason), is_infeasible=True)
     return _Answer(replace(entry, why=LONG if is_time_over() else "no design was found that keeps the other limits"))
 
 
-def _narrowed(result: Result, problem: Problem, solve: Solve) -> Result:
+def _shrink_conflict(result: Result, problem: Problem, solve: Solve) -> Result:
     # shrink the conflict: limits that conflict on one star may be met on another
     limits = [limit for limit in problem.limits if limit.name in result.conflict]
 
     def excluded(subset: Sequence[Limit]) -> bool:
-        part = _asking(problem, problem.objective, tuple(subset))
+        part = _subproblem(problem, problem.objective, tuple(subset))
         return not is_time_over() and solve(part).status is Status.INFEASIBLE
 
     names = smallest_conflict(limits, excluded)
-    return result if len(names) == len(limits) else replace(result, conflict=names, message=contradiction(names))
+    return result if len(names) == len(limits) else replace(result, conflict=names, message=conflict_message(names))
 
 
-def _at_edges(
+def _bisect(
     entry: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
 ) -> _Answer:
     """Return the attainable value of a limit by bisection between the limit and the value of a design without it."""
     is_maximum = entry.side == "at most"
-    unlimited = solve(_asking(problem, problem.objective, others))
+    unlimited = solve(_subproblem(problem, problem.objective, others))
     if not unlimited.status.has_design:
-        return _none(entry, unlimited)
-    nearest, value = unlimited, _extreme(unlimited, limit, is_maximum)
+        return _answer_without_design(entry, unlimited)
+    nearest, value = unlimited, _extreme_value(unlimited, limit, is_maximum)
     unreached, bound = entry.limit, entry.limit if status is Status.INFEASIBLE else math.nan
     for _ in until_time_limit(range(HALVINGS)):
         if abs(value - unreached) <= CLOSE * abs(entry.limit):
             break
         middle = 0.5 * (value + unreached)
         bisected = replace(limit, maximum=middle) if is_maximum else replace(limit, minimum=middle)
-        candidate = solve(_asking(problem, problem.objective, (*others, bisected)))
+        candidate = solve(_subproblem(problem, problem.objective, (*others, bisected)))
         if candidate.status.has_design:
-            nearest, value = candidate, _extreme(candidate, limit, is_maximum)
+            nearest, value = candidate, _extreme_value(candidate, limit, is_maximum)
         else:
             unreached, bound = middle, middle if candidate.status is Status.INFEASIBLE else bound
     proven = Proof.WITHIN_GAP if bound == unreached else Proof.LOCAL
     return _Answer(replace(entry, value=value, bound=bound, proof=proven, decisions=nearest.decisions), nearest)
 
 
-def _extreme(result: Result, limit: Limit, is_maximum: bool) -> float:
+def _extreme_value(result: Result, limit: Limit, is_maximum: bool) -> float:
     values = result.final.values(limit.measure)
     return (max if is_maximum else min)(values, default=limit.maximum if is_maximum else limit.minimum)
 
 
-def _recovered(result: Result, problem: Problem, candidate: Result) -> Result:
+def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Result:
     """Return a feasible design that the search found, with the lower bound of the original objective."""
     bound, zero_level = (
         result.certificate.lower_bound if result.certificate else 0.0,
         numerical_zero(problem, candidate.final.engine),
     )
-    reading = read_under(problem, candidate.final, objective_value(problem, candidate.final), bound, zero_level)
+    reading = refine_objective(problem, candidate.final, objective_value(problem, candidate.final), bound, zero_level)
     candidate, value = replace(candidate, final=reading.evaluation), reading.value
     method = f"found while {candidate.problem.objective_name} was minimised"
     proof = make_certificate(
@@ -273,10 +273,10 @@ def _recovered(result: Result, problem: Problem, candidate: Result) -> Result:
     )
 
 
-def _excluded(result: Result, problem: Problem) -> Result:
+def _infeasible_by_bound(result: Result, problem: Problem) -> Result:
     # the problem is infeasible if the lower bound of a limited measure exceeds its limit
     for entry in result.reached:
-        if entry.side == "at most" and entry.bound > entry.limit * (1.0 + KEPT):
+        if entry.side == "at most" and entry.bound > entry.limit * (1.0 + FEASIBILITY_TOL):
             names = tuple(limit.name for limit in problem.limits)
             others = " that keeps the other limits" if len(names) > 1 else ""
             infeasible = infeasible_result(problem, result.initial, names, result.timing)
@@ -285,8 +285,8 @@ def _excluded(result: Result, problem: Problem) -> Result:
     return result
 
 
-def _nearest(result: Result, problem: Problem, designs: Sequence[Result]) -> Nearest | None:
+def _nearest_design(result: Result, problem: Problem, designs: Sequence[Result]) -> NearestDesign | None:
     # the design with the smallest violation
     known = [result.nearest] if result.nearest is not None else []
-    known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, result) if not r.final.resonance]
+    known += [nearest_record(problem, r.final, r.decisions) for r in (*designs, result) if not r.final.resonance]
     return min(known, key=lambda candidate: candidate.violation, default=None)

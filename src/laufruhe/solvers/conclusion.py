@@ -27,21 +27,21 @@ from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import why_no_order
-from laufruhe.solvers.values import DecisionValue, LimitValue, Nearest, ObjectiveValue
+from laufruhe.solvers.values import DecisionValue, LimitValue, NearestDesign, ObjectiveValue
 
 FEASIBLE = 1e-6
 """Relative violation of a limit that counts as zero."""
-KEPT = 10.0 * FEASIBLE
+FEASIBILITY_TOL = 10.0 * FEASIBLE
 """Largest relative violation of a feasible design."""
-STEEP = 10.0
+VIOLATION_PENALTY = 10.0
 """Penalty of a witness: its objective rises by this factor times its relative violation, since prices are unknown."""
-READINGS = 3
+MOST_REFINEMENTS = 3
 """Largest number of refinements of the samples while a lower bound exceeds the objective."""
 # prices below this share of the objective are rounding errors
 _PRICE_FLOOR = 1e-7
 # a limit is active if relaxing it by all of its value gains more than this share of the objective
 _ACTIVE_PRICE = 1e-3
-NEAR, STILL = 1e-3, 1e-9
+STEP, UNCHANGED = 1e-3, 1e-9
 """Step of a decision relative to its scale, and relative change of a measure that counts as none."""
 
 
@@ -70,7 +70,7 @@ class Design:
     @property
     def rank(self) -> tuple[bool, float]:
         """Sort key: smallest violation of limits first, then smallest objective."""
-        is_infeasible = self.violation > KEPT
+        is_infeasible = self.violation > FEASIBILITY_TOL
         return is_infeasible, self.violation if is_infeasible else self.value
 
 
@@ -129,15 +129,15 @@ def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
     return Design(problem, problem.start, initial, value, initial.violation(problem.limits))
 
 
-def better(design: Design, other: Design | None) -> Design:
+def better_design(design: Design, other: Design | None) -> Design:
     """Return the design with the smaller violation of limits; at equal violation, with the smaller objective."""
     if other is None:
         return design
-    return min((design, other), key=lambda candidate: (max(candidate.violation, KEPT), candidate.value))
+    return min((design, other), key=lambda candidate: (max(candidate.violation, FEASIBILITY_TOL), candidate.value))
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class SampledObjective:
     """Objective of a design at enough samples for a comparison with a lower bound.
 
     Attributes
@@ -155,10 +155,10 @@ class Reading:
     doubt: float
 
 
-def read_under(
+def refine_objective(
     problem: Problem, evaluation: Evaluation, value: float, bound: float, zero_level: float,
     prices: Mapping[Side, Price] | None = None,
-) -> Reading:  # fmt: skip
+) -> SampledObjective:  # fmt: skip
     """Return the objective of a design, with more samples while a lower bound exceeds it (P7).
 
     A bound holds for the mean over the cycle, and a mean of few samples may be smaller than that.
@@ -174,23 +174,25 @@ def read_under(
     prices
         Shadow prices of limits, which value violations within the tolerance.
     """
-    for _ in range(READINGS):
+    for _ in range(MOST_REFINEMENTS):
         if not is_over(bound, value, zero_level) or not any(is_sampled(term.measure) for term in problem.objective):
             break
         evaluation = with_fine_sampling(evaluation)
         value = objective_value(problem, evaluation)
-    return Reading(evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, zero_level) else 0.0)
+    return SampledObjective(
+        evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, zero_level) else 0.0
+    )
 
 
-def result_under(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
+def refine_result(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
     """Return a result with more samples while a bound exceeds its objective, and the error of that objective."""
     if result.objective is None:
         return result, 0.0
-    read = read_under(result.problem, result.final, result.objective.value, bound, zero_level, result.prices)
+    read = refine_objective(result.problem, result.final, result.objective.value, bound, zero_level, result.prices)
     return replace(result, final=read.evaluation, objective=replace(result.objective, value=read.value)), read.doubt
 
 
-def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
+def witness_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
     """Return a design as a witness of lower bounds; None if its violation is larger than `violation`.
 
     Parameters
@@ -206,8 +208,8 @@ def known_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witne
 
     def read() -> float:
         zero_level = numerical_zero(problem, evaluation.engine)
-        reading = read_under(problem, evaluation, design.value, math.inf, zero_level)
-        return reading.value * (1.0 + STEEP * max(design.violation, 0.0)) + reading.doubt + zero_level
+        reading = refine_objective(problem, evaluation, design.value, math.inf, zero_level)
+        return reading.value * (1.0 + VIOLATION_PENALTY * max(design.violation, 0.0)) + reading.doubt + zero_level
 
     return Witness(place, design.value, read)
 
@@ -246,10 +248,10 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
     initial_value = objective_value(problem, initial)
     baseline = Design(problem, problem.start, initial, initial_value, initial.violation(problem.limits))
     design = min(design, baseline, key=lambda candidate: candidate.rank)
-    is_feasible = design.violation <= KEPT
+    is_feasible = design.violation <= FEASIBILITY_TOL
     zero_level = numerical_zero(problem, design.evaluation.engine)
     if is_feasible:
-        reading = read_under(problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices)
+        reading = refine_objective(problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices)
         design = replace(design, evaluation=reading.evaluation, value=reading.value)
         certificate = make_certificate(
             design.value, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method,
@@ -266,13 +268,13 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
     proven = certificate.kind is Proof.GLOBAL
     message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
     if not is_feasible:
-        message = broken_message(problem, design.evaluation)
+        message = violation_message(problem, design.evaluation)
     return Result(
         problem=problem,
         status=Status.FAILED if not is_feasible else Status.OPTIMAL if proven else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, design.value, initial_value),
         certificate=certificate,
-        decisions=decided(design, proof.bounds, price_floor),
+        decisions=priced_decisions(design, proof.bounds, price_floor),
         limits=limits,
         initial=initial,
         final=design.evaluation,
@@ -282,13 +284,13 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
     )
 
 
-def broken_message(problem: Problem, evaluation: Evaluation) -> str:
+def violation_message(problem: Problem, evaluation: Evaluation) -> str:
     """Return a message that the best design found violates limits."""
-    broken = quoted(broken_limits(problem.limits, evaluation)) or "a limit"
+    broken = quote_names(violated_limits(problem.limits, evaluation)) or "a limit"
     return f"the best design found breaks {broken}; relax it, or open more"
 
 
-def state(problem: Problem, to_start_from: bool = False) -> Result:
+def evaluate_only(problem: Problem, to_start_from: bool = False) -> Result:
     """Evaluate the initial design without a change; infeasible if its throws have no permitted firing order.
 
     Parameters
@@ -314,14 +316,14 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
     )
 
 
-def quoted(names: Iterable[str]) -> str:
+def quote_names(names: Iterable[str]) -> str:
     """Return names in quotation marks, joined by "and"."""
     return " and ".join(f"'{name}'" for name in names)
 
 
-def contradiction(conflict: Sequence[str]) -> str:
+def conflict_message(conflict: Sequence[str]) -> str:
     """Return a message that no design meets all of the named limits."""
-    names = quoted(conflict) or "the bounds"
+    names = quote_names(conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return f"no design exists: {names} {verb}"
 
@@ -336,7 +338,7 @@ def infeasible_result(
         limits=limit_values(problem, initial),
         initial=initial,
         final=initial,
-        message=contradiction(conflict),
+        message=conflict_message(conflict),
         conflict=conflict,
         timing=timing,
     )
@@ -345,22 +347,22 @@ def infeasible_result(
 def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
     """Return a failed result: no feasible design was found, and none is proven not to exist."""
     message = (
-        f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
+        f"no design was found that keeps {quote_names(tuple(names))}, and none is excluded; relax it, or give more time"
     )
     return replace(infeasible_result(problem, initial, (), timing), status=Status.FAILED, message=message)
 
 
-def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
-    """Return names of limits whose relative violation is more than `KEPT`."""
-    return tuple(limit.name for limit in limits if evaluation.check_limit(limit).violation > KEPT)
+def violated_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
+    """Return names of limits whose relative violation is more than `FEASIBILITY_TOL`."""
+    return tuple(limit.name for limit in limits if evaluation.check_limit(limit).violation > FEASIBILITY_TOL)
 
 
-def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> Nearest:
+def nearest_record(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> NearestDesign:
     """Return the record of an infeasible design: its decisions, and the limit with the largest violation."""
     limit = max(problem.limits, key=lambda limit: design.check_limit(limit).violation)
     standing = design.check_limit(limit)
-    names = broken_limits(problem.limits, design)
-    return Nearest(
+    names = violated_limits(problem.limits, design)
+    return NearestDesign(
         limit.name,
         standing.side,
         standing.edge,
@@ -414,7 +416,7 @@ def _limit_value(
     is_priced = price.relaxed * abs(standing.edge) > _ACTIVE_PRICE * value and standing.violation >= -problem.tolerance
     active = bool(standing.violation >= -ACTIVE or is_priced)
     price = (
-        price.felt(price_floor * value / abs(standing.edge) if standing.edge else 0.0) if active else Price(0.0, 0.0)
+        price.floored(price_floor * value / abs(standing.edge) if standing.edge else 0.0) if active else Price(0.0, 0.0)
     )
     error = relative(missed(limit.measure, evaluation), standing.value)
     return LimitValue(
@@ -441,7 +443,7 @@ def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
         return True
     values, at_design = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
     steps = (
-        (decision, NEAR * decision.set.scale * (direction if decision.is_affine else 1.0))
+        (decision, STEP * decision.set.scale * (direction if decision.is_affine else 1.0))
         for decision in problem.decisions for direction in decision.set.directions
     )  # fmt: skip
     for decision, step in steps:
@@ -450,25 +452,26 @@ def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
         except ModelError:
             return True
         if len(shifted) != len(values) or any(
-            abs(x - y) > STILL * abs(x) for x, y in zip(values, shifted, strict=True)
+            abs(x - y) > UNCHANGED * abs(x) for x, y in zip(values, shifted, strict=True)
         ):
             return True
     return False
 
 
-def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
+def with_constant_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     """Return a result with further limits that no decision changes, in the order of `limits`."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     final, fine = result.final, with_fine_sampling(result.final)
     values = tuple(
-        known.get(limit) or _limit_value(problem, limit, fine if final.violation([limit]) > KEPT else final, {}, 0.0)
+        known.get(limit)
+        or _limit_value(problem, limit, fine if final.violation([limit]) > FEASIBILITY_TOL else final, {}, 0.0)
         for limit in limits
     )
     resonant = not known and result.final.resonance
     return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else values)
 
 
-def unbalances_of(problem: Problem, result: Result) -> list[complex]:
+def unbalance_values(problem: Problem, result: Result) -> list[complex]:
     """Return the unbalances of a result as complex numbers [kg m]."""
     return [complex(value) for value in values_of(replace(problem, decisions=problem.unbalances), result)]
 
@@ -486,7 +489,7 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
     return [value(decision) for decision in problem.decisions]
 
 
-def decided(
+def priced_decisions(
     design: Design, bounds: Mapping[str, Price] | None = None, price_floor: float = 0.0
 ) -> tuple[DecisionValue, ...]:
     """Return the decision values of a design, with shadow prices of active bounds.
@@ -509,7 +512,7 @@ def decided(
 def _priced(entry: DecisionValue, price: Price | None, minimum: float) -> DecisionValue:
     if price is None or not entry.at_bound:
         return entry
-    floored = price.felt(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
+    floored = price.floored(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
     return replace(entry, shadow_price=floored.relaxed, tightening_price=floored.other)
 
 

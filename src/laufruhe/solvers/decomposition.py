@@ -39,10 +39,10 @@ def _groups(problem: Problem) -> list[Kinds]:
 def is_separable(problem: Problem) -> bool:
     """Return True if flywheel or crankshaft are open with other numbers, and each measure depends on one group."""
     groups = [group for group in _groups(problem) if group]
-    return len(groups) > 1 and all(len(_movers(measure, groups, problem)) <= 1 for measure in problem.measures)
+    return len(groups) > 1 and all(len(_groups_of(measure, groups, problem)) <= 1 for measure in problem.measures)
 
 
-def _movers(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kinds]:
+def _groups_of(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kinds]:
     return [group for group in groups if group and depends(measure.channel, group, problem)]
 
 
@@ -55,7 +55,7 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
         If the objective depends on no decision of a group.
     """
     groups = _groups(problem)
-    by_group = {group: solve(part) for group, part in _parts(problem, groups).items()}
+    by_group = {group: solve(part) for group, part in _subproblems(problem, groups).items()}
     results = list(by_group.values())
     for result in results:
         if result.status is Status.INFEASIBLE:
@@ -76,7 +76,7 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
         problem=problem,
         status=next((r.status for r in results if r.status is Status.FAILED), _status(results)),
         objective=ObjectiveValue.of(problem, value, initial),
-        certificate=_together(results, value),
+        certificate=_joint_certificate(results, value),
         decisions=tuple(decisions.values()),
         limits=tuple(limits[limit] for limit in problem.limits),
         initial=evaluate_start(problem),
@@ -87,8 +87,8 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
     )
 
 
-def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
-    parts = {group: _part(problem, groups, group) for group in groups}
+def _subproblems(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
+    parts = {group: _subproblem(problem, groups, group) for group in groups}
     for part in parts.values():
         if part.decisions and not part.objective:
             what = part.decisions[0].name.split(".")[0]
@@ -96,11 +96,11 @@ def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
     return {group: part for group, part in parts.items() if part.decisions or part.objective or part.limits}
 
 
-def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
+def _subproblem(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
     # measures that depend on no group belong to the last one
 
     def belongs(measure: Measure) -> bool:
-        return (_movers(measure, groups, problem) or [groups[-1]])[0] == group
+        return (_groups_of(measure, groups, problem) or [groups[-1]])[0] == group
 
     return problem.changed(
         decisions=tuple(d for d in problem.decisions if d.kind in group),
@@ -114,7 +114,7 @@ def _status(results: list[Result]) -> Status:
     return Status.OPTIMAL if all(proven) else Status.FEASIBLE
 
 
-def _together(results: list[Result], value: float) -> Certificate:
+def _joint_certificate(results: list[Result], value: float) -> Certificate:
     """Return the certificate of the sum: lower bounds add up, and a part without decisions is its own bound."""
     pairs = [(r.certificate, r.objective.value if r.objective else 0.0) for r in results]
     bound = sum(objective if certificate is None else certificate.lower_bound for certificate, objective in pairs)

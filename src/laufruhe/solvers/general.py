@@ -66,7 +66,7 @@ def solve_generally(
     best = best_local_optimum(program, points, problem.search.starts)
     cone_decisions = tuple(decision for decision in problem.decisions if decision.kind in INNER)
     if 0 < len(cone_decisions) < len(problem.decisions) and by_cones(problem.changed(decisions=cone_decisions)):
-        best = _in_turns(program, best, decide)
+        best = _alternate_with_cones(program, best, decide)
     design = evaluate_design(problem, program.values(best))
     text = f"local programs from the best of {counted(len(points), 'start')}"
     proof = proof_data(program, design, 0.0, ProofStrength.RELAXED, text)
@@ -76,7 +76,7 @@ def solve_generally(
     return build_result(replace(design, problem=solved), initial, proof, timing)
 
 
-def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
+def _alternate_with_cones(program: LocalProgram, best: Array, decide: Decide) -> Array:
     """Alternate cone programs of `INNER` decisions and local programs of all while the objective falls."""
     problem = program.problem
     other_decisions = tuple(decision for decision in problem.decisions if decision.kind not in INNER)

@@ -41,7 +41,7 @@ def solve_in_order(problem: Problem, solve: Solve) -> Result:
     rank_limits: list[Limit] = []
     equal_by_rank: list[tuple[DecisionRange, ...]] = []
     for rank in problem.ranks:
-        result = _found(single.changed(objective=rank.terms), problem.limits, rank_limits, solve)
+        result = _solve_stage(single.changed(objective=rank.terms), problem.limits, rank_limits, solve)
         if not result.status.has_design or result.objective is None:
             if not stages:
                 return result
@@ -50,14 +50,14 @@ def solve_in_order(problem: Problem, solve: Solve) -> Result:
         limit = Limit(
             rank.terms[0].measure.name,
             rank.terms[0].measure,
-            _edge(result, max(rank.within, _least_room(rank.terms[0].measure))),
+            _limit_on(result, max(rank.within, _smallest_slack(rank.terms[0].measure))),
         )
         rank_limits.append(limit)
         equal_by_rank.append(equal_designs(result, limit) if len(rank.terms) == 1 else ())
-    return _together(problem, stages, rank_limits, equal_by_rank)
+    return _joint_result(problem, stages, rank_limits, equal_by_rank)
 
 
-def _edge(result: Result, slack: float) -> float:
+def _limit_on(result: Result, slack: float) -> float:
     # limit on this objective for later ranks; zero if it is numerically zero
     value = result.objective.value if result.objective else math.inf
     weight = result.problem.objective[0].weight
@@ -66,7 +66,7 @@ def _edge(result: Result, slack: float) -> float:
     return value / weight * (1.0 + slack)
 
 
-def _found(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], solve: Solve) -> Result:
+def _solve_stage(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], solve: Solve) -> Result:
     # relax the limits on earlier objectives until the solver finds a design
     for slack in WIDER:
         rank_limits[:] = [replace(limit, maximum=limit.maximum * (1.0 + slack)) for limit in rank_limits]
@@ -76,11 +76,11 @@ def _found(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], 
     return result
 
 
-def _least_room(measure: Measure) -> float:
+def _smallest_slack(measure: Measure) -> float:
     return SAMPLED if measure.is_load and not measure.norm.is_euclidean else CLOSE
 
 
-def _together(
+def _joint_result(
     problem: Problem, stages: list[Result], rank_limits: list[Limit], equal_by_rank: list[tuple[DecisionRange, ...]]
 ) -> Result:
     """Return the design of the last rank, with the proof of every rank."""
@@ -89,7 +89,7 @@ def _together(
     # ranks may have different samples, so the final design is evaluated at fine sampling (P7)
     final = with_fine_sampling(last.final)
     ranks = tuple(
-        _rank(stage, final, limit, last, k, count, designs)
+        _rank_value(stage, final, limit, last, k, count, designs)
         for k, (stage, limit, designs) in enumerate(zip(stages, rank_limits, equal_by_rank, strict=True))
     )
     message = last.message
@@ -122,12 +122,12 @@ def _together(
         initial=replace(first.initial, samples=last.final.samples),
         message=message,
         error=partial(largest_error, stages),
-        timing=_summed(stages),
+        timing=_total_timing(stages),
         ranks=ranks,
     )
 
 
-def _rank(
+def _rank_value(
     stage: Result, final: Evaluation, limit: Limit, last: Result, k: int, count: int, designs: tuple[DecisionRange, ...]
 ) -> RankValue:
     """Return the record of one rank: its optimum, and its value at the final design."""
@@ -158,7 +158,7 @@ def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) ->
     return replace(certificate, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
 
 
-def _summed(stages: list[Result]) -> dict[str, float]:
+def _total_timing(stages: list[Result]) -> dict[str, float]:
     total: dict[str, float] = {}
     for stage in stages:
         for name, took in stage.timing.items():

@@ -12,7 +12,7 @@ from laufruhe.problem.dependence import Dependence, dependence, open_kinds
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.accuracy import solve_within
+from laufruhe.solvers.accuracy import solve_accurately
 from laufruhe.solvers.result import Result
 
 # dependences on stars and optional shafts that methods of stars accept
@@ -110,4 +110,4 @@ class Method:
 
     def solve(self, problem: Problem) -> Result:
         """Return the best design, at a better fidelity if the method judges that and the design needs it."""
-        return solve_within(problem, self.solver) if self.judges_fidelity else self.solver(problem)
+        return solve_accurately(problem, self.solver) if self.judges_fidelity else self.solver(problem)

@@ -33,14 +33,14 @@ from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import (
-    KEPT,
+    FEASIBILITY_TOL,
     ProofData,
-    broken_limits,
     build_result,
     evaluate_design,
+    evaluate_only,
     infeasible_result,
-    state,
-    with_limits,
+    violated_limits,
+    with_constant_limits,
 )
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_polished
@@ -53,17 +53,17 @@ from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
-from laufruhe.solvers.walk import walked
+from laufruhe.solvers.walk import check_by_walk
 
-LIBRARIES = ("casadi", "clarabel", "cvxpy")
+OPTIONAL_PACKAGES = ("casadi", "clarabel", "cvxpy")
 """Optional packages that some methods import."""
-CUT_SHORT = "stopped at the time limit"
+TIME_LIMIT_NOTE = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 
 
 def solve_separable(problem: Problem) -> Result:
     """Solve groups of decisions that do not affect each other, each by its own method."""
-    return solve_decomposed(problem, _decided)
+    return solve_decomposed(problem, _solve_reduced)
 
 
 def solve_with_places(problem: Problem) -> Result:
@@ -83,7 +83,7 @@ def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) ->
     """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
     from laufruhe.solvers.general import solve_generally
 
-    return solve_generally(problem, _decided, lambda part: _method(part).solver is solve_polished, near)
+    return solve_generally(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, near)
 
 
 def _solve_flywheel(problem: Problem) -> Result:
@@ -149,8 +149,8 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
-_OWN: tuple[Method, ...] = (
-    Method("evaluation", {}, ProofStrength.EXACT, state, norms=lambda _: True,
+_CORE: tuple[Method, ...] = (
+    Method("evaluation", {}, ProofStrength.EXACT, evaluate_only, norms=lambda _: True,
            proves="the value itself"),
     Method("boxes of the flywheel", {_F: ()}, ProofStrength.EXACT, _solve_flywheel,
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
@@ -199,7 +199,7 @@ _OWN: tuple[Method, ...] = (
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
 
-METHODS: tuple[Method, ...] = in_order("methods", Method, _OWN)
+METHODS: tuple[Method, ...] = in_order("methods", Method, _CORE)
 """Methods in order of preference; the first one that suits a problem solves it."""
 
 
@@ -231,9 +231,9 @@ def solve(
         result: Result | None
         try:
             refuse(problem)
-            result = _decided(problem)
+            result = _solve_reduced(problem)
         except ModuleNotFoundError as error:
-            if error.name not in LIBRARIES:
+            if error.name not in OPTIONAL_PACKAGES:
                 raise
             why = f"what is open needs {error.name}, which is not installed; pip install {error.name}"
             raise SolverError(why) from None
@@ -241,39 +241,41 @@ def solve(
             if not is_time_over():
                 raise
             result = None
-        result = result if result is not None and not is_time_over() else _cut_short(problem, result)
+        result = result if result is not None and not is_time_over() else _at_time_limit(problem, result)
         # a method may have changed the problem, but its file is the same
         result = replace(result, problem=replace(result.problem, origin=problem.origin))
         if reports:
             return without_proof(result, reports[0])
-        result = walked(problem, result, time.thread_time() - spent)
+        result = check_by_walk(problem, result, time.thread_time() - spent)
         if not further or result.status is Status.FEASIBLE:
             return result
         if result.status is Status.OPTIMAL:
             return replace(result, free=free_decisions(result))
-        result = with_attainable_limits(result, problem, open_kinds(problem), time.perf_counter() - started, _decided)
+        result = with_attainable_limits(
+            result, problem, open_kinds(problem), time.perf_counter() - started, _solve_reduced
+        )
         return without_proof(result, reports[0]) if reports else result
 
 
-def _cut_short(problem: Problem, result: Result | None) -> Result:
+def _at_time_limit(problem: Problem, result: Result | None) -> Result:
     """Return the result at the time limit: the best design so far, or the initial design if it is feasible."""
     if result is None or result.status is Status.FAILED:
         with suppress(ModelError):
             initial = evaluate_design(problem, problem.start)
             if (
                 problem.phasing is None
-                and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= KEPT
+                and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= FEASIBILITY_TOL
             ):
-                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {CUT_SHORT}")
+                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {TIME_LIMIT_NOTE}")
                 return build_result(initial, initial.evaluation, proof, {})
     if result is None:
         raise SolverError("no design was found within the time limit; raise it")
     if result.status is Status.FAILED:
-        return replace(result, message=f"{result.message}; {CUT_SHORT}")
+        return replace(result, message=f"{result.message}; {TIME_LIMIT_NOTE}")
     certificate = result.certificate
     if certificate is None or certificate.kind is Proof.GLOBAL:
         return result
-    return replace(result, certificate=replace(certificate, method=f"{certificate.method}; {CUT_SHORT}"))
+    return replace(result, certificate=replace(certificate, method=f"{certificate.method}; {TIME_LIMIT_NOTE}"))
 
 
 def _method(problem: Problem) -> Method:
@@ -307,52 +309,52 @@ def refuse(problem: Problem) -> None:
         _refuse_long_cranks(problem)
 
 
-def _decided(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
+def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
     remaining = reductions() if remaining is None else remaining
     for k, reduction in enumerate(remaining):
         if reduction.applies(problem):
-            return reduction.solve(problem, _decided, partial(_decided, remaining=remaining[k + 1 :]))
-    return _by_method(problem)
+            return reduction.solve(problem, _solve_reduced, partial(_solve_reduced, remaining=remaining[k + 1 :]))
+    return _solve_by_method(problem)
 
 
-def _by_method(problem: Problem) -> Result:
+def _solve_by_method(problem: Problem) -> Result:
     """Solve a problem by the first method that suits it, with the bound of an exact method for part of its measures."""
     method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
     conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
-    closing = _closing(problem, kinds, method)
+    closing = _exact_part(problem, kinds, method)
     if closing is None:
         return method.solve(problem)
     other, relaxed = closing
     return solve_by_relaxation(problem, relaxed, other.solve, method.solve)
 
 
-def _refuse_any_rank(problem: Problem) -> None:
+def _refuse_ranks(problem: Problem) -> None:
     for rank in problem.ranks:
         refuse(problem.changed(ranks=(), objective=rank.terms))
 
 
-def _fixed_limits(problem: Problem) -> list[Limit]:
+def _constant_limits(problem: Problem) -> list[Limit]:
     kinds = open_kinds(problem)
     return [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
 
 
-def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result:
-    fixed = _fixed_limits(problem)
+def _without_constant_limits(problem: Problem, decide: Decide, _: Decide) -> Result:
+    fixed = _constant_limits(problem)
     initial = evaluate_start(problem)
     # raise ModelError first if the initial design cannot be evaluated
     objective_value(problem, initial)
     problem, least_shafts = exclude_collisions(problem, fixed, initial)
-    violated = broken_limits(fixed, with_fine_sampling(least_shafts))
+    violated = violated_limits(fixed, with_fine_sampling(least_shafts))
     if violated:
         return infeasible_result(problem, initial, violated, {})
     open_limits = tuple(limit for limit in problem.limits if limit not in fixed)
-    return with_limits(decide(problem.changed(limits=open_limits)), problem.limits)
+    return with_constant_limits(decide(problem.changed(limits=open_limits)), problem.limits)
 
 
-def _is_settled(problem: Problem) -> bool:
+def _has_constant_objective(problem: Problem) -> bool:
     kinds = open_kinds(problem)
     if not kinds or not problem.objective or problem.phasing is not None:
         return False
@@ -361,7 +363,7 @@ def _is_settled(problem: Problem) -> bool:
 
 def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Result:
     design = evaluate_design(problem, problem.start)
-    if design.violation > KEPT:
+    if design.violation > FEASIBILITY_TOL:
         return rest(problem)
     proof = ProofData(design.value, ProofStrength.EXACT, 0.0, "nothing open changes what is minimised")
     return build_result(design, design.evaluation, proof, {})
@@ -395,9 +397,9 @@ class Reduction:
 REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("more samples where few are not enough", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
     Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
-              _refuse_any_rank),
-    Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
-    Reduction("an objective that nothing open moves", _is_settled, _solve_without_decisions),
+              _refuse_ranks),
+    Reduction("limits that nothing open moves", lambda p: bool(_constant_limits(p)), _without_constant_limits),
+    Reduction("an objective that nothing open moves", _has_constant_objective, _solve_without_decisions),
 )  # fmt: skip
 """Reductions of the core, in the order in which they are tried."""
 
@@ -409,7 +411,7 @@ def reductions() -> tuple[Reduction, ...]:
     return table
 
 
-def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
+def _exact_part(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
     """Return an exact method for part of the measures, and the problem with these measures; None if there is none."""
     if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None

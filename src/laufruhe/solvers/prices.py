@@ -20,10 +20,10 @@ ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
 INDEPENDENT, BALANCED = 1e-3, 1e-2
 """Smallest relative singular value of independent slopes, and largest relative residual of their balance."""
-_SPARE = 1e-6
+_RESIDUAL_MARGIN = 1e-6
 ACTIVE = 1e-5
 """Relative distance to a limit, or to a bound of a decision, within which it is active."""
-MOST_VANISHING, _WAYS, MOST_CORNERS = 64, 8, 256
+MOST_VANISHING, _DIRECTIONS, MOST_CORNERS = 64, 8, 256
 """Largest number of zero rows of a norm, segments that approximate a disc, and largest number of rows of a hull."""
 
 
@@ -65,7 +65,7 @@ class Price:
         """Price of tightening; None if it is equal to that of relaxing."""
         return None if self.is_one or math.isnan(self.relaxed) else self.tightened
 
-    def felt(self, minimum: float) -> Price:
+    def floored(self, minimum: float) -> Price:
         """Return the price with values up to `minimum` set to zero."""
         relaxed, tightened = (0.0 if price <= minimum else price for price in (self.relaxed, self.tightened))
         return Price(relaxed, tightened)
@@ -138,13 +138,13 @@ def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Arra
     if not size:
         return None
     if all(slopes.is_smooth for slopes in (*objective, *limits)):
-        unique = _unique(np.concatenate([*(slopes.hull for slopes in limits), edges]), slope)
+        unique = _unique_prices(np.concatenate([*(slopes.hull for slopes in limits), edges]), slope)
         if unique is not None:
             return [Price.both(price) for price in unique]
     return _ranges(objective, limits, edges, size)
 
 
-def _unique(rows: Array, slope: Array) -> list[float] | None:
+def _unique_prices(rows: Array, slope: Array) -> list[float] | None:
     # None if slopes are dependent or do not balance
     lengths = np.linalg.norm(rows, axis=1)
     if not lengths.all():
@@ -183,7 +183,7 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
     left = program.minimum(each[last])
     if not left <= BALANCED:
         return None
-    program = program.under(each[last], 1.01 * left + _SPARE)
+    program = program.under(each[last], 1.01 * left + _RESIDUAL_MARGIN)
     found = []
     for total, scale in zip(totals[count:], scales[count:], strict=True):
         low, high = program.minimum(total), -program.minimum(-total)
@@ -246,7 +246,7 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
     return found
 
 
-def _at_nothing(decision: Decision, column: Array) -> list[Array]:
+def _angle_normals(decision: Decision, column: Array) -> list[Array]:
     # outward normals of the bounds of an angle at size zero, shape (2,) each
     bounds = decision.set
     if bounds.width == 1 or bounds.free_angle or float(np.hypot(*column)) > bounds.scale * ACTIVE:
@@ -287,7 +287,9 @@ def affine_prices(
     ]  # fmt: skip
     # bounds of an angle act on a size of zero and have no price there
     apex = [
-        (domain.columns, own) for domain in problem.domains for own in _at_nothing(domain.decision, x[domain.columns])
+        (domain.columns, own)
+        for domain in problem.domains
+        for own in _angle_normals(domain.decision, x[domain.columns])
     ]
     normals = np.zeros((len(edges) + len(apex), problem.size))
     for row, (columns, normal) in zip(normals, [*edges.values(), *apex], strict=True):
@@ -326,20 +328,20 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
             "ad,adn->an", multiplier / np.linalg.norm(multiplier, axis=1)[:, None], norm.slope[kinks.longest]
         )
     segments = [
-        segment for k in kinks.vanishing for segment in _disc(float(norm.grid.weights[k]) * norm.slope[k])
+        segment for k in kinks.vanishing for segment in _disc_segments(float(norm.grid.weights[k]) * norm.slope[k])
     ]  # fmt: skip
     return Slopes(weight * hull, weight * np.array(segments).reshape(-1, len(x)))
 
 
-def _disc(slope: Array) -> list[Array]:
+def _disc_segments(slope: Array) -> list[Array]:
     # segments that add up to the image of the unit ball, shape (n,) each
     sizes, ways = np.linalg.svd(slope, full_matrices=False)[1:]
     strong = sizes > EDGE * sizes.max(initial=0.0)
     axes = sizes[strong, None] * ways[strong]
     if len(axes) != 2:
         return list(axes)
-    turns = math.pi * np.arange(_WAYS) / _WAYS
-    return [0.5 * math.pi / _WAYS * (math.cos(t) * axes[0] + math.sin(t) * axes[1]) for t in turns]
+    turns = math.pi * np.arange(_DIRECTIONS) / _DIRECTIONS
+    return [0.5 * math.pi / _DIRECTIONS * (math.cos(t) * axes[0] + math.sin(t) * axes[1]) for t in turns]
 
 
 def angle_name(decision: Decision) -> str:

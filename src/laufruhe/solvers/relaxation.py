@@ -14,7 +14,7 @@ from laufruhe.errors import counted
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
-from laufruhe.solvers.conclusion import KEPT, limit_values, result_under, with_limits
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, refine_result, with_constant_limits
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
@@ -36,11 +36,11 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
     """
     proven = prove(relaxed)
     if proven.status is Status.INFEASIBLE:
-        return with_limits(proven, problem.limits)
+        return with_constant_limits(proven, problem.limits)
     certificate = proven.certificate
     is_optimal = certificate is not None and certificate.kind is Proof.GLOBAL and relaxed.objective == problem.objective
-    if is_optimal and proven.final.violation(problem.limits) <= KEPT:
-        return _under_all(proven, problem)
+    if is_optimal and proven.final.violation(problem.limits) <= FEASIBILITY_TOL:
+        return _with_all_limits(proven, problem)
     result = solve(problem)
     if certificate is None:
         return result
@@ -49,7 +49,7 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
     return with_bound(result, certificate.lower_bound, f"bound without {left_out}")
 
 
-def _under_all(proven: Result, problem: Problem) -> Result:
+def _with_all_limits(proven: Result, problem: Problem) -> Result:
     # limits left out of the relaxed problem have no price
     values = dict(zip(proven.problem.limits, proven.limits, strict=True))
     free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
@@ -77,7 +77,7 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     ):
         return result
     zero_level = numerical_zero(result.problem, result.final.engine)
-    result, doubt = result_under(result, bound, zero_level)
+    result, doubt = refine_result(result, bound, zero_level)
     value, text = (result.objective or objective).value, f"{certificate.method}; {source}"
     proof = make_certificate(
         value, bound, zero_level, result.problem.tolerance, ProofStrength.PARTIAL, certificate.kkt_residual, text, doubt

@@ -23,10 +23,10 @@ from laufruhe.solvers.values import (
     DecisionRange,
     DecisionValue,
     LimitValue,
-    Nearest,
+    NearestDesign,
     ObjectiveValue,
     RankValue,
-    meaningful,
+    relevant_decisions,
 )
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class ResultContent:
             )
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
-        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in meaningful(self.decisions)]
+        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in relevant_decisions(self.decisions)]
         if self.message:
             lines.append(f"  {self.message}")
         return "\n".join(lines) + ">"
@@ -99,7 +99,7 @@ class ResultContent:
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
 
 
-class Details:
+class ResultDetails:
     """Additional data of a result that an extension provides."""
 
     @property
@@ -150,10 +150,10 @@ class Result(ResultContent):
     error: Callable[[], float] = float
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
-    details: Details | None = None
+    details: ResultDetails | None = None
     ranks: tuple[RankValue, ...] = ()
     reached: tuple[AttainableLimit, ...] = ()
-    nearest: Nearest | None = None
+    nearest: NearestDesign | None = None
     free: tuple[DecisionRange, ...] | None = None
 
     @property

@@ -26,12 +26,12 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, gap_of
-from laufruhe.solvers.conclusion import KEPT, broken_message, limit_values
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, violation_message
 from laufruhe.solvers.result import Result, Status
 
 ROUNDS, MOST_TIMES = 4, 16
 """Largest number of refinements, and largest factor of the samples in one of them."""
-FELT, LEAST_TIMES = 0.1, 2.0
+SMALL_ERROR, LARGE_ERROR = 0.1, 2.0
 """Sampling error of the objective that counts as none, and smallest sampling error that counts; in tolerances."""
 
 
@@ -46,27 +46,29 @@ def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Res
         # the error of a mean falls with the square of the step; the gas pressure keeps its samples
         problem = with_more_samples(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MOST_TIMES))
         result = solve(problem)
-    return result if _sampling_disagreement(result) <= 1.0 else _evaluated_at_fine_sampling(result)
+    return result if _sampling_disagreement(result) <= 1.0 else _with_fine_values(result)
 
 
 def _sampling_disagreement(result: Result) -> float:
     # largest difference to fine sampling, in tolerances
-    return max(_untold(result) / KEPT, _misproven(result))
+    return max(_limit_disagreement(result) / FEASIBILITY_TOL, _gap_disagreement(result))
 
 
-def _evaluated_at_fine_sampling(result: Result) -> Result:
+def _with_fine_values(result: Result) -> Result:
     """Return the result of a design with values, limits and gap at fine sampling."""
     problem, objective, proof = result.problem, result.objective, result.certificate
     if objective is None or proof is None or not result.status.has_design:
         return result
-    value = objective.value - _misread(problem, result.measured)
+    value = objective.value - _sampling_error(problem, result.measured)
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
     zero_level = numerical_zero(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, zero_level)
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, zero_level + doubt)
     weaker_kind = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
-    is_feasible = violation_at_fine_sampling(problem, result.final) <= KEPT or result.measured is not result.final
+    is_feasible = (
+        violation_at_fine_sampling(problem, result.final) <= FEASIBILITY_TOL or result.measured is not result.final
+    )
     kind = Proof.NONE if not is_feasible else Proof.GLOBAL if gap <= problem.tolerance else weaker_kind
     status = Status.FAILED if not is_feasible else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
@@ -76,7 +78,7 @@ def _evaluated_at_fine_sampling(result: Result) -> Result:
         certificate=replace(proof, kind=kind, gap=gap),
         limits=limit_values(problem, final, result.prices, value) if result.measured is result.final else result.limits,
         final=final,
-        message=result.message if is_feasible else broken_message(problem, final),
+        message=result.message if is_feasible else violation_message(problem, final),
     )
 
 
@@ -92,7 +94,7 @@ def _coarsely_sampled_limits(problem: Problem, evaluation: Evaluation) -> list[L
     return [limit for limit in loads if is_coarsely_sampled(limit.measure, evaluation.samples)]
 
 
-def _untold(result: Result) -> float:
+def _limit_disagreement(result: Result) -> float:
     # relative violation at fine sampling; without a design, the difference between coarse and fine sampling
     problem, evaluation = result.problem, result.final
     if result.status is Status.INFEASIBLE or evaluation.resonance:
@@ -102,14 +104,14 @@ def _untold(result: Result) -> float:
     coarse = replace(evaluation, samples=problem.fidelity.samples)
     limits, fine = _coarsely_sampled_limits(problem, coarse), with_fine_sampling(coarse)
     # a failed search with fewer samples than the default is repeated with the default
-    minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / coarse.samples) ** 2
+    minimum = 0.5 * FEASIBILITY_TOL * (with_default_sampling(problem).fidelity.samples / coarse.samples) ** 2
     return max(
         (max(minimum, abs(fine.check_limit(x).violation - coarse.check_limit(x).violation)) for x in limits),
         default=0.0,
     )
 
 
-def _misread(problem: Problem, evaluation: Evaluation) -> float:
+def _sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     # objective at coarse sampling less that at fine sampling
     terms = [term for term in problem.load_terms if is_coarsely_sampled(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
@@ -118,23 +120,23 @@ def _misread(problem: Problem, evaluation: Evaluation) -> float:
     return objective_value(part, evaluation) - objective_value(part, with_fine_sampling(evaluation))
 
 
-def over_read(problem: Problem, evaluation: Evaluation) -> float:
+def sampling_overestimate(problem: Problem, evaluation: Evaluation) -> float:
     """Return the excess of an objective at coarse sampling over that at fine sampling; zero within the tolerance."""
-    excess = _misread(problem, evaluation)
+    excess = _sampling_error(problem, evaluation)
     return excess if excess > problem.tolerance * objective_value(problem, evaluation) else 0.0
 
 
-def _misproven(result: Result) -> float:
+def _gap_disagreement(result: Result) -> float:
     """Return the sampling error of the objective in tolerances if it changes the proof, else zero."""
     problem, proof, objective = result.problem, result.certificate, result.objective
     if proof is None or objective is None or not result.status.has_design or not problem.search.proves:
         return 0.0
-    excess = _misread(problem, result.measured)
+    excess = _sampling_error(problem, result.measured)
     value = objective.value - excess
-    if abs(excess) <= FELT * problem.tolerance * value:
+    if abs(excess) <= SMALL_ERROR * problem.tolerance * value:
         return 0.0
     zero_level = numerical_zero(problem, result.final.engine)
     proven = gap_of(value, proof.lower_bound, zero_level) <= problem.tolerance
     # a lower bound above the objective proves nothing
     is_same = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)
-    return 0.0 if is_same else max(abs(excess) / (problem.tolerance * value), LEAST_TIMES)
+    return 0.0 if is_same else max(abs(excess) / (problem.tolerance * value), LARGE_ERROR)

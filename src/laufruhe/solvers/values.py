@@ -12,8 +12,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.prices import Price
 
-NEXT_TO_NOTHING = 1e-5
-APART = 0.05
+ZERO_SHARE = 1e-5
+DISTINCT_SHARE = 0.05
 """Share of the largest decision by which two designs differ."""
 
 
@@ -48,10 +48,10 @@ class DecisionValue:
     @property
     def is_zero(self) -> bool:
         """True if the value is zero up to rounding, relative to its bounds."""
-        return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
+        return abs(self.value) <= ZERO_SHARE * max(abs(self.lower), abs(self.upper))
 
 
-def meaningful(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
+def relevant_decisions(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
     """Return the decisions without angles of zero sizes."""
     pairs = pairwise([None, *decisions])
     return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_zero)]
@@ -101,7 +101,7 @@ class RankValue:
     def equal(self) -> tuple[DecisionRange, ...]:
         """Decisions with a range wider than the tolerance of the solver."""
         maximum = {entry.unit: max(abs(d.high) for d in self.designs if d.unit == entry.unit) for entry in self.designs}
-        return tuple(entry for entry in self.designs if entry.high - entry.low > APART * maximum[entry.unit])
+        return tuple(entry for entry in self.designs if entry.high - entry.low > DISTINCT_SHARE * maximum[entry.unit])
 
 
 @dataclass(frozen=True)
@@ -171,7 +171,7 @@ class AttainableLimit:
 
 
 @dataclass(frozen=True)
-class Nearest:
+class NearestDesign:
     """Infeasible design with the smallest violation, described by the limit with the largest violation [SI].
 
     Attributes

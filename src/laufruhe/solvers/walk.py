@@ -27,7 +27,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import unproven_certificate
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import Design, decided, limit_values, values_of
+from laufruhe.solvers.conclusion import Design, limit_values, priced_decisions, values_of
 from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
@@ -48,7 +48,7 @@ ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class Point:
     """Design before its evaluation.
 
     Attributes
@@ -66,12 +66,12 @@ class Stand:
     candidate: Candidate | None = None
 
 
-Move = Callable[[Stand, float], Stand | None]
+Move = Callable[[Point, float], Point | None]
 """Function that returns a design at a signed step, relative to the range of the decisions; None if bounds forbid it."""
 
 
 @dataclass(frozen=True, eq=False)
-class Visit:
+class EvaluatedPoint:
     """Design evaluated by the exact model.
 
     Attributes
@@ -80,23 +80,23 @@ class Visit:
         Objective.
     violation
         Largest relative violation of a limit.
-    sure
+    upper_violation
         Largest relative violation plus sampling error of a limit.
     """
 
-    stand: Stand
+    point: Point
     evaluation: Evaluation
     value: float
     violation: float
-    sure: float
+    upper_violation: float
 
-    def is_better(self, other: Visit, allowed: float) -> bool:
+    def is_better(self, other: EvaluatedPoint, allowed: float) -> bool:
         """Return True if the violation above `allowed` is smaller, or equal and the objective smaller."""
-        key, other_key = (max(visit.violation, allowed) for visit in (self, other))
+        key, other_key = (max(evaluated.violation, allowed) for evaluated in (self, other))
         return (key, self.value) < (other_key, other.value)
 
 
-def walked(problem: Problem, result: Result, spent: float) -> Result:
+def check_by_walk(problem: Problem, result: Result, spent: float) -> Result:
     """Return the result, without proof if a walk from its design finds a better feasible design than the bound allows.
 
     Parameters
@@ -108,49 +108,49 @@ def walked(problem: Problem, result: Result, spent: float) -> Result:
     """
     is_infeasible = result.status is Status.INFEASIBLE
     bound = result.certificate.lower_bound if result.certificate is not None else 0.0
-    claims = (
+    has_claim = (
         bool(result.limits) and problem.phasing is None if is_infeasible else result.status.has_design and bound > 0.0
     )
-    if not claims or problem.extras:
+    if not has_claim or problem.extras:
         return result
-    start = _start(result)
+    start = _start_point(result)
     # a step may lead to a resonance
     with np.errstate(all="ignore"):
-        witness = _Walk(result, start).run(max(SHARE * spent, SECONDS))
-        if witness is None or not _is_shown(result, witness, None if is_infeasible else bound):
+        witness = _LocalSearch(result, start).run(max(SHARE * spent, SECONDS))
+        if witness is None or not _contradicts(result, witness, None if is_infeasible else bound):
             return result
-    return _withheld(problem, result, witness, bound)
+    return _without_proof(problem, result, witness, bound)
 
 
-def _start(result: Result) -> Stand:
+def _start_point(result: Result) -> Point:
     # the initial design if the result has none
     problem = result.problem
     values = tuple(values_of(problem, result))
     if problem.phasing is not None and result.phasing is not None:
         candidate = next(iter(candidates_of(problem.phasing, result.phasing.ranking[:1])), None)
-        return Stand(problem, values, candidate)
-    return Stand(problem, values)
+        return Point(problem, values, candidate)
+    return Point(problem, values)
 
 
-class _Walk:
+class _LocalSearch:
     """Local search by steps from a design to better ones until a time limit."""
 
-    def __init__(self, result: Result, start: Stand) -> None:
+    def __init__(self, result: Result, start: Point) -> None:
         self.limits, self.samples = result.problem.limits, result.final.samples
         errors = [limit.error_estimate for limit in result.limits]
         self.errors = errors if len(errors) == len(self.limits) else [0.0] * len(self.limits)
         self.random = np.random.default_rng(SEED)
-        self.start, self.is_none, self.final = start, result.status is Status.INFEASIBLE, result.final
+        self.start, self.is_infeasible, self.final = start, result.status is Status.INFEASIBLE, result.final
         self.phasing = result.problem.phasing
 
-    def run(self, seconds: float) -> Visit | None:
+    def run(self, seconds: float) -> EvaluatedPoint | None:
         """Return the best feasible design within a processor time [s]; None if no step leads to one."""
-        is_over = _timer(seconds)
-        best = self._visit(self.start, None)
+        is_over = _deadline(seconds)
+        best = self._evaluate(self.start, None)
         if best is None:
             return None
-        allowed, witness = 0.0 if self.is_none else max(best.violation, 0.0), None
-        sources = [self._choices(), self._steps()]
+        allowed, witness = 0.0 if self.is_infeasible else max(best.violation, 0.0), None
+        sources = [self._star_steps(), self._number_steps()]
         pending = [next(source, None) for source in sources]
         count = 0
         for k in itertools.cycle(range(len(sources))):
@@ -159,40 +159,46 @@ class _Walk:
             if (step := pending[k]) is None:
                 continue
             move, share = step
-            stand = move(best.stand, share)
-            visit = None if stand is None else self._visit(stand, best)
-            count += stand is not None
-            is_improved = visit is not None and visit.is_better(best, allowed)
-            if visit is not None and visit.sure <= 0.0 and (witness is None or visit.value < witness.value):
-                witness = visit
-            if is_improved and visit is not None:
-                best = visit
+            point = move(best.point, share)
+            evaluated = None if point is None else self._evaluate(point, best)
+            count += point is not None
+            is_improved = evaluated is not None and evaluated.is_better(best, allowed)
+            if (
+                evaluated is not None
+                and evaluated.upper_violation <= 0.0
+                and (witness is None or evaluated.value < witness.value)
+            ):
+                witness = evaluated
+            if is_improved and evaluated is not None:
+                best = evaluated
             try:
                 pending[k] = sources[k].send(is_improved)
             except StopIteration:
                 pending[k] = None
         return witness
 
-    def _visit(self, stand: Stand, best: Visit | None) -> Visit | None:
+    def _evaluate(self, point: Point, best: EvaluatedPoint | None) -> EvaluatedPoint | None:
         """Evaluate a design; None without finite loads, or if its objective is not below that of the best one."""
-        problem = stand.problem
+        problem = point.problem
         try:
-            engine, final = problem.design(stand.values), self.final
+            engine, final = problem.design(point.values), self.final
             # the final design has been evaluated before
             is_final = engine == final.engine and problem.fidelity == final.fidelity
             evaluation = final if is_final else evaluate(problem, engine, self.samples)
             value = objective_value(problem, evaluation)
             if not math.isfinite(value) or (best is not None and best.violation <= 0.0 and value >= best.value):
                 return None
-            excesses = [evaluation.check_limit(limit).violation for limit in self.limits]
+            violations = [evaluation.check_limit(limit).violation for limit in self.limits]
         except LaufruheError:
             return None
-        sure = max((violation + error for violation, error in zip(excesses, self.errors, strict=True)), default=0.0)
-        return Visit(stand, evaluation, value, max(excesses, default=0.0), sure)
+        upper_violation = max(
+            (violation + error for violation, error in zip(violations, self.errors, strict=True)), default=0.0
+        )
+        return EvaluatedPoint(point, evaluation, value, max(violations, default=0.0), upper_violation)
 
-    def _steps(self) -> Generator[tuple[Move, float], bool, None]:
+    def _number_steps(self) -> Generator[tuple[Move, float], bool, None]:
         """Yield steps along coordinates and random directions; repeat each while it leads to better designs."""
-        moves = [*_coordinates(self.start.problem), *self._angles()]
+        moves = [*_coordinate_moves(self.start.problem), *self._angle_moves()]
         sizes = [STEP] * len(moves)
         for size in STEP * SHORTER ** np.arange(8.0):
             for k in self.random.permutation(len(moves)):
@@ -205,25 +211,25 @@ class _Walk:
                     sizes[k] *= SHORTER
                 if len(moves) > 1:
                     columns = sum(domain.width for domain in domains_of(self.start.problem.decisions))
-                    yield _along(self.random.normal(size=columns) / math.sqrt(max(columns, 1))), size
+                    yield _move_along(self.random.normal(size=columns) / math.sqrt(max(columns, 1))), size
 
-    def _angles(self) -> list[Move]:
+    def _angle_moves(self) -> list[Move]:
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None or not phasing.continuous:
             return []
-        moves = [_throw(phasing, k) for k in range(len(candidate.throws))]
-        return [*moves, *(_angle(phasing, name) for name in ("bank_angle", "split_pin"))]
+        moves = [_move_throw(phasing, k) for k in range(len(candidate.throws))]
+        return [*moves, *(_move_angle(phasing, name) for name in ("bank_angle", "split_pin"))]
 
-    def _choices(self) -> Generator[tuple[Move, float], bool, None]:
+    def _star_steps(self) -> Generator[tuple[Move, float], bool, None]:
         # ends when no neighbour is better
-        moves = self._stars()
+        moves = self._star_moves()
         failures = 0
         for k in itertools.cycle(self.random.permutation(len(moves))):
             failures = 0 if (yield moves[k], 1.0) else failures + 1
             if failures == len(moves):
                 return
 
-    def _stars(self) -> list[Move]:
+    def _star_moves(self) -> list[Move]:
         """Return exchanges of throws, alone or symmetric to the middle, and other firing orders and optional shafts."""
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None:
@@ -232,15 +238,18 @@ class _Walk:
         if phasing.throws is None and phasing.throw_bounds is None:
             last = len(candidate.throws) - 1
             for i, j in itertools.combinations(range(last + 1), 2):
-                moves.append(_swapped(phasing, [(i, j)]))
+                moves.append(_exchange(phasing, [(i, j)]))
                 if i + j < last and {i, j}.isdisjoint({last - i, last - j}):
-                    moves.append(_swapped(phasing, [(i, j), (last - i, last - j)]))
+                    moves.append(_exchange(phasing, [(i, j), (last - i, last - j)]))
         if phasing.firing_order is None:
-            moves += [_fired(phasing, k) for k in range(ORDERS)]
-        return [*moves, *(_built(phasing, shafts) for shafts in phasing.shafts.allowed if phasing.shafts.optional)]
+            moves += [_change_order(phasing, k) for k in range(ORDERS)]
+        return [
+            *moves,
+            *(_build_shafts(phasing, shafts) for shafts in phasing.shafts.allowed if phasing.shafts.optional),
+        ]
 
 
-def _timer(seconds: float) -> Callable[[], bool]:
+def _deadline(seconds: float) -> Callable[[], bool]:
     """Return a function that returns True after a processor time of this thread [s].
 
     Processor time never exceeds wall time, so it is read only once the wall time has passed.
@@ -261,17 +270,17 @@ def _timer(seconds: float) -> Callable[[], bool]:
 # --- moves of numbers
 
 
-def _coordinates(problem: Problem) -> list[Move]:
+def _coordinate_moves(problem: Problem) -> list[Move]:
     columns = sum(domain.width for domain in domains_of(problem.decisions))
-    return [_along(row) for row in np.eye(columns)]
+    return [_move_along(row) for row in np.eye(columns)]
 
 
-def _along(direction: Array) -> Move:
+def _move_along(direction: Array) -> Move:
     """Return a step along a direction relative to the ranges of the decisions, shape (n,), with projection."""
 
-    def move(stand: Stand, step: float) -> Stand | None:
-        domains = domains_of(stand.problem.decisions)
-        x = decision_vector(domains, stand.values)
+    def move(point: Point, step: float) -> Point | None:
+        domains = domains_of(point.problem.decisions)
+        x = decision_vector(domains, point.values)
         if len(x) != len(direction):
             return None
         widths = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
@@ -280,7 +289,7 @@ def _along(direction: Array) -> Move:
             moved[domain.columns] = domain.project(moved)
         if np.array_equal(moved, x):
             return None
-        return replace(stand, values=tuple(_value(domain, moved) for domain in domains))
+        return replace(point, values=tuple(_value(domain, moved) for domain in domains))
 
     return move
 
@@ -293,44 +302,44 @@ def _value(domain: Domain, x: Array) -> Value:
 # --- moves of throws and firing orders
 
 
-def _throw(phasing: Phasing, k: int) -> Move:
+def _move_throw(phasing: Phasing, k: int) -> Move:
     """Return a move of throw `k`; the first throw stays at zero without bounds of its own (C5)."""
     bounds = phasing.throw_bounds
     width = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
 
-    def move(stand: Stand, step: float) -> Stand | None:
-        assert stand.candidate is not None
-        throws = list(stand.candidate.throws)
+    def move(point: Point, step: float) -> Point | None:
+        assert point.candidate is not None
+        throws = list(point.candidate.throws)
         if bounds is None:
             throws[k] += step * width if k else 0.0
         else:
             low, high = bounds[k]
             throws[k] = min(max(throws[k] + step * (high - low), low), high)
-        return _realised(phasing, stand, replace(stand.candidate, throws=tuple(throws)))
+        return _with_candidate(phasing, point, replace(point.candidate, throws=tuple(throws)))
 
     return move
 
 
-def _angle(phasing: Phasing, name: str) -> Move:
+def _move_angle(phasing: Phasing, name: str) -> Move:
     """Return a move of the bank angle or of the split pins."""
     low, high = (phasing.bank if name == "bank_angle" else phasing.split) or (0.0, 0.0)
 
-    def move(stand: Stand, step: float) -> Stand | None:
-        assert stand.candidate is not None
-        angle = getattr(stand.candidate, name)
+    def move(point: Point, step: float) -> Point | None:
+        assert point.candidate is not None
+        angle = getattr(point.candidate, name)
         if angle is None:
             return None
         angle = min(max(angle + step * (high - low), low), high)
-        return _realised(phasing, stand, replace(stand.candidate, **{name: angle}))
+        return _with_candidate(phasing, point, replace(point.candidate, **{name: angle}))
 
     return move
 
 
-def _swapped(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
+def _exchange(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
     """Return a move that exchanges the throws of each pair, and their cylinders in the firing order."""
 
-    def move(stand: Stand, _: float) -> Stand | None:
-        candidate = stand.candidate
+    def move(point: Point, _: float) -> Point | None:
+        candidate = point.candidate
         assert candidate is not None
         pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
         for i, j in pairs:
@@ -343,35 +352,35 @@ def _swapped(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
         # cylinder 1 keeps its angle (C5)
         shift = candidate.throws[0] - throws[0]
         rotated = tuple((angle + shift) % math.tau for angle in throws)
-        return _realised(phasing, stand, replace(candidate, throws=rotated, firing_order=order))
+        return _with_candidate(phasing, point, replace(candidate, throws=rotated, firing_order=order))
 
     return move
 
 
-def _fired(phasing: Phasing, k: int) -> Move:
+def _change_order(phasing: Phasing, k: int) -> Move:
 
-    def move(stand: Stand, _: float) -> Stand | None:
-        candidate = stand.candidate
+    def move(point: Point, _: float) -> Point | None:
+        candidate = point.candidate
         assert candidate is not None
         orders = lap_orders(phasing.cycle, phasing.layout_of(candidate), candidate.throws)
         order = next(itertools.islice(orders, k, None), None)
-        return None if order is None else _realised(phasing, stand, replace(candidate, firing_order=order))
+        return None if order is None else _with_candidate(phasing, point, replace(candidate, firing_order=order))
 
     return move
 
 
-def _built(phasing: Phasing, built: Sequence[int]) -> Move:
+def _build_shafts(phasing: Phasing, built: Sequence[int]) -> Move:
 
-    def move(stand: Stand, _: float) -> Stand | None:
-        assert stand.candidate is not None
-        return _realised(phasing, stand, replace(stand.candidate, left_out=phasing.without(built)))
+    def move(point: Point, _: float) -> Point | None:
+        assert point.candidate is not None
+        return _with_candidate(phasing, point, replace(point.candidate, left_out=phasing.without(built)))
 
     return move
 
 
-def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | None:
+def _with_candidate(phasing: Phasing, point: Point, candidate: Candidate) -> Point | None:
     """Return the design of a candidate with the present decisions; None if its firing order is not permitted."""
-    if candidate == stand.candidate:
+    if candidate == point.candidate:
         return None
     if phasing.firing_order is not None and candidate.firing_order != phasing.firing_order:
         return None
@@ -384,19 +393,19 @@ def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | N
         problem = phasing.realise(candidate)
     except LaufruheError:
         return None
-    values_by_name = dict(zip((d.name for d in stand.problem.decisions), stand.values, strict=True))
+    values_by_name = dict(zip((d.name for d in point.problem.decisions), point.values, strict=True))
     values = [values_by_name.get(decision.name, decision.start) for decision in problem.decisions]
     domains = domains_of(problem.decisions)
     x = projected_vector(domains, values)
-    return Stand(problem, tuple(_value(domain, x) for domain in domains), candidate)
+    return Point(problem, tuple(_value(domain, x) for domain in domains), candidate)
 
 
 # --- contradictions between designs and bounds
 
 
-def _is_shown(result: Result, witness: Visit, bound: float | None) -> bool:
+def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -> bool:
     """Return True if a design is feasible and below the bound by more than the sampling error; no bound is None."""
-    problem, evaluation = witness.stand.problem, witness.evaluation
+    problem, evaluation = witness.point.problem, witness.evaluation
     if bound is not None:
         if witness.value >= bound:
             return False
@@ -413,12 +422,12 @@ def _is_shown(result: Result, witness: Visit, bound: float | None) -> bool:
     return is_feasible and violation_at_fine_sampling(problem, evaluation) <= 0.0
 
 
-def _withheld(problem: Problem, result: Result, witness: Visit, bound: float) -> Result:
+def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bound: float) -> Result:
     """Return the design of the walk as a result without proof."""
-    stand, candidate, original = witness.stand, witness.stand.candidate, result.problem
-    problem_of_design = replace(stand.problem, phasing=original.phasing)
-    design = Design(problem_of_design, stand.values, witness.evaluation, witness.value, witness.violation)
-    decisions, details = decided(design), result.phasing
+    point, candidate, original = witness.point, witness.point.candidate, result.problem
+    problem_of_design = replace(point.problem, phasing=original.phasing)
+    design = Design(problem_of_design, point.values, witness.evaluation, witness.value, witness.violation)
+    decisions, details = priced_decisions(design), result.phasing
     if details is not None and candidate is not None and original.phasing is not None:
         decisions = (*phase_decisions(problem, original.phasing, candidate), *decisions)
         if candidate != next(iter(candidates_of(original.phasing, details.ranking[:1])), None):
@@ -436,7 +445,7 @@ def _withheld(problem: Problem, result: Result, witness: Visit, bound: float) ->
         message="",
         error=partial(error_of, problem_of_design, witness.evaluation),
         phasing=details,
-        ranks=_reached(result, witness),
+        ranks=_rank_values(result, witness),
         nearest=None,
     )
     source, claim = "a walk", bound
@@ -445,7 +454,7 @@ def _withheld(problem: Problem, result: Result, witness: Visit, bound: float) ->
     return without_proof(unproven, BoundError(source, claim, witness.value))
 
 
-def _reached(result: Result, witness: Visit) -> tuple[RankValue, ...]:
+def _rank_values(result: Result, witness: EvaluatedPoint) -> tuple[RankValue, ...]:
     problem = result.problem
     values = [objective_value(replace(problem, objective=rank.terms), witness.evaluation) for rank in problem.ranks]
     return tuple(

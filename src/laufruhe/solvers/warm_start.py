@@ -27,7 +27,7 @@ STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
 """Starts of the first search, stars that it ranks, and fewer stars if mounts or throws are open too."""
 BOXES, NEAR_BOXES = 100, 30
 """Largest number of boxes of positions and leads: of the first search, and of a search from a known design."""
-LIKE = 0.1
+SIMILAR = 0.1
 """Relative difference of the objective up to which a search from the known design alone is sufficient."""
 STEPS = 96
 """Samples per cycle for the ranking of stars with even firing."""
@@ -47,7 +47,7 @@ def compares_stars(problem: Problem) -> bool:
     return problem.phasing is not None and not (problem.phasing.continuous or problem.mount_decisions)
 
 
-def by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
+def solve_by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
     """Return the engine with optimal unbalances by one cone program; None if it has no solution.
 
     Parameters
@@ -60,7 +60,7 @@ def by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
     return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
 
 
-def first_of(problem: Problem) -> Result | None:
+def first_search(problem: Problem) -> Result | None:
     """Return the result of `solve` with few starts and boxes, without proof; None if it found no feasible design."""
     phasing = problem.phasing
     if phasing is not None:
@@ -72,7 +72,7 @@ def first_of(problem: Problem) -> Result | None:
     return result if result.status.has_design else None
 
 
-def next_to(problem: Problem, neighbour: Result) -> Engine | None:
+def reoptimise(problem: Problem, neighbour: Result) -> Engine | None:
     """Return the best engine of searches from a known result; None if no search ends within the limits.
 
     Parameters
@@ -82,29 +82,30 @@ def next_to(problem: Problem, neighbour: Result) -> Engine | None:
     """
     if compares_stars(problem):
         # the best star may differ from the best one of the neighbour
-        return _of_stars(problem, first_of(problem.at(_coarse(problem.fidelity))) or neighbour)
-    engines = [_from(problem, neighbour) if problem.phasing is None else _of_stars(problem, neighbour)]
-    if not _is_like(problem, neighbour):
+        return _best_star(problem, first_search(problem.at(_coarse_fidelity(problem.fidelity))) or neighbour)
+    engines = [_engine_from(problem, neighbour) if problem.phasing is None else _best_star(problem, neighbour)]
+    if not _is_similar(problem, neighbour):
         with suppress(SolverError, ModelError):
-            engines.append(_engine(first_of(problem)))
-    return _best(problem, engines)
+            engines.append(_engine(first_search(problem)))
+    return _best_engine(problem, engines)
 
 
-def _is_like(problem: Problem, neighbour: Result) -> bool:
+def _is_similar(problem: Problem, neighbour: Result) -> bool:
     # the design of the neighbour has about the same objective in this problem
     value = objective_value(problem, evaluate(problem, neighbour.final.engine))
     return (
-        neighbour.objective is not None and abs(value - neighbour.objective.value) <= LIKE * neighbour.objective.value
+        neighbour.objective is not None
+        and abs(value - neighbour.objective.value) <= SIMILAR * neighbour.objective.value
     )
 
 
-def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
+def _best_engine(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
     designs = [initial_design(problem, evaluate(problem, engine)) for engine in engines if engine is not None]
     best = min((design for design in designs if design is not None), key=lambda design: design.rank, default=None)
     return None if best is None else best.evaluation.engine
 
 
-def _of_stars(problem: Problem, neighbour: Result) -> Engine | None:
+def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
     """Return the best engine of the first-ranked stars; open throws may then leave the best star."""
     phasing = problem.phasing
     if phasing is None or neighbour.phasing is None:
@@ -112,38 +113,38 @@ def _of_stars(problem: Problem, neighbour: Result) -> Engine | None:
     stars: dict[Engine, Candidate] = {}
     for candidate in candidates_of(phasing, neighbour.phasing.ranking)[:STARS]:
         star = replace(phasing.realise(candidate), phasing=None)
-        engine = _from(star, neighbour) if star.decisions else star.engine
+        engine = _engine_from(star, neighbour) if star.decisions else star.engine
         if engine is not None:
             stars[engine] = candidate
-    best = _best(problem, [*stars])
+    best = _best_engine(problem, [*stars])
     if best is None or not phasing.continuous:
         return best
-    return _moved(phasing, stars[best], neighbour) or best
+    return _moved_throws(phasing, stars[best], neighbour) or best
 
 
-def _coarse(fidelity: Fidelity) -> Fidelity:
+def _coarse_fidelity(fidelity: Fidelity) -> Fidelity:
     return replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
 
 
-def _moved(phasing: Phasing, star: Candidate, neighbour: Result) -> Engine | None:
+def _moved_throws(phasing: Phasing, star: Candidate, neighbour: Result) -> Engine | None:
     problem = replace(phasing.realise(star), phasing=None)
     if problem.mount_decisions:
         from laufruhe.solvers.mounts.nonlinear import solve_moved
 
         moves = ThrowMoves(phasing, phasing.layout_of(star), star, phasing.intervals)
-        return _engine(solve_moved(_begun(problem, neighbour), moves, None)[0])
+        return _engine(solve_moved(_started_at(problem, neighbour), moves, None)[0])
     from laufruhe.solvers.throws.uneven_throws import local_optimum
 
     optimum = local_optimum(phasing, star, phasing.intervals, nudged=False)
     return None if optimum is None else _engine(optimum.result)
 
 
-def _from(problem: Problem, neighbour: Result) -> Engine | None:
+def _engine_from(problem: Problem, neighbour: Result) -> Engine | None:
     # a convex problem needs no start
-    return by_cones(problem) if is_convex(problem) else _engine(solve(_begun(problem, neighbour)))
+    return solve_by_cones(problem) if is_convex(problem) else _engine(solve(_started_at(problem, neighbour)))
 
 
-def _begun(problem: Problem, neighbour: Result) -> Problem:
+def _started_at(problem: Problem, neighbour: Result) -> Problem:
     # the problem with the values of the neighbour as its only start
     values = values_of(problem, neighbour)
     pairs = list(zip(problem.decisions, values, strict=True))

@@ -21,7 +21,7 @@ from laufruhe.present.measures import limits_of, main_load, mount_orders, shakin
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, place_measures
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import solve, state
+from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.result import Result
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
@@ -43,9 +43,9 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
     try:
         result = solve(problem)
     except SolverError:
-        return state(problem, to_start_from=True), FAILED, "none"
+        return evaluate_only(problem, to_start_from=True), FAILED, "none"
     if result.objective is None:
-        return state(problem, to_start_from=True), str(result.status), "none"
+        return evaluate_only(problem, to_start_from=True), str(result.status), "none"
     is_closed = not problem.decisions and problem.phasing is None
     proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if is_closed else "none"
     return result, str(result.status), proof

@@ -30,7 +30,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.warm_start import by_cones, first_of, is_convex, next_to
+from laufruhe.solvers.warm_start import first_search, is_convex, reoptimise, solve_by_cones
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
@@ -203,9 +203,9 @@ class _Decided:
         engine = None
         with suppress(SolverError, ModelError):
             if is_open(problem) and is_convex(problem):
-                engine = by_cones(at, REFERENCE_STEPS)
+                engine = solve_by_cones(at, REFERENCE_STEPS)
             elif is_open(problem):
-                self._known = first_of(at)
+                self._known = first_search(at)
                 engine = None if self._known is None else self._known.final.engine
         if engine is not None:
             self.of(engine)
@@ -226,8 +226,8 @@ class _Decided:
         variant = variant.at(replace(variant.fidelity, tolerance=None))
         with working_on(SERIAL), suppress(SolverError, ModelError):
             if is_convex(variant):
-                return by_cones(variant)
-            return None if self._known is None else next_to(variant, self._known)
+                return solve_by_cones(variant)
+            return None if self._known is None else reoptimise(variant, self._known)
         return None
 
     def regretted(self, row: TradeRow) -> TradeRow:

@@ -28,7 +28,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import KEPT, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, unbalance_values
 from laufruhe.solvers.result import Result
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
@@ -227,9 +227,9 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
     first = RobustDesign(
         solved[0], adversary.at(solved[0], proven=True), 0.0, program.active, 1, angles, adversary.samples
     )
-    assert KEPT < first.worst.violation < MAX_MARGIN
+    assert FEASIBILITY_TOL < first.worst.violation < MAX_MARGIN
     kept = _keep_limits(program, adversary, first)
-    assert kept.worst.violation <= KEPT
+    assert kept.worst.violation <= FEASIBILITY_TOL
     assert kept.worst.value > first.worst.value
 
 
@@ -328,7 +328,7 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     found = solve(replace(problem, tolerance=1e-3))
     assert found.certificate is not None
     assert found.certificate.kind is Proof.GLOBAL
-    values = unbalances_of(problem, found)
+    values = unbalance_values(problem, found)
     for z in tolerances_of(problem).draw(np.random.default_rng(4), 200):
         own = with_errors(problem, z)
         value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
@@ -346,7 +346,7 @@ def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
     assert "worst of 30 drawn engines" in found.objective.name
     assert "not of all" in found.certificate.method
     assert not found.details.exact
-    values = unbalances_of(problem, found)
+    values = unbalance_values(problem, found)
     engines = (with_errors(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
     maximum = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
     assert maximum == pytest.approx(worst(found), rel=1e-9)

@@ -11,14 +11,14 @@ from laufruhe import load, solve
 from laufruhe.physics.torque import torque_parts
 from laufruhe.plots.results import twins
 from laufruhe.report.tables import number_tables
-from laufruhe.solvers import state
+from laufruhe.solvers import evaluate_only
 from laufruhe.solvers.prices import Price
 from problem_files import PROBLEMS
 
 
 @pytest.mark.slow
 def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
-    result = state(load(PROBLEMS / "rotary-two.toml"))
+    result = evaluate_only(load(PROBLEMS / "rotary-two.toml"))
     sheet, point = number_tables(result)["chambers"], result.problem.points[0]
     rows = np.array([row[2:] for row in sheet.rows if row[0] == point.name], dtype=float)
     steps = len(np.unique(rows[:, 1]))

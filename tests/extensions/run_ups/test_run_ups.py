@@ -14,7 +14,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
 from laufruhe.report.tables import number_tables
-from laufruhe.solvers import Status, state
+from laufruhe.solvers import Status, evaluate_only
 from problem_files import PROBLEMS, loaded
 
 RPM = np.pi / 30.0
@@ -80,7 +80,7 @@ def test_a_run_up_needs_springs(tmp_path):
 
 @pytest.mark.slow
 def test_tables_files_and_picture_tell_of_the_same_run() -> None:
-    result = state(laufruhe.load(PROBLEMS / "soft-single-run-up.toml"))
+    result = evaluate_only(laufruhe.load(PROBLEMS / "soft-single-run-up.toml"))
     record, sheets = as_dict(result)["run_up"], number_tables(result)
     (grid,) = (grid for grid in tables_of(result) if grid.title == "Through resonance")
     assert [row[0] for row in grid.rows] == ["run-up", "shut-down"]
@@ -93,7 +93,7 @@ def test_tables_files_and_picture_tell_of_the_same_run() -> None:
 
 @pytest.mark.slow
 def test_soft_mounts_without_a_run_have_one_of_three_seconds() -> None:
-    result = state(laufruhe.load(PROBLEMS / "study-soft-mounts.toml"))
+    result = evaluate_only(laufruhe.load(PROBLEMS / "study-soft-mounts.toml"))
     assert as_dict(result)["run_up"]["up"]["time"] == 3.0
     assert "run-up" in number_tables(result)
     assert "through-resonance" not in number_tables(result)

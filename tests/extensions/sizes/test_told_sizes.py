@@ -12,7 +12,7 @@ from laufruhe.numerics.budget import limit_time
 from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status, solve
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.sampling_refinement import refine_sampling
 from solvers.test_sampling_refinement import ENGINE, SECOND, problem
 
@@ -53,7 +53,7 @@ def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met:
     asked = problem(told, objective={"minimise": "rms shaking force"}, **more)
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).violation(asked.limits) <= FEASIBILITY_TOL
 
 
 def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
@@ -71,7 +71,7 @@ def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> Non
     asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
     with limit_time(1e-9):
         result = refine_sampling(asked, solve_sizes)
-    assert with_fine_sampling(result.final).violation(asked.limits) > KEPT
+    assert with_fine_sampling(result.final).violation(asked.limits) > FEASIBILITY_TOL
     assert result.status is Status.FAILED
     assert result.certificate is not None
     assert result.certificate.kind is Proof.NONE

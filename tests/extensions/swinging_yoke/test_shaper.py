@@ -14,7 +14,7 @@ from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.files.reader import load_tables
 from laufruhe.problem.problem import Problem
 from laufruhe.report.wording import fired
-from laufruhe.solvers import Result, state
+from laufruhe.solvers import Result, evaluate_only
 from problem_files import PROBLEMS
 
 PROBLEM = PROBLEMS / "shaper.toml"
@@ -107,7 +107,7 @@ def test_the_weight_of_the_lever_counts_as_a_counterweight(maximum: float) -> No
 
 
 def test_a_shaper_does_not_fire() -> None:
-    assert fired(state(laufruhe.load(PROBLEM))) == ""
+    assert fired(evaluate_only(laufruhe.load(PROBLEM))) == ""
 
 
 def test_a_lever_weight_is_found_by_its_name() -> None:

@@ -18,7 +18,7 @@ from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers.mounts.places import started_at
-from laufruhe.solvers.sampling_refinement import over_read
+from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
 EARLY = 0.1
 """Share of the box budget after which other provers run."""
@@ -34,7 +34,7 @@ def corner_answers(question: Question) -> Iterator[BoxResult]:
         design = started_at(problem, (mounts.tolist(), columns))
         if design is None or design.violation > 0.0:
             return math.inf
-        return design.value - over_read(problem, design.evaluation)
+        return design.value - sampling_overestimate(problem, design.evaluation)
 
     boxes = DesignBoxes(problem, question.value, exact_value)
     result = designed_bound(boxes, question.room, question.known)

@@ -35,7 +35,7 @@ from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate, u
 from laufruhe.prove.witness import Witness, check_near_witness
 from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import KEPT, limit_values
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
 from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
@@ -78,7 +78,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
             value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0,
             f"branch and bound over assignments, {search.node_count} nodes bounded by multipliers",
         )  # fmt: skip
-    is_feasible = final.violation(problem.limits) <= KEPT
+    is_feasible = final.violation(problem.limits) <= FEASIBILITY_TOL
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
     result = Result(
         problem=problem, status=status if is_feasible else Status.FAILED,

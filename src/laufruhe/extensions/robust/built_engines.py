@@ -22,7 +22,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, obj
 from laufruhe.problem.measure import Limit, Measure, kinks_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 
 QUICK = 1
 """Nodes of branch and bound while the design is not final."""
@@ -136,7 +136,7 @@ def largest_violation(limits: Sequence[tuple[Limit, float]]) -> float:
 
 def violated_limits(limits: Sequence[tuple[Limit, float]]) -> tuple[str, ...]:
     """Return the names of limits that are exceeded by more than the feasibility tolerance."""
-    return tuple(limit.name for limit, value in limits if value > limit.maximum * (1.0 + KEPT))
+    return tuple(limit.name for limit, value in limits if value > limit.maximum * (1.0 + FEASIBILITY_TOL))
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,13 +34,13 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, make_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import (
-    KEPT,
+    FEASIBILITY_TOL,
     Design,
     ProofData,
-    decided,
     decision_values,
     infeasible_result,
     limit_values,
+    priced_decisions,
 )
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
@@ -243,7 +243,7 @@ def robust_result(
     details
         Comparison with the best drawing.
     """
-    is_feasible = max(final_worst.violation, design.violation) <= KEPT
+    is_feasible = max(final_worst.violation, design.violation) <= FEASIBILITY_TOL
     zero_level = numerical_zero(problem, design.evaluation.engine)
     certificate = make_certificate(
         final_worst.bound, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method
@@ -260,7 +260,7 @@ def robust_result(
         status=status if is_feasible else Status.FAILED,
         objective=ObjectiveValue.of(problem, final_worst.bound, initial_worst.value),
         certificate=certificate,
-        decisions=decided(design),
+        decisions=priced_decisions(design),
         limits=limits,
         initial=evaluate(problem),
         final=design.evaluation,

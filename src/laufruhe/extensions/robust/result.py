@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from laufruhe.extensions.robust.tolerance import Population
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.solvers.result import Details
+from laufruhe.solvers.result import ResultDetails
 
 SHARE = 0.95
 """Share of built engines in comparisons, unless the problem sets one."""
@@ -77,7 +77,7 @@ class PricedTolerance:
 
 
 @dataclass(frozen=True)
-class RobustResult(Details):
+class RobustResult(ResultDetails):
     """Two designs under the same tolerances, and the price of each tolerance.
 
     Attributes
@@ -142,7 +142,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class AssemblyResult(Details):
+class AssemblyResult(ResultDetails):
     """Best assembly, compared with random ones [SI].
 
     Attributes

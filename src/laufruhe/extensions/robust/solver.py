@@ -38,7 +38,14 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, ProofData, evaluate_design, unbalances_of
+from laufruhe.solvers.conclusion import (
+    FEASIBILITY_TOL,
+    FEASIBLE,
+    MOST_REFINEMENTS,
+    ProofData,
+    evaluate_design,
+    unbalance_values,
+)
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible, smallest_conflict, tighten_limits
 from laufruhe.solvers.general import solve_star_by_star
@@ -130,7 +137,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     if is_unsolved or not nonzero.tolerances:
         return replace(drawing, problem=problem)
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
-    start = tuple(unbalances_of(problem, drawing))
+    start = tuple(unbalance_values(problem, drawing))
     report_progress("worst errors of the drawing")
     adversary, robust = _decide(problem, population, start, drawing)
     adversary = replace(adversary, samples=robust.samples)
@@ -165,7 +172,7 @@ def _decide(
     # with symmetric errors at least half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     robust = replace(robust, bound=bound if problem.decisions else robust.worst.bound)
-    for _ in until_time_limit(range(READINGS)):
+    for _ in until_time_limit(range(MOST_REFINEMENTS)):
         if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
         sampled = replace(sampled, samples=fine_samples(robust.samples))
@@ -339,7 +346,7 @@ def _minimise_worst_case(
         candidate = RobustDesign(
             values, worst, bound, program.active, len(program.errors), samples, adversary.samples, program.margin
         )
-        best = min(best, candidate, key=lambda design: (design.worst.violation > KEPT, design.worst.value))
+        best = min(best, candidate, key=lambda design: (design.worst.violation > FEASIBILITY_TOL, design.worst.value))
         if gap_of(worst.bound, bound, zero_level) <= problem.tolerance and worst.violation <= FEASIBLE:
             break
     if not best.worst.proven or best.samples < adversary.samples:
@@ -348,7 +355,7 @@ def _minimise_worst_case(
 
 
 def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float) -> RobustDesign:
-    for _ in until_time_limit(range(READINGS)):
+    for _ in until_time_limit(range(MOST_REFINEMENTS)):
         if not is_over(best.bound, best.worst.bound, zero_level):
             break
         adversary = replace(adversary, samples=fine_samples(best.samples))
@@ -360,7 +367,7 @@ def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) ->
     """Lower limits until the proven bound of a design satisfies them, if the bound alone violates them."""
     program.margin = best.margin
     for _ in until_time_limit(range(MOST_MARGINS)):
-        if not KEPT < best.worst.violation <= MAX_MARGIN:
+        if not FEASIBILITY_TOL < best.worst.violation <= MAX_MARGIN:
             break
         program.lower(best.worst.violation)
         # the initial design has no program yet

@@ -22,7 +22,7 @@ from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import infeasible_result, unbalances_of, with_limits
+from laufruhe.solvers.conclusion import infeasible_result, unbalance_values, with_constant_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import smallest_conflict
 from laufruhe.solvers.result import Result, Status
@@ -41,7 +41,11 @@ def solve_run_cones(
         return infeasible_result(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
     for _ in until_time_limit(range(_AGAIN)):
         result = decide(steps.problem)
-        x = decision_vector(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
+        x = (
+            decision_vector(domains_of(problem.decisions), unbalance_values(problem, result))
+            if result.decisions
+            else None
+        )
         fidelity = result.problem.fidelity
         if fidelity != problem.fidelity:
             # compute the rows again with the fidelity that the accuracy needs
@@ -54,7 +58,7 @@ def solve_run_cones(
         if x is None or result.status is Status.INFEASIBLE or steps.has_all(x):
             break
         steps.add(x)
-    return with_limits(replace(result, problem=problem), problem.limits)
+    return with_constant_limits(replace(result, problem=problem), problem.limits)
 
 
 class _Steps:

@@ -17,12 +17,12 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.solvers.conclusion import KEPT, ProofData, broken_limits, build_result, infeasible_result
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result, violated_limits
 from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
 from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 
 STARTS, STOPPED_STARTS = 6, 3
 """Most starts of a search, without and with bump stops: each step costs several run-ups."""
@@ -55,7 +55,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     box_result = bound_search(problem, search, False) if has_bound else BoxResult(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     best = search.best_or_baseline
-    if best is None or best.design.violation > KEPT:
+    if best is None or best.design.violation > FEASIBILITY_TOL:
         conflict = minimal_conflict(problem) if box_result.bound == math.inf else ()
         result = infeasible_result(problem, initial, conflict, timing)
         return result if conflict else _infeasible(problem, search, best, result)
@@ -82,7 +82,7 @@ def _best_result(
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, box_result: BoxResult) -> str:
-    ends = ends_in_words(optima, len(distinct(optima, scale, 1e-3)))
+    ends = describe_starts(optima, len(distinct_optima(optima, scale, 1e-3)))
     if box_result.bound > relaxed_bound:
         bound = f"; bounds of mounts and run-ups on {box_result.boxes} box{'es' if box_result.boxes > 1 else ''}"
     elif relaxed_bound > 0.0:
@@ -95,7 +95,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, 
 def _infeasible(problem: Problem, search: MountSearch, best: SearchResult | None, result: Result) -> Result:
     names, nearest = "the limits", ""
     if best is not None:
-        names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, best.design.evaluation))
+        names = " and ".join(f"'{name}'" for name in violated_limits(problem.limits, best.design.evaluation))
         nearest = f" (nearest misses by {best.design.violation:.3g} of a limit)"
     starts = sum(optimum.starts for optimum in search.optima)
     message = f"no design found: from {starts} starts none satisfies {names}{nearest}; relax it, or open more"

@@ -19,7 +19,7 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
+from laufruhe.solvers.conclusion import quote_names, violated_limits, with_constant_limits
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 
@@ -53,10 +53,10 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     relaxed = None
     if without_runs.objective:
         relaxed = decide(without_runs)
-        violated = broken_limits(limits, relaxed.final)
+        violated = violated_limits(limits, relaxed.final)
         if not relaxed.status.has_design or not (violated or terms):
             # the relaxed optimum satisfies the limits of run-ups
-            return with_limits(relaxed, problem.limits)
+            return with_constant_limits(relaxed, problem.limits)
         if relaxed.problem.fidelity != problem.fidelity:
             # its bound holds for the fidelity that its accuracy needed
             problem = problem.at(relaxed.problem.fidelity)
@@ -67,12 +67,14 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     if terms or relaxed is None:
         name = terms[0].measure.name
         raise ModelError(f"{name} is minimised over unbalances and mounts, not over {other_kinds}; fix it, or limit it")
-    names = quoted(broken_limits(limits, relaxed.final))
+    names = quote_names(violated_limits(limits, relaxed.final))
     message = (
         f"the best design found breaks {names}: beside {other_kinds} a run-up is checked, not designed for; "
         f"relax it, fix {other_kinds}, or limit travel"
     )
-    return replace(with_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=message)
+    return replace(
+        with_constant_limits(relaxed, problem.limits), status=Status.FAILED, certificate=None, message=message
+    )
 
 
 def _run_result(

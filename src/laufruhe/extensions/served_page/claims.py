@@ -10,7 +10,7 @@ from enum import StrEnum
 from laufruhe.present.numbers import figure, number
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
 
@@ -102,7 +102,7 @@ class Claim:
 def is_broken(limit: LimitValue) -> bool:
     """Return True for a limit that a design breaks by more than the tolerance of limits."""
     over = limit.value - limit.limit if limit.side == "at most" else limit.limit - limit.value
-    return over > KEPT * (abs(limit.limit) or 1.0)
+    return over > FEASIBILITY_TOL * (abs(limit.limit) or 1.0)
 
 
 def breaks_words(limits: Iterable[LimitValue]) -> str:

@@ -19,7 +19,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, gap_of
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.cones.tie_break import break_ties
@@ -137,7 +137,7 @@ class Follower:
 
 
 def _breaks(value: float, maximum: float) -> bool:
-    return value > maximum * (1.0 + KEPT)
+    return value > maximum * (1.0 + FEASIBILITY_TOL)
 
 
 def _conflict(conflict: tuple[str, ...]) -> SliderOptimum:

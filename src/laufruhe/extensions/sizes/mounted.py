@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.solvers.conclusion import KEPT, Design, build_result, evaluate_design
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, evaluate_design
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, spread_starts
@@ -94,7 +94,7 @@ def _bound(problem: Problem, design: Design) -> float:
     depends_on_sizes = any(
         term.measure.channel.size_value is not None or _has_size_factors(term.measure) for term in problem.objective
     )
-    if model.moves_rod or depends_on_sizes or design.violation > KEPT:
+    if model.moves_rod or depends_on_sizes or design.violation > FEASIBILITY_TOL:
         return 0.0
     relaxed, reference = with_masses(problem, model, design.values)
     gap_tolerance = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))

@@ -22,11 +22,17 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Multipliers, ProofStrength
 from laufruhe.solvers.boxes.box_designs import rebalance
-from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, witness_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
+from laufruhe.solvers.smooth.local_programs import (
+    LocalProgram,
+    best_local_optimum,
+    proof_data,
+    prove_design,
+    spread_starts,
+)
 
 MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
 """Most boxes if the rod length is open, which takes ten times as long, and if each box has cone programs."""
@@ -111,10 +117,10 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
             value, gap_tolerance = known, gap_tolerance * known / value
         place = program.columns(program.shares(design.values))[program.sized]
         return divided_sizes(
-            boxes, value, gap_tolerance, maximum, known_of(design, place) if value < math.inf else None
+            boxes, value, gap_tolerance, maximum, witness_of(design, place) if value < math.inf else None
         )
 
-    outcome = proven(program, optimum, bounded)
+    outcome = prove_design(program, optimum, bounded)
     if boxes is not None and outcome.excludes_all:
         conflict = smallest_conflict(
             problem.limits, lambda limits: divided_sizes(boxes.with_limits(limits), math.inf, 0.0, 64).bound == math.inf

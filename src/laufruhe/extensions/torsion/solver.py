@@ -16,10 +16,16 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult, bisect_box
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.conclusion import KEPT, Design, build_result, infeasible_result, known_of
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, infeasible_result, witness_of
 from laufruhe.solvers.method import Method, is_pointwise
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
+from laufruhe.solvers.smooth.local_programs import (
+    LocalProgram,
+    best_local_optimum,
+    proof_data,
+    prove_design,
+    spread_starts,
+)
 
 # open numbers that are divided, and boxes that this may take
 MOST_OPEN, MOST_BOXES = 3, 3000
@@ -44,16 +50,16 @@ def solve_torsion(problem: Problem) -> Result:
             return BoxResult(0.0, 0)
         coordinates = boxes.coordinates
         place = coordinates.from_decisions(np.array([float(x.real) for x in design.values]))
-        known = known_of(design, place) if value < math.inf else None
+        known = witness_of(design, place) if value < math.inf else None
         divided = bisect_box(boxes, coordinates.lower, coordinates.upper, value, room, maximum, known)
         return replace(divided, places=tuple(coordinates.decisions(x) for x in divided.places))
 
-    outcome = proven(program, best, bounded)
+    outcome = prove_design(program, best, bounded)
     if outcome.excludes_all:
         names = tuple(limit.name for limit in problem.limits)
         return infeasible_result(problem, initial, names, {"solve": time.perf_counter() - started})
     method = f"local programs; lower bound on {outcome.divided.boxes} boxes of discs and shafts"
-    is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.violation <= KEPT
+    is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.violation <= FEASIBILITY_TOL
     bound = outcome.bound if boxes.coordinates.is_exact else 0.0
     proof = proof_data(
         program, outcome.design, bound, ProofStrength.PARTIAL if is_near else ProofStrength.RELAXED, method

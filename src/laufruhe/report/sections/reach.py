@@ -8,18 +8,18 @@ from laufruhe.present.numbers import DASH, figure, share, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.values import AttainableLimit, DecisionValue, Nearest, meaningful
+from laufruhe.solvers.values import AttainableLimit, DecisionValue, NearestDesign, relevant_decisions
 
 NOTE = "Each column breaks the limit in its heading; none is an answer."
 
 
 def tables(result: Result) -> list[Table]:
     """Return the designs nearest to each limit, a row per decision."""
-    designs: list[tuple[str, AttainableLimit | Nearest]] = [
+    designs: list[tuple[str, AttainableLimit | NearestDesign]] = [
         (f"nearest to '{design.name}'", design) for design in result.reached if design.decisions
     ]
     designs += [("nearest to all limits", result.nearest)] if result.nearest is not None else []
-    known = [{decision.name: decision for decision in meaningful(design.decisions)} for _, design in designs]
+    known = [{decision.name: decision for decision in relevant_decisions(design.decisions)} for _, design in designs]
     names = dict.fromkeys(name for each in known for name in each)
     first = ("value reached", *(figure(design.value, design.unit) for _, design in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
@@ -60,7 +60,7 @@ def _sentence(limit: AttainableLimit, lead: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _nearest(design: Nearest) -> str:
+def _nearest(design: NearestDesign) -> str:
     value, required = figure(design.value, design.unit), with_unit(design.limit, design.unit)
     beyond = f", {share(design.violation, 3)} beyond" if design.limit else ""
     return (

@@ -26,8 +26,8 @@ from laufruhe.solvers.conclusion import (
     build_result,
     evaluate_design,
     infeasible_result,
-    known_of,
-    unbalances_of,
+    unbalance_values,
+    witness_of,
 )
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import Price
@@ -90,7 +90,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
 
     def witness_of(self, design: RebalancedDesign) -> Witness | None:
         """Return a design as a witness of bounds, or None if it violates limits."""
-        return known_of(design.design, self.place(design))
+        return witness_of(design.design, self.place(design))
 
     def place(self, design: RebalancedDesign) -> Array:
         """Return the values of the decisions that boxes bound, shape (n,)."""
@@ -169,7 +169,7 @@ def rebalance(problem: Problem, balance: Problem, fixed_values: dict[str, Value]
         balance = replace(balance, tolerance=SHARE * problem.tolerance)
         result = solve_unbalances(balance, angles=angles)
         if result.status is not Status.INFEASIBLE:
-            unbalances = unbalances_of(balance, result)
+            unbalances = unbalance_values(balance, result)
             values |= dict(zip((decision.name for decision in balance.decisions), unbalances, strict=True))
         samples = result.final.samples
     return RebalancedDesign(evaluate_design(problem, list(values.values()), samples), result)

@@ -20,10 +20,16 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, divided
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, witness_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, proven, spread_starts
+from laufruhe.solvers.smooth.local_programs import (
+    LocalProgram,
+    best_local_optimum,
+    proof_data,
+    prove_design,
+    spread_starts,
+)
 
 WIDTH = "flywheel.width"
 # share of the tolerance for a monotone objective, whose gap closes fast
@@ -155,7 +161,7 @@ def solve_flywheel(problem: Problem) -> Result:
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
 
     def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
-        known = None if math.isinf(value) else known_of(design, coordinates.place(design.values), violation=0.0)
+        known = None if math.isinf(value) else witness_of(design, coordinates.place(design.values), violation=0.0)
         result = divided(
             functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, known=known
         )
@@ -165,7 +171,7 @@ def solve_flywheel(problem: Problem) -> Result:
         feasibility = replace(coordinates.monotone_problem(initial, limits), terms=())
         return divided(feasibility, math.inf, 0.0, FEW_BOXES).bound == math.inf
 
-    outcome = proven(program, best, bounded)
+    outcome = prove_design(program, best, bounded)
     timing = {"solve": time.perf_counter() - started}
     if outcome.excludes_all:
         return infeasible_result(problem, initial, smallest_conflict(problem.limits, is_infeasible), timing)

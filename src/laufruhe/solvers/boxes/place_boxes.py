@@ -31,7 +31,7 @@ from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
-from laufruhe.solvers.conclusion import unbalances_of, values_of
+from laufruhe.solvers.conclusion import unbalance_values, values_of
 from laufruhe.solvers.result import Result
 
 AXIAL = 0
@@ -169,7 +169,7 @@ class Relaxation:
         lower, upper
             Bounds of the positions [m], shape (places,) each.
         """
-        unbalances = dict(zip((d.name for d in relaxed.unbalances), unbalances_of(relaxed, result), strict=True))
+        unbalances = dict(zip((d.name for d in relaxed.unbalances), unbalance_values(relaxed, result), strict=True))
         # unbalances and their coordinates along each position, a pair of arrays per decision
         moments: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
         nodes = self._nodes(lower, upper)

@@ -18,14 +18,14 @@ from laufruhe.prove.branch_and_bound import bisect_box
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.boxes.search import search_from_grid
 from laufruhe.solvers.conclusion import (
-    KEPT,
+    FEASIBILITY_TOL,
     Design,
     ProofData,
-    better,
+    better_design,
     build_result,
     evaluate_design,
     infeasible_result,
-    known_of,
+    witness_of,
 )
 from laufruhe.solvers.result import Result
 
@@ -42,10 +42,10 @@ def solve_shared_leads(problem: Problem) -> Result:
     lower, upper = real_bounds(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
     value, gap_tolerance, known = math.inf, 0.0, None
-    if best is not None and best.violation <= KEPT:
+    if best is not None and best.violation <= FEASIBILITY_TOL:
         value = best.value
         gap_tolerance = SHARE * problem.tolerance * max(value, numerical_zero(problem))
-        known = known_of(best, np.array([float(x.real) for x in best.values]))
+        known = witness_of(best, np.array([float(x.real) for x in best.values]))
     division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MOST_BOXES), known)
     timing = {"solve": time.perf_counter() - started}
     if best is None or (known is None and math.isinf(division.bound)):
@@ -70,5 +70,5 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
     ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
     best = design(np.array([d.real_start for d in problem.decisions]))
     for end in ends:
-        best = best if end is None else better(end, best)
+        best = best if end is None else better_design(end, best)
     return best

@@ -18,7 +18,7 @@ from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, evaluate_design, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, FEASIBLE, evaluate_design, unbalance_values
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.tie_break import distance
 from laufruhe.solvers.prices import angle_name
@@ -66,7 +66,7 @@ def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or is_time_over():
         return ()
     model = AffineModel(problem)
-    x = decision_vector(model.domains, unbalances_of(result.problem, result))
+    x = decision_vector(model.domains, unbalance_values(result.problem, result))
     rows = _widen_limits(model.at(min(model.full_samples, COARSE)), x)
     ranges = []
     for domain in model.domains:
@@ -100,7 +100,7 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
     if not (is_plain and is_affine and 0 < len(problem.decisions) <= MOST_OPEN) or is_time_over():
         return None
     model = AffineModel(problem)
-    x = projected_vector(model.domains, unbalances_of(problem, result))
+    x = projected_vector(model.domains, unbalance_values(problem, result))
     rows = _widen_limits(model.at(min(model.full_samples, COARSEST)), x)
     ends = [] if rows.groups else _ends(rows, x, FAINT)
     if not ends:
@@ -117,7 +117,7 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
             candidate = x + share * (end - x)
             values = [domain.complex_value(candidate) for domain in model.domains]
             design = evaluate_design(problem, values, result.final.samples)
-            if design.value <= maximum and design.violation <= KEPT:
+            if design.value <= maximum and design.violation <= FEASIBILITY_TOL:
                 designs.append(candidate)
                 break
     return tuple(entry for domain in _free_domains(rows, designs) for entry in ranges_of(domain, designs))

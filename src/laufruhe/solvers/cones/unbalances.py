@@ -20,14 +20,14 @@ from laufruhe.problem.numerical_zero import ROUNDING, numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import (
+    FEASIBILITY_TOL,
     FEASIBLE,
-    KEPT,
     ProofData,
-    broken_limits,
     build_result,
     evaluate_design,
     failed_result,
     infeasible_result,
+    violated_limits,
 )
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
@@ -53,7 +53,7 @@ def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
     return (
         solve_unbalances(balance).conflict
         if balance.decisions
-        else broken_limits(limits, with_fine_sampling(evaluate(balance)))
+        else violated_limits(limits, with_fine_sampling(evaluate(balance)))
     )
 
 
@@ -104,7 +104,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = evaluate_design(problem, values, cycle_samples)
-    if fixed and design.violation > KEPT:
+    if fixed and design.violation > FEASIBILITY_TOL:
         design = evaluate_design(problem, values, with_fine_sampling(design.evaluation).samples)
     initial = replace(initial, samples=design.evaluation.samples)
     timing["evaluate"] = time.perf_counter() - solved
@@ -132,7 +132,7 @@ def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tu
     samples = model.full_samples * max(2, math.ceil(FINE_SAMPLES / model.full_samples))
     zero = np.zeros(sum(domain.width for domain in model.domains))
     values = [(limit, model.norm(limit.measure, samples).value(zero)) for limit in fixed]
-    violated = [limit.name for limit, value in values if value > limit.maximum * (1.0 + KEPT)]
+    violated = [limit.name for limit, value in values if value > limit.maximum * (1.0 + FEASIBILITY_TOL)]
     return fixed, tuple(violated[:1])
 
 
@@ -162,21 +162,29 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     for k in until_time_limit(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
-            if best is not None and best.violation <= KEPT and _keeps_limits_with_fine_sampling(problem, best):
+            if (
+                best is not None
+                and best.violation <= FEASIBILITY_TOL
+                and _keeps_limits_with_fine_sampling(problem, best)
+            ):
                 return best, samples
             # sample averages of means: at few samples, a mean may exceed its value over the whole cycle (P7)
             if is_infeasible(model.at(samples, averaged=True)):
                 return None, samples
             # a limit close to the smallest possible value is met within the tolerance of limits
-            optimum = _attempt(problem, model, samples, zero_level, FEASIBLE - KEPT)
-            if optimum is not None and optimum.violation <= KEPT and _keeps_limits_with_fine_sampling(problem, optimum):
+            optimum = _attempt(problem, model, samples, zero_level, FEASIBLE - FEASIBILITY_TOL)
+            if (
+                optimum is not None
+                and optimum.violation <= FEASIBILITY_TOL
+                and _keeps_limits_with_fine_sampling(problem, optimum)
+            ):
                 best = optimum
             samples *= 2
             continue
         best = optimum
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         is_close = best.gap <= problem.tolerance or not problem.search.proves
-        is_allowed = best.violation <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
+        is_allowed = best.violation <= (FEASIBLE if k < MOST_DOUBLINGS else FEASIBILITY_TOL)
         is_fathomed = is_allowed and (is_close or k >= MOST_DOUBLINGS)
         if rows > MOST_ROWS or (is_fathomed and _keeps_limits_with_fine_sampling(problem, optimum)):
             break
@@ -189,7 +197,7 @@ def _keeps_limits_with_fine_sampling(problem: Problem, optimum: Optimum) -> bool
     if not any(limit.measure.is_load for limit in problem.load_limits):
         return True
     values = [domain.complex_value(optimum.x) for domain in optimum.problem.domains]
-    return violation_at_fine_sampling(problem, evaluate(problem, problem.design(values))) <= KEPT
+    return violation_at_fine_sampling(problem, evaluate(problem, problem.design(values))) <= FEASIBILITY_TOL
 
 
 def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_level: float) -> Optimum | None:

@@ -17,11 +17,11 @@ from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
-from laufruhe.solvers.conclusion import KEPT, Design, known_of, values_of
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, values_of, witness_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.sampling_refinement import over_read
+from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
 MOST_DIVISIONS = 3
 # share of the problem's largest number of boxes for a test of one set of limits
@@ -52,10 +52,10 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
     for _ in until_time_limit(range(MOST_DIVISIONS)):
         design = search.best_or_baseline.design if search.best_or_baseline is not None else None
         value, known = math.inf, None
-        if design is not None and design.violation <= KEPT:
+        if design is not None and design.violation <= FEASIBILITY_TOL:
             # bounds exclude errors of coarse sampling
-            value = design.value - over_read(problem, design.evaluation)
-            known = known_of(design, mount_numbers(design))
+            value = design.value - sampling_overestimate(problem, design.evaluation)
+            known = witness_of(design, mount_numbers(design))
         gap_tolerance = gap_tolerance_of(
             value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None)
         )

@@ -35,7 +35,7 @@ from laufruhe.prove.mounts.convex_functions import (
 )
 from laufruhe.solvers.conclusion import (
     ProofData,
-    better,
+    better_design,
     build_result,
     evaluate_design,
     infeasible_result,
@@ -159,7 +159,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
             for name, price in bounds_of(decision, np.array([value]), gradient[k : k + 1]).items()
         },
     )
-    design = better(evaluate_design(problem, [float(v) for v in x]), initial_design(problem, initial))
+    design = better_design(evaluate_design(problem, [float(v) for v in x]), initial_design(problem, initial))
     return build_result(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
 
 

@@ -28,14 +28,14 @@ from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import (
-    KEPT,
+    FEASIBILITY_TOL,
     Design,
     ProofData,
     build_result,
-    decided,
     infeasible_result,
-    nearest_of,
-    unbalances_of,
+    nearest_record,
+    priced_decisions,
+    unbalance_values,
 )
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict
@@ -45,7 +45,7 @@ from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import evaluation_count, place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
-from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 NOTABLE_RATIO = 1.01
@@ -136,7 +136,7 @@ def _search_and_bound(
             division = bound_search(problem, search, defer_bounds)
             best = search.best_or_baseline
             timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
-            if best is None or best.design.violation > KEPT:
+            if best is None or best.design.violation > FEASIBILITY_TOL:
                 return _without_design(problem, search, initial, division, timing), search.turns
             balance = ahead.result(best.design.values, _share(best.design))
     rebalanced = None if balance is None else _rebalanced(best.design, *balance)
@@ -167,14 +167,14 @@ def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], flo
     result = solve_unbalances(replace(problem, engine=engine).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
-    return unbalances_of(problem, result), result.certificate.gap
+    return unbalance_values(problem, result), result.certificate.gap
 
 
 def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
     mounts, columns = iter(_mounts(design)), iter(unbalances)
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
     rebalanced = evaluate_design_at(design.problem, values)
-    return None if rebalanced is None or rebalanced.violation > KEPT else (rebalanced, gap)
+    return None if rebalanced is None or rebalanced.violation > FEASIBILITY_TOL else (rebalanced, gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -270,8 +270,8 @@ def _result(
 def _method(
     optima: Sequence[LocalOptimum], scale: float, rebalanced: tuple[Design, float] | None, division: BoxResult
 ) -> str:
-    ends = distinct(optima, scale)
-    text = ends_in_words(optima, len(ends))
+    ends = distinct_optima(optima, scale)
+    text = describe_starts(optima, len(ends))
     if len(ends) > 1 and ends[-1].value > NOTABLE_RATIO * ends[0].value > 0.0:
         text += f", up to {ends[-1].value / ends[0].value:.3g} times the best"
     if rebalanced is not None:
@@ -298,7 +298,7 @@ def _without_design(
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
     design = search.best.design if search.best else None
-    nearest_design = nearest_of(problem, design.evaluation, decided(design)) if design else None
+    nearest_design = nearest_record(problem, design.evaluation, priced_decisions(design)) if design else None
     return replace(result, status=Status.FAILED, message=message, nearest=nearest_design)
 
 

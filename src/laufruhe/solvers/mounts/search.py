@@ -22,8 +22,8 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
 from laufruhe.solvers.mounts.places import Place, evaluate_design_at, started_at
 from laufruhe.solvers.mounts.starts import start_points
-from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
-from laufruhe.solvers.smooth.nonlinear import StopWhen, solve_nonlinear, try_all
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima, is_explored
+from laufruhe.solvers.smooth.nonlinear import StopWhen, run_all_starts, solve_nonlinear
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
@@ -144,7 +144,7 @@ class MountSearch:
 
     def refine(self) -> None:
         """Search again from the best local optima, with the time step of the final evaluation."""
-        optima = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
+        optima = distinct_optima(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
         optima = optima or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
         starts = [_split(self.joint, optimum.x) for optimum in optima[:MOST_REFINED]]
         if self.best is not None and self.best.optimum not in optima[:MOST_REFINED]:
@@ -202,7 +202,7 @@ class MountSearch:
             joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
         ]
         optima = self._solve(starts, self._is_explored)
-        centres = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
+        centres = distinct_optima(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
         if centres and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
             low, high = real_bounds(problem.mount_decisions)
             starts = []
@@ -211,7 +211,7 @@ class MountSearch:
                 centre, columns = _split(joint, x)
                 mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
                 starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.throw_deviations(x)))
-            more = self._solve(starts, try_all, len(points))
+            more = self._solve(starts, run_all_starts, len(points))
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._evaluate_optima(optima)
 

@@ -30,12 +30,12 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.solvers.conclusion import contradiction, evaluate_design, known_of, result_under, values_of
+from laufruhe.solvers.conclusion import conflict_message, evaluate_design, refine_result, values_of, witness_of
 from laufruhe.solvers.mounts.bounds import mount_numbers, with_mount_bounds
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.sampling_refinement import over_read
+from laufruhe.solvers.sampling_refinement import sampling_overestimate
 from laufruhe.solvers.stars.cut_search import search_designs
 from laufruhe.solvers.stars.even_search import MOST_LISTED
 from laufruhe.solvers.stars.families import Family, families_of
@@ -245,7 +245,7 @@ def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], desig
         bound = min(certificate.lower_bound if certificate else 0.0 for certificate in certificates)
     division = _divide_boxes(problem, phasing, best)
     bound = max(bound, division.bound)
-    result, doubt = result_under(best.result, bound, zero_level)
+    result, doubt = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
     method = details.method
     if division.boxes:
@@ -264,8 +264,8 @@ def _divide_boxes(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxRe
         return BoxResult(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
     design = evaluate_design(realised, values_of(realised, best.result))
-    known = known_of(design, mount_numbers(design))
-    value = design.value - over_read(realised, design.evaluation)
+    known = witness_of(design, mount_numbers(design))
+    value = design.value - sampling_overestimate(realised, design.evaluation)
     gap_tolerance = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return proven(Question(realised, value, gap_tolerance, design.values, known, moves=(phasing, best.candidate)))
 
@@ -310,7 +310,7 @@ def _without_design(problem: Problem, designs: list[StarDesign], baseline: Evalu
     # each star may violate other limits
     names = {name for design in designs for name in design.result.conflict} if is_proven else ()
     conflict = tuple(limit.name for limit in problem.limits if limit.name in names)
-    reason = contradiction(conflict) if is_proven else first.message
+    reason = conflict_message(conflict) if is_proven else first.message
     message = f"{reason} (best of {len(designs)} of {counted(design_count, 'star')})"
     return replace(
         first, problem=problem, status=status, objective=None, certificate=None, initial=baseline, final=baseline,

@@ -18,7 +18,7 @@ from laufruhe.problem.decision import domains_of, projected_vector, real_bounds
 from laufruhe.problem.evaluation import Evaluation, objective_value, with_mounts
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import unbalances_of
+from laufruhe.solvers.conclusion import unbalance_values
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 
@@ -61,7 +61,7 @@ def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
     """Return the mounts of a result [SI] and its columns of unbalances [kg m], shape (columns,)."""
     values = {decision.name: decision.value for decision in result.decisions}
     mounts = [values[decision.name] for decision in problem.mount_decisions]
-    return mounts, projected_vector(domains_of(problem.unbalances), unbalances_of(problem, result))
+    return mounts, projected_vector(domains_of(problem.unbalances), unbalance_values(problem, result))
 
 
 def _baseline_balance(problem: Problem) -> list[complex] | None:
@@ -70,7 +70,7 @@ def _baseline_balance(problem: Problem) -> list[complex] | None:
     result = solve_unbalances(
         replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, START_TOLERANCE))
     )
-    return unbalances_of(problem, result) if result.decisions else None
+    return unbalance_values(problem, result) if result.decisions else None
 
 
 def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:

@@ -71,7 +71,7 @@ class LocalOptimum:
         return self.ending in (Ending.CONVERGED, Ending.ACCEPTABLE) and self.violation <= _NEAR
 
 
-def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
+def distinct_optima(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
     """Return usable optima, best first, whose objectives differ by more than `tolerance * scale`."""
     best_optima: list[LocalOptimum] = []
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: o.value):
@@ -80,7 +80,7 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _S
     return tuple(best_optima)
 
 
-def ends_in_words(optima: Sequence[LocalOptimum], count: int) -> str:
+def describe_starts(optima: Sequence[LocalOptimum], count: int) -> str:
     """Return a text with the number of IPOPT starts and of different optima."""
     if not optima:
         return "a design to start from"
@@ -99,7 +99,7 @@ def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
     (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80). The new one is the best of all w + 1 with probability
     1 / (w + 1). A start without a usable optimum counts as a new optimum.
     """
-    n, best_optima = sum(optimum.starts for optimum in optima), distinct(optima, scale)
+    n, best_optima = sum(optimum.starts for optimum in optima), distinct_optima(optima, scale)
     w = len(best_optima) + sum(optimum.starts for optimum in optima if not optimum.usable)
     best_value = best_optima[0].value + _SAME * scale if best_optima else 0.0
     best_starts = sum(optimum.starts for optimum in optima if optimum.usable and optimum.value <= best_value)

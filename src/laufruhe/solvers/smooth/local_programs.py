@@ -21,14 +21,14 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
-from laufruhe.solvers.conclusion import KEPT, Design, ProofData, evaluate_design
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, ProofData, evaluate_design
 from laufruhe.solvers.prices import Price, Slopes, bounds_of, edges_at, prices_of
-from laufruhe.solvers.sampling_refinement import over_read
+from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
 # designs evaluated for each start; step of differences, margin of an active limit, and value of an infinite objective
-LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
+POINTS_PER_START, STEP, ACTIVE_MARGIN, INFINITE_VALUE = 4, 1e-6, 1e-6, 1e3
 # searches from the boxes with the smallest bound
-TRIES = 2
+ROUNDS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +111,7 @@ class LocalProgram:
 
 def spread_starts(problem: Problem) -> list[Array]:
     """Return start points by Latin hypercube sampling, shape (n,) each."""
-    rng, count = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
+    rng, count = np.random.default_rng(problem.search.seed), POINTS_PER_START * problem.search.starts
     # one point in each of `count` equal intervals of every column
     columns = [
         (rng.permutation(count) + rng.random(count)) / count for d in problem.decisions for _ in range(d.set.width)
@@ -131,7 +131,7 @@ def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) 
     """
     ranked = sorted(until_time_limit(places), key=program.rank)
     best = ranked[0]
-    for place in ranked[: max(1, min(starts, LOOKS))]:
+    for place in ranked[: max(1, min(starts, POINTS_PER_START))]:
         if is_time_over():
             break
         best = min(best, _local_optimum(program, place), key=program.rank)
@@ -155,7 +155,7 @@ def _local_optimum(program: LocalProgram, place: Array) -> Array:
                 raise _TimeOverError
             result = program.numbers(point)
             best = min(best, (point, _rank(result)), key=lambda pair: pair[1])
-            cache[point.tobytes()] = np.append(min(result[0] / unit, FAR), result[1:])
+            cache[point.tobytes()] = np.append(min(result[0] / unit, INFINITE_VALUE), result[1:])
         return cache[point.tobytes()]
 
     def slopes(x: Array) -> Array:
@@ -163,7 +163,7 @@ def _local_optimum(program: LocalProgram, place: Array) -> Array:
             raise _TimeOverError
         result = program.slopes(np.clip(x, 0.0, 1.0))
         result[0] /= unit
-        return np.nan_to_num(result, posinf=FAR, neginf=-FAR)
+        return np.nan_to_num(result, posinf=INFINITE_VALUE, neginf=-INFINITE_VALUE)
 
     limits = len(initial) - 1
     inside: Any = [{"type": "ineq", "fun": lambda x: numbers(x)[1:], "jac": lambda x: slopes(x)[1:]}] if limits else []
@@ -185,15 +185,15 @@ class _TimeOverError(Exception):
 def _rank(numbers: Array) -> tuple[float, float]:
     # sort key: feasible designs by objective, others by violation
     value, *rooms = numbers
-    return max(-min(rooms, default=0.0), KEPT), float(value)
+    return max(-min(rooms, default=0.0), FEASIBILITY_TOL), float(value)
 
 
-BoundedBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
+BoundByBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
 """Function of objective, gap tolerance and design that returns a lower bound by boxes."""
 
 
 @dataclass(frozen=True, eq=False)
-class Proven:
+class ProvenDesign:
     """Best design, as shares and evaluated, with the lower bound by boxes."""
 
     shares: Array
@@ -203,15 +203,15 @@ class Proven:
     @property
     def excludes_all(self) -> bool:
         """True if boxes prove that no design meets the limits."""
-        return self.design.violation > KEPT and self.divided.bound == math.inf
+        return self.design.violation > FEASIBILITY_TOL and self.divided.bound == math.inf
 
     @property
     def bound(self) -> float:
         """Lower bound of the objective; zero if the design violates a limit."""
-        return self.divided.bound if self.design.violation <= KEPT else 0.0
+        return self.divided.bound if self.design.violation <= FEASIBILITY_TOL else 0.0
 
 
-def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
+def prove_design(program: LocalProgram, best: Array, bounded: BoundByBoxes) -> ProvenDesign:
     """Return a design with its bound; search again from the boxes with the smallest bound while a gap is open.
 
     Parameters
@@ -222,16 +222,16 @@ def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
         Lower bound by boxes.
     """
     problem = program.problem
-    result = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
-    for _ in range(TRIES):
+    result = ProvenDesign(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
+    for _ in range(ROUNDS):
         if is_time_over():
             break
         value, room = math.inf, 0.0
-        if result.design.violation <= KEPT:
+        if result.design.violation <= FEASIBILITY_TOL:
             value = result.design.value
             room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, result.design.evaluation.engine))
             # boxes cannot close the part of the gap that is a sampling error
-            value -= over_read(problem, result.design.evaluation)
+            value -= sampling_overestimate(problem, result.design.evaluation)
         result = replace(result, divided=bounded(value, room, result.design))
         places = [program.place(x) for x in result.divided.places]
         if not places or result.divided.bound >= value - room:
@@ -239,7 +239,7 @@ def proven(program: LocalProgram, best: Array, bounded: BoundedBoxes) -> Proven:
         retry = best_local_optimum(program, [result.shares, *places], len(places) + 1)
         if program.rank(retry) >= program.rank(result.shares):
             break
-        result = Proven(retry, evaluate_design(problem, program.values(retry)), result.divided)
+        result = ProvenDesign(retry, evaluate_design(problem, program.values(retry)), result.divided)
     return result
 
 
@@ -261,8 +261,8 @@ def proof_data(program: LocalProgram, design: Design, bound: float, reach: Proof
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
     size = float(np.abs(slopes[0]).max()) or 1.0
-    active_rooms = [k for k, room in enumerate(rooms) if room <= HELD]
-    low, high = best <= HELD, best >= 1.0 - HELD
+    active_rooms = [k for k, room in enumerate(rooms) if room <= ACTIVE_MARGIN]
+    low, high = best <= ACTIVE_MARGIN, best >= 1.0 - ACTIVE_MARGIN
     columns = [-slopes[1 + k] / (float(np.abs(slopes[1 + k]).max()) or 1.0) for k in active_rooms]
     columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
     scale = max(size, design.value)

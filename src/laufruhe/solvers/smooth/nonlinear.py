@@ -201,7 +201,7 @@ def _run_first_stage(
     return optima, run_starts
 
 
-def try_all(_: Sequence[LocalOptimum]) -> bool:
+def run_all_starts(_: Sequence[LocalOptimum]) -> bool:
     """Return False: the first stage runs all starts."""
     return False
 

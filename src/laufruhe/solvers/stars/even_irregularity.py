@@ -12,7 +12,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import ProofStrength, make_certificate
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
+from laufruhe.solvers.conclusion import quote_names, violated_limits, with_constant_limits
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
@@ -41,10 +41,10 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     """
     initial = evaluate(problem)
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
-    violated = broken_limits(wheel, initial)
+    violated = violated_limits(wheel, initial)
     if violated:
         reason = (
-            f"no star keeps {quoted(violated)}: the degree of irregularity is equal for all even stars; "
+            f"no star keeps {quote_names(violated)}: the degree of irregularity is equal for all even stars; "
             "increase the flywheel's inertia"
         )
         return no_star(problem, reason, conflict=violated)
@@ -62,7 +62,9 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
 
     inner = replace(phasing, realise=lambda candidate: without_wheel(phasing.realise(candidate)))
     result = solve(replace(without_wheel(problem), phasing=inner))
-    result = with_limits(replace(result, problem=result.problem.changed(objective=problem.objective)), problem.limits)
+    result = with_constant_limits(
+        replace(result, problem=result.problem.changed(objective=problem.objective)), problem.limits
+    )
     result = replace(result, problem=replace(result.problem, phasing=phasing))
     if result.objective is None or result.certificate is None:
         return result

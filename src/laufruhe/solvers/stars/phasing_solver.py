@@ -21,7 +21,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.throws.firing_average import firing_bound
-from laufruhe.solvers.conclusion import quoted, result_under
+from laufruhe.solvers.conclusion import quote_names, refine_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.even_irregularity import flywheel_measures, solve_alike_stars
 from laufruhe.solvers.stars.even_search import EvenDesign, EvenStarResult, search_even
@@ -104,7 +104,7 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
         names = tuple(limit.name for limit in problem.limits)
         if search_result.complete:
             # each star may violate other limits
-            limits = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
+            limits = (quote_names(names) or "the bounds") + " together" * (len(names) > 1)
             tried = counted(search_result.infeasible, "design")
             reason = f"no star keeps {limits}, whatever else is decided ({tried} tried)"
             return no_star(problem, reason, conflict=names)
@@ -165,7 +165,7 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
         firing_bound(problem, result.final) if result.objective and not any(phasing.is_geometry_open) else 0.0
     )
     bound, zero_level = max(search_result.bound, firing_value), numerical_zero(problem)
-    result, doubt = result_under(result, bound, zero_level)
+    result, doubt = refine_result(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
     certificate = make_certificate(
         value, bound, zero_level, problem.tolerance, ProofStrength.EXACT,
@@ -269,7 +269,7 @@ def solve_every_order(
     proof = best.result.certificate
     method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
-    result, doubt = result_under(best.result, bound, zero_level)
+    result, doubt = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
     certificate = make_certificate(
         best.value, bound, zero_level, problem.tolerance, strength, residual, method_text, doubt

@@ -9,7 +9,7 @@ from dataclasses import replace
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import broken_limits
+from laufruhe.solvers.conclusion import violated_limits
 
 
 def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
@@ -44,7 +44,7 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
     for count in (1, 2):
         for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
             is_known = any(set(clash) <= set(sets) for clash in clashes)
-            if not is_known and broken_limits(placing, with_built(sets)):
+            if not is_known and violated_limits(placing, with_built(sets)):
                 clashes.append(sets)
     shafts = replace(phasing.shafts, clashes=tuple(clashes))
     return replace(problem, phasing=replace(phasing, shafts=shafts)), with_built(())

@@ -13,7 +13,7 @@ from laufruhe.load_models.star_model import StarModel, StarProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, check_dual, gap_of
 from laufruhe.prove.throws.star_cuts import Cut, cut_of
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.cones.conic import solve_cones
 
 COARSE = 48
@@ -100,7 +100,9 @@ def solve_design(
         if solution.x is None:
             # at few samples, a mean may exceed its value over the cycle; sample averages never do (P7)
             averages = model.at(samples, averaged=True)
-            wide = replace(averages, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in averages.limits))
+            wide = replace(
+                averages, limits=tuple((maximum * (1.0 + FEASIBILITY_TOL), norm) for maximum, norm in averages.limits)
+            )
             cut = _limit_cut(wide, solution.multipliers, fixed)
             if cut.excludes(np.array([star]), [built], owners).all():
                 return None, cut
@@ -158,7 +160,7 @@ def _violates_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineP
     if not violated:
         return False
     finer = model.at(FINER * model.samples, averaged=True).at(star).limits
-    return any(norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + KEPT) for maximum, norm in
+    return any(norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + FEASIBILITY_TOL) for maximum, norm in
                (finer[k] for k in violated))  # fmt: skip
 
 

@@ -11,7 +11,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sam
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.conclusion import KEPT, state
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, evaluate_only
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import PhasingResult
@@ -45,7 +45,9 @@ class StarDesign:
     @cached_property
     def is_feasible(self) -> bool:
         """True if the star has a design that keeps its limits."""
-        return self.result.status.has_design and self.result.final.violation(self.result.problem.limits) <= KEPT
+        return (
+            self.result.status.has_design and self.result.final.violation(self.result.problem.limits) <= FEASIBILITY_TOL
+        )
 
     @property
     def is_infeasible(self) -> bool:
@@ -53,7 +55,7 @@ class StarDesign:
         result = self.result
         if not result.status.has_design:
             return result.status is Status.INFEASIBLE
-        return with_fine_sampling(result.final).violation(result.problem.limits) > KEPT
+        return with_fine_sampling(result.final).violation(result.problem.limits) > FEASIBILITY_TOL
 
     @property
     def value(self) -> float:
@@ -68,7 +70,7 @@ class StarDesign:
 
 def solve_fixed(problem: Problem) -> Result:
     """Solve a problem with fixed phasing for its unbalances, or evaluate it if it has no decisions."""
-    return solve_unbalances(problem) if problem.decisions else state(problem)
+    return solve_unbalances(problem) if problem.decisions else evaluate_only(problem)
 
 
 def with_star(

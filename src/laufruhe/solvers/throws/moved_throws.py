@@ -16,7 +16,7 @@ from laufruhe.problem.decision import AddressDrive, Decision
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Path, Phasing, Problem
 from laufruhe.problem.sets import Interval
-from laufruhe.solvers.conclusion import quoted
+from laufruhe.solvers.conclusion import quote_names
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import no_star, with_star
@@ -102,7 +102,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
         if result.status.has_design and (objective := result.objective) and (certificate := result.certificate)
     ]
     if not feasible:
-        limits = quoted(limit.name for limit in problem.limits) or "the firing intervals"
+        limits = quote_names(limit.name for limit in problem.limits) or "the firing intervals"
         return no_star(problem, f"no crank was found that keeps {limits}, but none is excluded", Status.FAILED)
     value, proof, candidate, best = min(feasible, key=lambda design: design[0])
     method = f"{proof.method}; throws moved from {counted(len(results), 'crank')}"

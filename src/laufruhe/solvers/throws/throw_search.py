@@ -26,7 +26,7 @@ from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.witness import Witness, thin_box
 from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
-from laufruhe.solvers.conclusion import FEASIBLE, read_under
+from laufruhe.solvers.conclusion import FEASIBLE, refine_objective
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.stars.star_results import StarDesign
@@ -370,7 +370,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
     def _highest_objective(self, best: StarDesign) -> float:
         zero_level, result = numerical_zero(self._problem), best.result
-        read = read_under(result.problem, result.final, best.value, math.inf, zero_level)
+        read = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
         return read.value + read.doubt + zero_level
 
     def around(self, incumbent: _Best) -> _Part | FathomedPart | None:

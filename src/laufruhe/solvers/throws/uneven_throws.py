@@ -26,10 +26,17 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import ProofStrength, make_certificate
 from laufruhe.prove.throws.firing_windows_bound import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, result_under, unbalances_of
+from laufruhe.solvers.conclusion import (
+    FEASIBILITY_TOL,
+    FEASIBLE,
+    limit_values,
+    quote_names,
+    refine_result,
+    unbalance_values,
+)
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.smooth.nonlinear import solve_nonlinear, try_all
+from laufruhe.solvers.smooth.nonlinear import run_all_starts, solve_nonlinear
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
@@ -98,7 +105,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         return _without_design(problem, phasing, box_bound)
     trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
     zero_level = numerical_zero(problem)
-    result, doubt = result_under(designs[0].result, floor, zero_level)
+    result, doubt = refine_result(designs[0].result, floor, zero_level)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
     # zero is a lower bound of every norm
@@ -162,14 +169,14 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
 def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | None) -> Result:
     """Return a result without a design: infeasible if branch and bound or the bound of a limited measure proves it."""
     if box_bound is not None and box_bound.bound == math.inf:
-        names = quoted(box_bound.conflict) or "the bounds on firing intervals"
+        names = quote_names(box_bound.conflict) or "the bounds on firing intervals"
         return no_star(problem, f"no crank keeps {names}, whatever else is decided", conflict=box_bound.conflict)
     for limit in problem.load_limits:
         single_term = replace(problem, objective=(Term(limit.measure),))
-        if _bound(single_term, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
+        if _bound(single_term, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + FEASIBILITY_TOL):
             why = f"no crank keeps '{limit.name}', whatever else is decided"
             return no_star(problem, why, conflict=(limit.name,))
-    names = quoted(limit.name for limit in problem.limits) or "the bounds"
+    names = quote_names(limit.name for limit in problem.limits) or "the bounds"
     remedy = (
         "" if box_bound is None else f", and {box_bound.boxes} boxes of throws do not exclude one; raise search.boxes"
     )
@@ -215,7 +222,7 @@ def local_optimum(
         smooth = SmoothProgram(problem, unit, margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
         minimum_violation = math.inf
         starts = _start_points(smooth, best)[: None if nudged else 1]
-        for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=try_all):
+        for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=run_all_starts):
             if not optimum.usable:
                 continue
             candidate = moves.candidate(smooth.throw_deviations(optimum.x))
@@ -245,7 +252,7 @@ def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]
     # a star that equals its mirror image may be a saddle point
     columns = np.zeros(smooth.columns)
     if best is not None and smooth.columns:
-        columns = projected_vector(smooth.domains, unbalances_of(smooth.problem, best.result))
+        columns = projected_vector(smooth.domains, unbalance_values(smooth.problem, best.result))
     turns = np.zeros(0 if smooth.moves is None else smooth.moves.size)
     nudges = np.random.default_rng(1964).standard_normal((2, len(turns) + len(columns)))
     nudges *= 0.02 * np.concatenate([np.full(len(turns), TURN), *(np.full(d.width, d.scale) for d in smooth.domains)])
