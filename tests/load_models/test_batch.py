@@ -31,7 +31,7 @@ def test_designs_agree_with_evaluations(path: Path) -> None:
         designs = prepare(problem, prune)
         assert designs.objective(values) == pytest.approx(single, rel=1e-11)
         features = np.concatenate([np.ones((COUNT, 1)), _columns(designs, values)], axis=1)
-        assert [designs.one(x) for x in features] == pytest.approx(single, rel=1e-11)
+        assert [designs.objective_of_one(x) for x in features] == pytest.approx(single, rel=1e-11)
 
 
 def _at_steps(problem: Problem, found: Evaluation) -> float:

@@ -297,7 +297,7 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
         # at as many angles as the program has: 32 a turn
         exact = evaluate(moved, moved.design([*unbalances, *given]), 64)
         assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=1e-3)
-        rows, _ = moves.firing(turns)
+        rows, _ = moves.firing_intervals(turns)
         assert sorted(rows) == pytest.approx(sorted(exact.engine.firing_intervals), abs=1e-9)
 
 

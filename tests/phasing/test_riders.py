@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.load_models.uneven_model import rotor_throws_of
 from laufruhe.machine import Engine
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.phasing import Candidate
@@ -57,7 +57,7 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
         replace(d, set=Interval(*own, d.set.angle)) if d.set.width == 1 and d.name.startswith("sized") else d
         for d in given.decisions
     ))  # fmt: skip
-    riders = Riders(given, rides_of(phasing, candidate), throws)
+    riders = Riders(given, rotor_throws_of(phasing, candidate), throws)
     found = riders.columns(np.array(throws), np.array(throws))
     rng = np.random.default_rng(5)
     names = [decision.name for decision in given.unbalances]

@@ -10,7 +10,7 @@ import pytest
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
-from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.load_models.uneven_model import rotor_throws_of
 from laufruhe.machine.firing import firing_turns, intervals_of, lap_orders
 from laufruhe.numerics.exact_angles import angle_of
 from laufruhe.numerics.norms import NORMS, Grid
@@ -80,7 +80,7 @@ def programs_of(problem, phasing, window, samples=64):
     throws = nearest_throws(window, 0.5 * sum(window.box))
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     realised = replace(phasing.realise(candidate), phasing=None)
-    rides = rides_of(phasing, candidate)
+    rides = rotor_throws_of(phasing, candidate)
     riders = Riders(realised, rides, candidate.throws)
     waves = ThrowWaves(riders.problem, phasing.layout(*phasing.minimum_geometry), rides)
     return ThrowPrograms(waves, riders, firing_bounds(phasing), samples)

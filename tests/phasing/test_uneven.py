@@ -10,7 +10,7 @@ import pytest
 
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import amplitude_objective
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rides_of
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
@@ -147,7 +147,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
     problem = replace(phasing.realise(start), phasing=None)
-    model = UnevenModel(problem, phasing.layout(bank, split), rides_of(phasing, start))
+    model = UnevenModel(problem, phasing.layout(bank, split), rotor_throws_of(phasing, start))
     moved = tuple(rng.uniform(0.0, math.tau, count))
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
     columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]

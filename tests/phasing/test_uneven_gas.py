@@ -10,7 +10,7 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import LEFT_OUT, UnevenModel, UnevenSymbols, rides_of
+from laufruhe.load_models.uneven_model import LEFT_OUT, UnevenModel, UnevenSymbols, rotor_throws_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
@@ -53,7 +53,7 @@ def scene(folder, name, rest=MOUNT_FORCE):
 def model_of(phasing, start, left_out=0.0):
     problem = replace(phasing.realise(start), phasing=None)
     layout = phasing.layout(start.bank_angle, start.split_pin)
-    return UnevenModel(problem, layout, rides_of(phasing, start), left_out)
+    return UnevenModel(problem, layout, rotor_throws_of(phasing, start), left_out)
 
 
 def moved(moves, x):

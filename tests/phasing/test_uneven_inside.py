@@ -16,10 +16,10 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models import uneven_model
-from laufruhe.load_models.mount_loads import MovedThrows
+from laufruhe.load_models.block_loads import OpenCrankLoads
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.throw_waves import ThrowWaves
-from laufruhe.load_models.uneven_model import UnevenModel, rides_of
+from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import domains_of
@@ -96,7 +96,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     own = replace(phasing.realise(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
-    model = MovedThrows(own, moves, UnevenModel(own, moves.layout, rides_of(phasing, start)), turns, columns)
+    model = OpenCrankLoads(own, moves, UnevenModel(own, moves.layout, rotor_throws_of(phasing, start)), turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
     moved = replace(phasing.realise(moves.candidate(x)), phasing=None)
@@ -121,7 +121,7 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
         phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
         start = start_candidates(phasing, None, True)[0]
         own = replace(phasing.realise(start), phasing=None)
-        waves = ThrowWaves(own, phasing.layout_of(start), rides_of(phasing, start))
+        waves = ThrowWaves(own, phasing.layout_of(start), rotor_throws_of(phasing, start))
         measure = own.objective[0].measure
         norm = waves.norm(measure, waves.samples(measure, 192))
         window = windows[rng.integers(len(windows))]

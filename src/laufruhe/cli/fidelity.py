@@ -50,7 +50,7 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
         fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
         designs = prepare(fixed, prune)
         start = np.zeros((1, 1 + designs.columns))
-        times.append(1e3 * seconds(lambda d=designs, x=start: d.of_columns(x)))  # type: ignore[misc]
+        times.append(1e3 * seconds(lambda d=designs, x=start: d.objective_from_features(x)))  # type: ignore[misc]
     return times[0], times[1]
 
 

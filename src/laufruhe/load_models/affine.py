@@ -1,4 +1,7 @@
-"""A problem as norms of rows that are affine in its decisions, with numbers from the exact model (P1)."""
+"""Problem with objective and limits as norms of rows that are affine in the decisions (P1).
+
+The coefficients are loads that the exact model computes once for each decision.
+"""
 
 from __future__ import annotations
 
@@ -26,25 +29,28 @@ from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, 
 from laufruhe.problem.problem import Problem
 
 MAXIMUM = NORMS["maximum"]
-NEEDED, LEAST_UNIT = 1e3, 1e-9
+# unit of a column over the size that balances the loads, and smallest unit over the bound of the column
+UNIT_MARGIN, MIN_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
-"""Relative excess over a limit that counts as none."""
+"""Relative violation of a limit that counts as none."""
 MOST_NUMBERS = 60_000_000
-"""Of one measure: rows by open numbers; some ten times as many are held while a program is solved."""
+"""Largest number of coefficients of one measure; a solver needs about ten times that memory."""
 
 
 @dataclass(frozen=True, eq=False)
 class AffineNorm:
-    """N(V0 + B x) on a grid.
+    """Norm of rows that are affine in the decision vector x: N(V0 + B x).
 
     Attributes
     ----------
+    norm
+        Norm N.
     constant
-        V0, shape (k, d).
+        Rows V0 of the design with every decision at zero, shape (k, d).
     slope
-        B, shape (k, d, n).
+        Derivative B of the rows, shape (k, d, n).
     grid
-        Weights of the rows, and how they follow each other.
+        Weights and order of the rows.
     """
 
     norm: Norm
@@ -53,20 +59,20 @@ class AffineNorm:
     grid: Grid
 
     def rows(self, x: Array) -> Array:
-        """V0 + B x, shape (k, d)."""
+        """Return the rows V0 + B x, shape (k, d)."""
         moved = self.slope.reshape(self.constant.size, len(x)) @ x
         return self.constant + moved.reshape(self.constant.shape)
 
     def value(self, x: Array) -> float:
-        """The norm at x."""
+        """Return the norm at a decision vector of shape (n,)."""
         return self.norm.value(self.grid, self.rows(x))
 
     def subgradient(self, x: Array) -> Array:
-        """Dual rows along the rows at x (P2)."""
+        """Return dual rows Z, shape (k, d), with <Z, V> = N(V) at the rows V of a decision vector (P2)."""
         return self.norm.subgradient(self.grid, self.rows(x))
 
     def pullback(self, z: Array) -> Array:
-        """Slope of <Z, V> in the decision vector, shape (n,)."""
+        """Return the gradient of <Z, V> in the decision vector, shape (n,), for dual rows of shape (k, d)."""
         return np.asarray(z.ravel() @ self.slope.reshape(z.size, -1))
 
     def dual_norm(self, z: Array) -> float:
@@ -74,26 +80,26 @@ class AffineNorm:
         return self.norm.dual_norm(self.grid, z)
 
     def dual_feasible(self, z: Array) -> Array:
-        """Dual rows brought into the unit ball (P3)."""
+        """Return dual rows, shape (k, d), scaled into the unit ball of the dual norm (P3)."""
         return self.norm.dual_feasible(self.grid, z)
 
 
 @dataclass(frozen=True, eq=False)
 class AffineProblem:
-    """Least sum of weighted norms, some norms limited, each decision in its own set.
+    """Convex problem: minimise a weighted sum of norms under limits on norms, with every decision in its set.
 
     Attributes
     ----------
     terms
-        (weight, norm) pairs.
+        Pairs (weight, norm) of the objective.
     limits
-        (maximum, norm) pairs.
+        Pairs (maximum, norm).
     domains
-        Of the decisions.
+        Sets of the decisions, and their columns in the decision vector.
     samples
-        Steps over the common period of the load rows.
+        Number of samples over the common period of the loads.
     groups
-        Of each term the sum that it belongs to, the largest of which is minimised; one sum of all when empty.
+        Index of the sum that each term belongs to; the objective is the largest sum. Empty for one sum of all terms.
     """
 
     terms: tuple[tuple[float, AffineNorm], ...]
@@ -109,83 +115,94 @@ class AffineProblem:
 
     @property
     def start(self) -> Array:
-        """The decision vector of the design as given."""
+        """Decision vector of the baseline design, shape (n,)."""
         return decision_vector(self.domains)
 
     @property
     def scales(self) -> Array:
-        """Largest size of every column."""
+        """Largest absolute value of every column, shape (n,)."""
         return column_scales(self.domains)
 
     @cached_property
     def units(self) -> Array:
-        """A size of every column for a solver: its bound, or a thousand times what all loads need if that is less.
+        """Unit of every column for a solver, shape (n,): its bound, or less if a small value balances the loads.
 
-        Bounds that are far apart would else leave no digits for the small ones.
+        The unit is at most `UNIT_MARGIN` times the size that balances the constant rows. Otherwise a huge bound of one
+        column would leave no significant digits for the others.
         """
         norms = [norm for _, norm in (*self.terms, *self.limits)]
         constants = [float(np.linalg.norm(norm.constant)) for norm in norms]
         squares = [np.einsum("kdn,kdn->n", norm.slope, norm.slope) for norm in norms]
-        found = []
+        units = []
         for domain in self.domains:
-            own = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
-            needs = [constant / size for constant, size in zip(constants, own, strict=True) if size > 0.0]
-            # a need that is a rounding of what the bounds could load is none
-            needed = max(NEEDED * max(needs, default=0.0), LEAST_UNIT * domain.scale)
-            found.append(np.full(domain.width, min(domain.scale, needed) if max(needs, default=0.0) else domain.scale))
-        return np.concatenate(found) if found else np.zeros(0)
+            slopes = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
+            balancing = [constant / slope for constant, slope in zip(constants, slopes, strict=True) if slope > 0.0]
+            # a size that is a rounding error of the bound counts as none
+            unit = max(UNIT_MARGIN * max(balancing, default=0.0), MIN_UNIT * domain.scale)
+            units.append(
+                np.full(domain.width, min(domain.scale, unit) if max(balancing, default=0.0) else domain.scale)
+            )
+        return np.concatenate(units) if units else np.zeros(0)
 
     def objective(self, x: Array) -> float:
-        """Weighted sum of the terms, or the largest of several."""
+        """Return the weighted sum of the terms at x, or the largest of several sums."""
         values = np.array([weight * norm.value(x) for weight, norm in self.terms])
         return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
 
-    def shared(self, shares: Array) -> AffineProblem:
-        """Return the problem with the sums weighted by shares in place of the largest sum.
+    def with_weighted_groups(self, shares: Array) -> AffineProblem:
+        """Return the problem with a weighted mean of the sums as objective, in place of the largest sum.
 
-        Its value is not larger where the shares add up to one.
+        Parameters
+        ----------
+        shares
+            Weight of every sum, shape (groups,). Weights that add up to one give a lower bound of the objective.
         """
-        kept = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
-        terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in kept)
+        used = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
+        terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in used)
         return replace(self, terms=terms, groups=())
 
     def violation(self, x: Array) -> float:
-        """Largest relative excess over a limit, negative where all have room; zero without limits."""
+        """Return the largest relative violation of a limit at x, negative if all are kept; zero without limits."""
         return max(((norm.value(x) - maximum) / (maximum or 1.0) for maximum, norm in self.limits), default=0.0)
 
 
-def reach(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
-    """A size of these norms that is not zero: at no decisions, or at large ones."""
+def typical_size(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
+    """Return a positive size of norms [SI]: the largest at x = 0, or of any slope times its unit."""
     sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
     sizes += [float(np.abs(norm.slope * problem.units).max(initial=0.0)) for norm in norms]
     return max(sizes, default=0.0) or 1.0
 
 
 class AffineModel:
-    """Spectra of the design without its decisions, and of each decision alone.
+    """Load spectra of the design with every decision at zero, and of each column of the decision vector.
 
-    Rows at any number of samples follow from them without evaluating the engine again.
+    Norms at any number of samples follow from these spectra without another evaluation of the engine.
 
     Parameters
     ----------
+    problem
+        Problem whose unbalances and masses are decided.
+    keep_all
+        Whether rows keep components that are zero, so that several models can be added up.
     whole_cycle
-        Rows over the whole working cycle, even where the loads repeat within it.
+        Whether rows cover the whole working cycle, even if the loads repeat within it.
 
     Attributes
     ----------
     bare
-        The design with every decision at zero.
-    lead
-        A model whose bends are counted in place of its own.
+        Evaluation of the design with every decision at zero.
+    base
+        Lowest order of the common period of the loads.
+    kink_model
+        Model whose kinks are used in place of its own, so that several models share sample angles; None for its own.
     """
 
-    lead: AffineModel | None = None
+    kink_model: AffineModel | None = None
 
     def __init__(self, problem: Problem, keep_all: bool = False, whole_cycle: bool = False) -> None:
         self.problem = problem
-        # components that are zero are dropped, unless models are to be added up
         self._keep_all = keep_all
-        # rows that repeat within the common period are needed once, unless they are to be added up
+        # rows that repeat within the common period are needed once, unless models are to be added up
         self._once = not keep_all and not whole_cycle
         self.domains = domains_of(problem.unbalances)
         bare = evaluate(problem, problem.design([0.0] * len(problem.unbalances), problem.unbalances))
@@ -195,28 +212,35 @@ class AffineModel:
         changes = [_change(problem, d.decision, direction) for d in self.domains for direction in d.set.directions]
         self.bare, self._changes = bare, changes
         orders = [as_order(abs(r.shaft.ratio)) for change in changes for r in change.rotors]
-        # loads of every column alone, at every operating point
-        alone = [(_alone(problem.engine, change), change.shares) for change in changes]
-        self._slopes = [[_loads(*each, point, problem, mounting) for each in alone] for point in problem.points]
+        # loads of one unit of every column, at every operating point
+        columns = [(_only_changed(problem.engine, change), change.shares) for change in changes]
+        self._slopes = [[_loads(*column, point, problem, mounting) for column in columns] for point in problem.points]
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
-        # a bearing feels each cylinder beside it alone, so loads inside the crankcase count too
+        # loads inside the crankcase may repeat less often than the wrench on the block
         inside = {measure.load for measure in self.problem.measures if measure.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
         return common_base([signal.repeat_order(tuple(orders)) for signal in signals] or [Fraction(1)])
 
     @property
     def full_samples(self) -> int:
-        """Steps of the problem's fidelity that fall into one period of the loads."""
+        """Number of samples over one period of the loads that the fidelity of the problem asks for."""
         cycle = self.problem.engine.cycle
         return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
 
     def at(self, samples: int, averaged: bool = False, finer: bool = False) -> AffineProblem:
-        """The problem with its load rows at `samples` steps over their common period.
+        """Return the problem at a number of samples over the common period.
 
-        Rows of means may be averaged about their angles: what bounds these, bounds the
-        whole cycle (P7). Rows of peaks may be as much finer as results are measured (M6).
+        Parameters
+        ----------
+        samples
+            Number of samples.
+        averaged
+            Whether rows of means are averages over the step about each sample. A lower bound of their mean is a lower
+            bound of the mean over the whole cycle (P7).
+        finer
+            Whether peaks have as many more samples as results have (M6).
         """
 
         def norm(measure: Measure) -> AffineNorm:
@@ -229,75 +253,92 @@ class AffineModel:
         return AffineProblem(terms, limits, self.domains, samples)
 
     def with_limits(self, limits: Sequence[Limit]) -> AffineModel:
-        """The same model under some of its limits."""
+        """Return a copy of the model with these limits of the problem."""
         other = copy(self)
         other.problem = replace(self.problem, limits=tuple(limits))
         return other
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
-        """Per operating point the wrench of the bare design, and of one unit of every column."""
+        """Return the wrench of the bare design and of one unit of every column, for each operating point."""
         return [
-            (loads.wrench, tuple(each.wrench for each in by))
-            for loads, by in zip(self.bare.loads, self._slopes, strict=True)
+            (loads.wrench, tuple(column.wrench for column in columns))
+            for loads, columns in zip(self.bare.loads, self._slopes, strict=True)
         ]
 
     def spectra(self, channel: LoadChannel) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
-        """Per operating point what a channel measures of the bare design, and of one unit of every column."""
-        own = self.bare.signals(channel)
-        return [(bare, tuple(map(channel.signal, by))) for bare, by in zip(own, self._slopes, strict=True)]
+        """Return the signal of a channel for the bare design and for one unit of every column, per operating point."""
+        signals = self.bare.signals(channel)
+        return [
+            (bare, tuple(map(channel.signal, columns))) for bare, columns in zip(signals, self._slopes, strict=True)
+        ]
 
     def norm(self, measure: Measure, samples: int, averaged: bool = False, peaks: int = 0) -> AffineNorm:
-        """A measure at `samples` steps over the common period, a mean averaged about them, peaks in parts of these."""
-        channel, known = measure.channel, self.problem.known_rows.get(measure)
-        if known is not None:
-            grid = Grid(np.ones(len(known.constant)), len(known.constant))
-            return AffineNorm(MAXIMUM, known.constant, known.slope, grid)
+        """Return a measure as the norm of affine rows.
+
+        Parameters
+        ----------
+        measure
+            Measure of loads, masses or a constant number.
+        samples
+            Number of samples over the common period.
+        averaged
+            Whether the rows of a mean are averages over the step about each sample.
+        peaks
+            Number of parts of a step over which rows of other norms are averaged, if `averaged`; 0 for no average.
+        """
+        channel, linearised = measure.channel, self.problem.known_rows.get(measure)
+        if linearised is not None:
+            grid = Grid(np.ones(len(linearised.constant)), len(linearised.constant))
+            return AffineNorm(MAXIMUM, linearised.constant, linearised.slope, grid)
         if channel.is_number:
-            # of mounts or of a flywheel that stay: the same for every design
-            only = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
-            return _stacked(only, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
+            # numbers of fixed mounts or of a fixed flywheel are the same for every design
+            rows = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
+            return _stacked(rows, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
             engine = self.bare.engine
             bare = mass_rows(measure, engine.rotors, engine.slider_cranks)
             slopes = [
-                mass_rows(measure, _only(engine, change.rotors), _alone(engine, change).slider_cranks).vectors
+                mass_rows(
+                    measure, _only_rotors(engine, change.rotors), _only_changed(engine, change).slider_cranks
+                ).vectors
                 for change in self._changes
             ]
             return _stacked(bare, slopes, self._keep_all)
         parts = peaks if averaged and not measure.norm.averages else int(averaged)
         pairs = self.spectra(channel)
-        own = [bare for bare, _ in pairs]
-        alone = [[by[k] for _, by in pairs] for k in range(len(self._changes))]
-        base = self._own_base([*own, *(signal for by in alone for signal in by)], samples)
+        bare_signals = [bare for bare, _ in pairs]
+        column_signals = [[columns[k] for _, columns in pairs] for k in range(len(self._changes))]
+        base = self._base_of([*bare_signals, *(signal for column in column_signals for signal in column)], samples)
         samples = int(samples * self.base / base)
-        # what is open does not bend, but has to be known at the same angles
-        lead = [signal.with_base(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
-        bends = kinks_of(measure, lead, self.problem.engine)
-        bare = self._rows(measure, own, base, samples, parts, bends)
+        # decisions add no kinks, but their rows stand at the same angles
+        kinked = bare_signals if self.kink_model is None else self.kink_model.bare.signals(channel)
+        kinks = kinks_of(measure, [signal.with_base(base) for signal in kinked], self.problem.engine)
+        bare = self._rows(measure, bare_signals, base, samples, parts, kinks)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        slopes = [self._rows(measure, by, base, samples, parts, bends).vectors for by in alone]
+        slopes = [self._rows(measure, column, base, samples, parts, kinks).vectors for column in column_signals]
         return _stacked(bare, slopes, self._keep_all)
 
-    def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
-        own = common_base([signal.repeat_order() for signal in signals]) if self._once else self.base
-        whole = all((steps * self.base / own).denominator == 1 for steps in (samples, self.full_samples))
-        return own if whole else self.base
+    def _base_of(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
+        # shortest period of signals that whole numbers of samples divide
+        base = common_base([signal.repeat_order() for signal in signals]) if self._once else self.base
+        is_whole = all((steps * self.base / base).denominator == 1 for steps in (samples, self.full_samples))
+        return base if is_whole else self.base
 
     def _rows(
         self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, parts: int,
-        bends: Sequence[Array],
+        kinks: Sequence[Array],
     ) -> Rows:  # fmt: skip
         period = [signal.with_base(base) for signal in signals]
         if parts:
             period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
-        return load_rows(measure, self.problem.points, period, self.problem.engine, samples, bends)
+        return load_rows(measure, self.problem.points, period, self.problem.engine, samples, kinks)
 
 
 @dataclass(frozen=True)
 class _Change:
-    # one unit of a column: rotors, masses with one more kilogram, geared shafts with all inertia
+    # one unit of a column: rotors by their unbalance, pistons by one kilogram, geared shafts by all their inertia
     rotors: tuple[Rotor, ...]
     pistons: tuple[tuple[str, str], ...]
     shares: tuple[str, ...] = ()
@@ -312,12 +353,12 @@ def _change(problem: Problem, decision: Decision, direction: complex) -> _Change
     return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE))
 
 
-def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
+def _only_rotors(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
     changed = {rotor.name: rotor.unbalance for rotor in rotors}
     return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 
 
-def _alone(engine: Engine, change: _Change) -> Engine:
+def _only_changed(engine: Engine, change: _Change) -> Engine:
     # the engine with the changed rotors and pistons as its only masses
     parts = (part.only({mass: 1.0 for name, mass in change.pistons if name == part.name})
              for part in engine.slider_cranks)  # fmt: skip
@@ -325,25 +366,25 @@ def _alone(engine: Engine, change: _Change) -> Engine:
 
 
 def _loads(
-    alone: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
+    parts: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
 ) -> PointLoads:
-    """Return the loads of these parts at an operating point; torque and uneven speed are those of the whole engine."""
+    """Return the loads that some parts of the engine cause at an operating point, at the speed of the whole engine."""
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
-    wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
-    if any(part != part.only({}) for part in alone.slider_cranks):
-        wrench = shaking_loads(alone, point, without_gas)
+    wrench = added_rotor_loads(parts.rotors, problem.engine, point, problem.fidelity)
+    if any(part != part.only({}) for part in parts.slider_cranks):
+        wrench = shaking_loads(parts, point, without_gas)
     if shares:
-        geared = tuple(replace(own, share=1.0) for own in problem.engine.geared if own.name in shares)
+        geared = tuple(replace(shaft, share=1.0) for shaft in problem.engine.geared if shaft.name in shares)
         wrench = wrench + added_geared_loads(replace(problem.engine, geared=geared), point, problem.fidelity)
     forces = mounting.forces(wrench, point.speed) if mounting else None
     travel = travel_of(problem.engine, mounting, wrench, point.speed)
-    return PointLoads(point, wrench, forces, travel, alone, without_gas)
+    return PointLoads(point, wrench, forces, travel, parts, without_gas)
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
     used = np.any([keep_all | np.any(rows != 0.0, axis=0) for rows in (bare.vectors, *slopes)], axis=0)
     used[:1] |= not used.any()
-    # in memory row by row, as every product with them takes them
+    # rows contiguous in memory, which products with them need
     constant, *moved = (np.compress(used, rows, axis=1) for rows in (bare.vectors, *slopes))
     slope = np.stack(moved, axis=-1) if moved else np.zeros((*constant.shape, 0))
     return AffineNorm(bare.norm, constant, slope, bare.grid)

@@ -1,4 +1,4 @@
-"""Which objectives are sums of norms of a star's forces and couples, and with what factors (S3)."""
+"""Objectives that depend only on the amplitudes of a crank star's forces and couples by order (S3)."""
 
 from __future__ import annotations
 
@@ -22,20 +22,26 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Phasing, Problem
 
+# relative factor of an order that counts as zero
 NEGLIGIBLE = 1e-13
+# largest number of directions of dual vectors
 DIRECTIONS = 400
 _LEVERS: dict[Channel, int] = {SHAKING_FORCE: 0, SURGING_FORCE: 0, ROCKING_COUPLE: 1, SWAYING_COUPLE: 1}
-"""Powers of a throw's position that loads grow with, for loads that add up by positions alone."""
+"""Power of the throw position by which each load grows."""
 
 
 @dataclass(frozen=True)
 class AmplitudeTerm:
-    """w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2), one norm of the objective (S3).
+    """Term of the objective: w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2) over the orders h (S3).
+
+    F_h is the sum of e^{i h theta} over the throws, C_h the same sum weighted by throw positions.
 
     Attributes
     ----------
+    weight
+        Weight w.
     force, couple
-        f_h and c_h of every order.
+        Factors f_h and c_h of every order.
     """
 
     weight: float
@@ -45,7 +51,7 @@ class AmplitudeTerm:
 
 @dataclass(frozen=True)
 class AmplitudeObjective:
-    """A sum of norms of forces and couples of a star by order (S3)."""
+    """Sum of norms of the forces and couples of a crank star by order (S3)."""
 
     orders: tuple[int, ...]
     terms: tuple[AmplitudeTerm, ...]
@@ -53,38 +59,47 @@ class AmplitudeObjective:
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:  # noqa: ARG002
         """Return the objective of many stars, shape (n,).
 
-        Any number between `maximum` and a larger value may stand for it.
+        Parameters
+        ----------
+        space
+            Steps and positions of the throws.
+        stars
+            Step of every throw, shape (n, throws).
+        maximum
+            Value above which other objectives of this interface may return any number above `maximum`; unused here.
         """
-        return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
+        return self._values_of_sums(star_sums(stars, space.phases, space.places, self.orders))
 
-    def of_angles(self, places: Sequence[float], throws: Array) -> Array:
-        """Return the objective of many cranks, shape (n,), from throw angles [rad], shape (n, throws)."""
+    def values_at_angles(self, places: Sequence[float], throws: Array) -> Array:
+        """Return the objective of many cranks, shape (n,), from positions [m] and angles [rad], shape (n, throws)."""
         weights = np.stack([np.ones(len(places)), places], axis=-1)
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
-        return self._of_sums(waves @ weights)
+        return self._values_of_sums(waves @ weights)
 
-    def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
+    def _values_of_sums(self, sums: NDArray[np.complex128]) -> Array:
         squares = np.square(sums.real) + np.square(sums.imag)
-        out = np.zeros(len(sums))
+        values = np.zeros(len(sums))
         for term in self.terms:
             factors = np.stack([np.square(term.force), np.square(term.couple)], axis=-1)
-            out += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))
-        return out
+            values += term.weight * np.sqrt(np.einsum("nhc,hc->n", squares, factors))
+        return values
 
 
 def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> AmplitudeObjective | None:
-    """The objective as norms of |F_h| and |C_h|, where it is of that kind; else None.
+    """Return the objective as norms of the amplitudes |F_h| and |C_h|, or None if it depends on anything else.
 
-    It is if nothing but throws that are alike and what hangs on them makes forces and couples,
-    nothing else is open, no limit can tell even stars apart, and every term is a root mean square or is
-    of a single order: then no phase between orders can matter.
+    Amplitudes suffice if all of the following hold. Equal throws cause all forces and couples, and only the star is
+    open. Limits have the same value for all even stars. Every term is a root mean square, or has a single order, so
+    that no phase between orders matters.
 
     Parameters
     ----------
     problem
-        Of one of the stars.
-    phasing, layout
-        What is open, and where the cylinders of these stars stand.
+        Problem of one of the stars.
+    phasing
+        Open crank star.
+    layout
+        Positions of the cylinders.
     """
     engine = problem.engine
     if problem.decisions or phasing.shafts.optional or not problem.objective:
@@ -94,12 +109,12 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     single = _one_throw(engine, layout)
     if single is None or not all(_is_amplitude(term) for term in problem.objective):
         return None
-    if not _limits_massless(problem, phasing, layout):
+    if not _limits_are_kept(problem, phasing, layout):
         return None
     x = layout.throw_positions[0]
-    silent = tuple(replace(point, gas=None) for point in problem.points)
-    alone = evaluate(replace(problem, engine=single, points=silent))
-    highest = max(len(shaking_loads(single, point, problem.fidelity).coefficients) for point in silent)
+    points = tuple(replace(point, gas=None) for point in problem.points)
+    alone = evaluate(replace(problem, engine=single, points=points))
+    highest = max(len(shaking_loads(single, point, problem.fidelity).coefficients) for point in points)
     highest = min(highest, max(orders_needed(p.rod_ratio, p.offset_ratio) for p in single.slider_cranks) + 1)
     orders = _orders(problem, highest)
     terms = tuple(_factors(term, alone, orders, abs(x)) for term in problem.objective)
@@ -115,8 +130,8 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     )
 
 
-def _limits_massless(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
-    # even stars share the limited forces where the counts on the steps are the same
+def _limits_are_kept(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
+    # even stars have equal forces if they have equal numbers of throws on the steps
     if not problem.limits:
         return True
     if (
@@ -124,8 +139,8 @@ def _limits_massless(problem: Problem, phasing: Phasing, layout: Layout) -> bool
         or len(even_patterns(phasing.cycle, layout)) > 1
     ):
         return False
-    given = evaluate(problem)
-    return all(given.value(limit.measure) <= limit.maximum for limit in problem.limits)
+    evaluation = evaluate(problem)
+    return all(evaluation.value(limit.measure) <= limit.maximum for limit in problem.limits)
 
 
 def _is_amplitude(term: Term) -> bool:
@@ -148,11 +163,11 @@ def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
 
 
 def _orders(problem: Problem, highest: int) -> list[int]:
-    wanted: set[int] = set()
+    orders: set[int] = set()
     for term in problem.objective:
-        given = term.measure.orders
-        wanted |= set(range(1, highest)) if given is None else {int(h) for h in given if h == int(h) and h > 0}
-    return sorted(wanted)
+        counted = term.measure.orders
+        orders |= set(range(1, highest)) if counted is None else {int(h) for h in counted if h == int(h) and h > 0}
+    return sorted(orders)
 
 
 def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> AmplitudeTerm:
@@ -161,37 +176,40 @@ def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> 
     for h in orders:
         counts = counted is None or any(float(h) == order for order in counted)
         values.append(alone.value(replace(term.measure, orders=(float(h),))) if counts else 0.0)
-    none = (0.0,) * len(orders)
+    zeros = (0.0,) * len(orders)
     if _LEVERS[term.measure.channel] == 0:
-        return AmplitudeTerm(term.weight, tuple(values), none)
-    return AmplitudeTerm(term.weight, none, tuple(v / x for v in values))
+        return AmplitudeTerm(term.weight, tuple(values), zeros)
+    return AmplitudeTerm(term.weight, zeros, tuple(v / x for v in values))
 
 
-def directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
-    """Points of the dual ball: v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 (S4).
+def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
+    """Return dual vectors v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 for every term t (S4).
+
+    Each gives a lower bound Re sum_h v_h C_h of the objective. Orders with a small weight stay at zero, which keeps
+    the bound valid.
 
     Returns
     -------
-    Shape (directions, orders). The orders that weigh little are left at zero, which is
-    allowed and costs tightness only.
+    NDArray
+        Dual vectors, shape (directions, orders).
     """
     total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
     heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
     if not heavy:
         return np.zeros((1, len(objective.orders)), dtype=complex)
     angles = max(4, int((DIRECTIONS / 3 if len(heavy) > 1 else DIRECTIONS) ** (1.0 / len(heavy))))
-    out = []
-    for shares in _shares(objective, heavy):
-        for turn in itertools.product(range(angles), repeat=len(heavy)):
+    vectors = []
+    for sizes in _sizes(objective, heavy):
+        for steps in itertools.product(range(angles), repeat=len(heavy)):
             v = np.zeros(len(objective.orders), dtype=complex)
-            for h, size, t in zip(heavy, shares, turn, strict=True):
-                v[h] = size * np.exp(2j * np.pi * t / angles)
-            out.append(v)
-    return np.unique(np.array(out), axis=0)
+            for h, size, step in zip(heavy, sizes, steps, strict=True):
+                v[h] = size * np.exp(2j * np.pi * step / angles)
+            vectors.append(v)
+    return np.unique(np.array(vectors), axis=0)
 
 
-def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
-    """Sizes of v on the heavy orders: a term of several orders divides its unit between them."""
+def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
+    """Yield sizes of v on the heavy orders; a term with several of them divides its unit between them."""
     grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
     grid = (
         [np.ones(len(heavy)), *grid]
@@ -201,10 +219,10 @@ def _shares(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Arr
     for raw in grid:
         sizes = np.zeros(len(heavy))
         for term in objective.terms:
-            mine = np.array([term.couple[h] for h in heavy])
-            unit = np.where(mine > 0.0, raw, 0.0)
+            factors = np.array([term.couple[h] for h in heavy])
+            unit = np.where(factors > 0.0, raw, 0.0)
             length = float(np.sqrt((unit**2).sum()))
-            sizes += term.weight * mine * (unit / length if length > 0.0 else unit)
+            sizes += term.weight * factors * (unit / length if length > 0.0 else unit)
         yield sizes
 
 

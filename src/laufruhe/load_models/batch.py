@@ -1,4 +1,4 @@
-"""Many designs of one problem in one call: decisions, and speeds (F12)."""
+"""Evaluate the objective of many designs of one problem in one call (F12)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,21 @@ from laufruhe.problem.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """A problem prepared for many designs; the features of its norms are 1 and the decision vector."""
+    """Problem prepared for the evaluation of many designs.
+
+    The features of a design are 1 and its decision vector, side by side.
+
+    Attributes
+    ----------
+    problem
+        Problem with open unbalances.
+    model
+        Loads of the problem, affine in the decision vector.
+    terms
+        Pairs (weight, norm) of the objective.
+    limits
+        Pairs (maximum, norm).
+    """
 
     problem: Problem
     model: AffineModel
@@ -25,15 +39,25 @@ class Designs:
     limits: tuple[tuple[float, BatchNorm], ...] = ()
 
     def objective(self, values: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """Objective of every design from its decisions u, complex, shape (designs, decisions) (C4)."""
-        return self.of_columns(self._features(values), threads, cache_bytes)
+        """Return the objective of every design, shape (designs,) (C4).
 
-    def within(self, values: Array) -> NDArray[np.bool_]:
-        """Return which designs keep the limits on loads and masses, within the tolerance `FEASIBLE`."""
-        features, kept = self._features(values), np.ones(len(values), dtype=bool)
+        Parameters
+        ----------
+        values
+            Decisions of every design, complex, shape (designs, decisions).
+        threads
+            Number of threads.
+        cache_bytes
+            Memory for one block of designs.
+        """
+        return self.objective_from_features(self._features(values), threads, cache_bytes)
+
+    def are_feasible(self, values: Array) -> NDArray[np.bool_]:
+        """Return which designs keep the limits on loads and masses within `FEASIBLE`, shape (designs,)."""
+        features, feasible = self._features(values), np.ones(len(values), dtype=bool)
         for maximum, norm in self.limits:
-            kept &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
-        return kept
+            feasible &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
+        return feasible
 
     def _features(self, values: Array) -> Array:
         columns = [
@@ -43,15 +67,15 @@ class Designs:
         ]
         return np.stack([np.ones(len(values)), *columns], axis=1)
 
-    def of_columns(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """Objective of 1 and the decision vector side by side, shape (designs, 1 + columns)."""
+    def objective_from_features(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
+        """Return the objective of every design from its features, shape (designs, 1 + columns)."""
         total = np.zeros(len(features))
         for weight, norm in self.terms:
             total += weight * norm.values(features, threads, cache_bytes)
         return total
 
-    def one(self, features: Array) -> float:
-        """Objective of a single design, of 1 and the decision vector, shape (1 + columns,)."""
+    def objective_of_one(self, features: Array) -> float:
+        """Return the objective of one design from its features, shape (1 + columns,)."""
         return sum(weight * norm.value(features) for weight, norm in self.terms)
 
     @property
@@ -61,37 +85,44 @@ class Designs:
 
     @property
     def operations(self) -> int:
-        """Additions and multiplications of the matrix products of one design."""
+        """Number of floating-point operations in the matrix products of one design."""
         return sum(norm.operations for _, norm in self.terms)
 
 
 def prepare(problem: Problem, prune: bool = True) -> Designs:
-    """Everything that does not depend on the decisions, once.
+    """Compute all that does not depend on the decisions.
 
-    What `prune` leaves out, what repeats within the cycle and what nothing drives, changes nothing but the time.
+    Parameters
+    ----------
+    problem
+        Problem with open unbalances.
+    prune
+        Whether samples that repeat within the cycle, and components that are zero, are left out to save time.
 
     Raises
     ------
     ModelError
-        If anything but unbalances is open: loads are linear in these alone.
+        If anything but unbalances is open, because loads are linear only in unbalances.
     """
-    others = [d.name for d in problem.decisions if not d.is_affine]
-    others += ["throws or firing order"] if problem.phasing is not None else []
-    if others:
-        raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(others)}")
+    nonlinear = [d.name for d in problem.decisions if not d.is_affine]
+    nonlinear += ["throws or firing order"] if problem.phasing is not None else []
+    if nonlinear:
+        raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(nonlinear)}")
     model = AffineModel(problem, whole_cycle=not prune)
     affine = model.at(model.full_samples if prune else problem.fidelity.samples)
-    terms, limits = (tuple((w, _batched(norm, prune)) for w, norm in of) for of in (affine.terms, affine.limits))
+    terms, limits = (
+        tuple((number, _batched(norm, prune)) for number, norm in pairs) for pairs in (affine.terms, affine.limits)
+    )
     return Designs(problem, model, terms, limits)
 
 
-def by_feature(norm: AffineNorm) -> Array:
-    """V0 and the columns of B as `BatchNorm` has them, shape (d, 1 + n, k)."""
+def feature_rows(norm: AffineNorm) -> Array:
+    """Return V0 and the columns of B in the layout of `BatchNorm`, shape (d, 1 + n, k)."""
     return np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
 
 
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
-    rows, grid = by_feature(norm), norm.grid
+    rows, grid = feature_rows(norm), norm.grid
     if prune and norm.norm.is_monotone_in_lengths:
         rows, weights = _merged(rows, grid.weights)
         grid = Grid(weights, len(weights))
@@ -99,10 +130,11 @@ def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
 
 
 def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
+    # rows that are equal up to sign have equal lengths: each once, with the sum of the weights
     flat = rows.reshape(-1, rows.shape[2]).T
-    lead = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
+    leading = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
     _, first, inverse = np.unique(
-        flat * np.where(lead < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True
+        flat * np.where(leading < 0.0, -1.0, 1.0), axis=0, return_index=True, return_inverse=True
     )
     order = np.argsort(first)
     rank = np.empty_like(order)

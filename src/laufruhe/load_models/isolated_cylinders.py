@@ -1,7 +1,7 @@
-"""Parts of an engine that load by themselves: one cylinder, or some rotors, the other cylinders idle in their places.
+"""Engines reduced to one cylinder or to some rotors, so that their loads can be computed alone.
 
-What an idle cylinder leaves in place are its pin and its bearings: loads inside the crankcase have places of every
-cylinder, and one cylinder may load those of another.
+The other cylinders are removed, or keep their places without mass. They must keep their places for loads inside the
+crankcase, because one cylinder may load the pins and bearings of another.
 """
 
 from __future__ import annotations
@@ -16,66 +16,85 @@ from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.problem.problem import Problem
 
-QUARTERS = (0.0, 0.5 * math.pi, math.pi)
-"""Banks that tell what a cylinder loads at any other: all of it leans with the bank, or not at all."""
-SAME = 9
-"""Digits of a lead [rad] that count."""
+BANK_SAMPLES = (0.0, 0.5 * math.pi, math.pi)
+"""Bank angles at which loads determine those at any bank angle [rad]: loads turn with the bank, or stay."""
+LEAD_DIGITS = 9
+"""Decimal digits to which leads are compared [rad]."""
 
 
 def massless_copy(part: SliderCrank) -> SliderCrank:
-    """A cylinder without mass, and without an area that a charge could press."""
+    """Return a cylinder without mass, and without a piston area on which gas could act."""
     return replace(part.only({}), bore=None if part.bore is None else 0.0)
 
 
-def isolate(engine: Engine, k: int, beside: bool, part: SliderCrank | None = None) -> Engine:
-    """Cylinder k alone, or another in its place; the places of the others beside it where these are asked."""
-    parts = engine.slider_cranks
-    own = parts[k] if part is None else part
-    every = [own if j == k else massless_copy(other) for j, other in enumerate(parts)]
-    return replace(engine, slider_cranks=tuple(every) if beside else (own,), rotors=())
+def isolate_cylinder(engine: Engine, k: int, keep_places: bool, part: SliderCrank | None = None) -> Engine:
+    """Return the engine reduced to cylinder k, without rotors.
+
+    Parameters
+    ----------
+    engine
+        Engine with all cylinders.
+    k
+        Index of the cylinder.
+    keep_places
+        Whether the other cylinders stay as massless copies.
+    part
+        Cylinder to put in place of cylinder k; None for that of the engine.
+    """
+    cylinders = engine.slider_cranks
+    active = cylinders[k] if part is None else part
+    with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(cylinders)]
+    return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=())
 
 
-def only_rotors(engine: Engine, rotors: Sequence[Rotor], beside: bool) -> Engine:
-    """These rotors alone; the places of the cylinders beside them where these are asked."""
-    parts = tuple(map(massless_copy, engine.slider_cranks)) if beside else ()
+def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -> Engine:
+    """Return the engine reduced to some rotors; massless copies of the cylinders stay if `keep_places`."""
+    parts = tuple(map(massless_copy, engine.slider_cranks)) if keep_places else ()
     return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
 
 
-def leaning(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
-    """Return the loads that go with cos(bank), with sin(bank) and with neither, from the banks of `QUARTERS`."""
-    still = 0.5 * (upright + upside)
-    return 0.5 * (upright - upside), across - still, still
+def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
+    """Return the factors of cos(bank), of sin(bank) and of 1 in the loads of a cylinder.
+
+    Parameters
+    ----------
+    upright, across, upside
+        Load coefficients at the three bank angles of `BANK_SAMPLES`.
+    """
+    constant = 0.5 * (upright + upside)
+    return 0.5 * (upright - upside), across - constant, constant
 
 
-def working(problem: Problem, name: str) -> Problem:
-    """The problem with the gas of one cylinder alone."""
-    return replace(problem, points=tuple(_working(point, name) for point in problem.points))
+def only_gas_of(problem: Problem, name: str) -> Problem:
+    """Return the problem with the gas of the named cylinder only."""
+    return replace(problem, points=tuple(_point_with_gas_of(point, name) for point in problem.points))
 
 
 def motored(problem: Problem) -> Problem:
-    """The problem without gas."""
+    """Return the problem without gas."""
     return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
 
 
 def gas_distinguishes_cylinders(problem: Problem) -> bool:
-    """Return True if gas that is felt drives some cylinders differently from others."""
+    """Return True if gas acts on measures of the problem, and differs between cylinders."""
     if not problem.depends_on_gas:
         return False
     gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
-    return len({tuple(_driven(gas, part) for gas in gases) for part in problem.engine.cylinders}) > 1
+    return len({tuple(_gas_key(gas, part) for gas in gases) for part in problem.engine.cylinders}) > 1
 
 
-def _driven(gas: GasModel, part: SliderCrank) -> Hashable:
-    # roundings of the lead of the facing piston are left out
-    other = part.facing
-    plain = replace(part, facing=replace(other, ahead=round(other.ahead, SAME))) if isinstance(other, Facing) else part
-    return alike_under(gas, plain)
+def _gas_key(gas: GasModel, part: SliderCrank) -> Hashable:
+    # without rounding errors in the lead of a facing piston
+    facing = part.facing
+    if isinstance(facing, Facing):
+        part = replace(part, facing=replace(facing, ahead=round(facing.ahead, LEAD_DIGITS)))
+    return alike_under(gas, part)
 
 
-def _working(point: OperatingPoint, name: str) -> OperatingPoint:
+def _point_with_gas_of(point: OperatingPoint, name: str) -> OperatingPoint:
     gas = point.gas
     if not isinstance(gas, Chambers):
-        # idle cylinders have no bore
+        # massless copies have no bore, so that other gas models do not act on them
         return point
-    own = tuple(replace(one, cylinders=(name,)) for one in gas.chambers if name in one.cylinders)
-    return replace(point, gas=replace(gas, chambers=own) if own else None)
+    chambers = tuple(replace(chamber, cylinders=(name,)) for chamber in gas.chambers if name in chamber.cylinders)
+    return replace(point, gas=replace(gas, chambers=chambers) if chambers else None)

@@ -1,4 +1,4 @@
-"""Forces and travel of mounts at angles of the cycle, as expressions of what is open (E4)."""
+"""Mount forces and mount deflections at samples of the cycle as CasADi expressions (E4)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from laufruhe.load_models.lines import waves
 from laufruhe.load_models.mount_symbols import SymbolicResponse
+from laufruhe.load_models.symbolic_spectrum import cosines_and_sines
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels
@@ -18,11 +18,24 @@ from laufruhe.problem.measure import Measure
 
 LEAST_SAMPLES = 32
 SAMPLES_PER_ORDER = 4
+"""Number of samples per period of the highest order."""
 
 
 @dataclass(frozen=True, eq=False)
 class PointResponse:
-    """Symbolic response at one operating point, and where its orders stand."""
+    """Response of the mounted block at one operating point.
+
+    Attributes
+    ----------
+    name, weight
+        Name and weight of the operating point.
+    base
+        Order of the common period.
+    orders
+        Orders, shape (n,).
+    response
+        Mount forces and deflections of every order.
+    """
 
     name: str
     weight: float
@@ -31,61 +44,66 @@ class PointResponse:
     response: SymbolicResponse
 
 
-def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity: Measure) -> tuple[Any, Grid]:
-    """Vectors at samples and their weights, as `load_rows` has them (P1).
+def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure: Measure) -> tuple[Any, Grid]:
+    """Return the rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
 
-    Of a norm that knows nothing but squares these are the orders' own (Parseval).
+    Rows are values at samples, or coefficients of orders for a root mean square (Parseval).
 
     Parameters
     ----------
+    points
+        Response at every operating point.
     names
-        Of the mounts, in the order of the response.
-    quantity
-        Of the forces or of the travel of the mounts.
+        Names of the mounts, in the order of the response.
+    measure
+        Measure of mount forces or mount deflections.
 
     Returns
     -------
-    Expression of shape (k, 3), and where its rows stand.
+    tuple
+        Rows as an expression of shape (k, 3), and their grid.
     """
-    chosen = [p for p in points if quantity.points is None or p.name in quantity.points]
-    mounts = quantity.places(names)
-    whole = sum(point.weight for point in chosen)
+    chosen = [p for p in points if measure.points is None or p.name in measure.points]
+    mounts = measure.places(names)
+    total_weight = sum(point.weight for point in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
-    exact = quantity.norm.is_euclidean
-    # points keep orders of their own: every signal has as many steps as the finest needs
-    finest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
-    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * finest))
+    exact = measure.norm.is_euclidean
+    # orders differ between points: all have the samples that the highest order needs
+    highest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
+    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest))
     for point in chosen:
-        signal = point.response.force if quantity.channel is channels.MOUNT_FORCE else point.response.travel
-        counted = np.flatnonzero(quantity.counted(point.orders)).tolist()
+        signal = point.response.force if measure.channel is channels.MOUNT_FORCE else point.response.travel
+        counted = np.flatnonzero(measure.counted(point.orders)).tolist()
         orders, (real, imaginary) = point.orders[counted], (part[:, counted] for part in signal)
         if exact:
-            still = orders == 0.0
-            values, steps = ca.horzcat(real, imaginary), np.append(0.5 + 0.5 * still, 0.5 - 0.5 * still)
+            is_mean = orders == 0.0
+            values, steps = ca.horzcat(real, imaginary), np.append(0.5 + 0.5 * is_mean, 0.5 - 0.5 * is_mean)
         else:
-            cosine, sine = waves(orders.tolist(), point.base, samples)
+            cosine, sine = cosines_and_sines(orders.tolist(), point.base, samples)
             values, steps = real @ cosine - imaginary @ sine, np.full(samples, 1.0 / samples)
         for k in mounts:
             rows = values[3 * k : 3 * k + 3, :].T
-            if quantity.direction_weights is not None:
-                rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
+            if measure.direction_weights is not None:
+                rows = rows @ ca.diag(ca.DM(list(measure.direction_weights)))
             blocks.append(rows)
-            weights += [*(point.weight / whole / len(mounts) * steps)]
+            weights += [*(point.weight / total_weight / len(mounts) * steps)]
     return ca.vertcat(*blocks), Grid(np.array(weights), samples, points=len(chosen))
 
 
-def transmitted(points: Sequence[PointResponse], quantity: Measure) -> list[tuple[Any, Any]]:
-    """Squares of forces on elastic and on firm mounts, per point and order (E11)."""
+def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> list[tuple[Any, Any]]:
+    """Return sums of squares of forces on elastic and on rigid mounts, per operating point and order (E11)."""
     pairs = []
-    counted = [quantity.orders] if quantity.orders is None else [(order,) for order in quantity.orders]
+    counted = [measure.orders] if measure.orders is None else [(order,) for order in measure.orders]
     for point in points:
-        if quantity.points is not None and point.name not in quantity.points:
+        if measure.points is not None and point.name not in measure.points:
             continue
-        for one in counted:
-            group = np.flatnonzero((point.orders > 0.0) & replace(quantity, orders=one).counted(point.orders)).tolist()
+        for orders in counted:
+            group = np.flatnonzero(
+                (point.orders > 0.0) & replace(measure, orders=orders).counted(point.orders)
+            ).tolist()
             if group:
-                parts = point.response.force, point.response.firm
-                over, under = (sum(ca.sumsqr(part[:, group]) for part in halves) for halves in parts)
-                pairs.append((over, under))
+                forces = point.response.force, point.response.rigid_force
+                elastic, rigid = (sum(ca.sumsqr(part[:, group]) for part in parts) for parts in forces)
+                pairs.append((elastic, rigid))
     return pairs

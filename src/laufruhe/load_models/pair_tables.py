@@ -1,11 +1,11 @@
-"""Root mean squares of a star as sums over pairs of throws (V9).
+"""Root mean squares of the loads of a crank star as sums over pairs of throws (V9).
 
-A root mean square of rows that add up over the throws is a sum over pairs,
+Throw k stands on step p_k of the star and adds rows m_k(p_k). The square of the root mean square is
 
-    |V0 + sum_k m_k(p_k)|^2 = c + sum_k L_k(p_k) + 2 sum_{k<l} m_k(p_k) . m_l(p_l),
+    |V0 + sum_k m_k(p_k)|^2 = c + sum_k L_k(p_k) + 2 sum_{k<l} m_k(p_k) . m_l(p_l).
 
-whatever orders, sections and operating points it is taken over: as many as there are cost nothing
-more. A star that grows throw by throw takes its squares along.
+The tables of L and of the products have the same size for any number of orders, sections and operating points. A search
+that places one throw after the other adds to the squares at each step.
 """
 
 from __future__ import annotations
@@ -23,16 +23,18 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """The square of one root mean square.
+    """Table of the square of one root mean square.
 
     Attributes
     ----------
-    constant, linear
-        c and L, the latter of shape (throws, steps).
+    constant
+        Square c of the rows without any throw.
+    linear
+        L_k(p), shape (throws, steps).
     pairs
         2 m_k(p) . m_l(q), shape (throws, throws, steps, steps).
     rounding
-        What a square may be off by.
+        Largest rounding error of a square.
     """
 
     constant: float
@@ -41,54 +43,64 @@ class PairTable:
     rounding: float
 
     def squares(self, stars: Stars) -> Array:
-        """Return the squares of whole stars, shape (n,)."""
+        """Return the squares of stars, shape (n,), from the step of every throw, shape (n, throws)."""
         total = np.full(len(stars), self.constant)
         for k in range(stars.shape[1]):
-            total += self.placed(stars, stars[:, k], k)
+            total += self.increments(stars, stars[:, k], k)
         return total
 
-    def placed(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """Return the increase of the squares by placing one throw, shape (n,); the throws before it are placed."""
+    def increments(self, stars: Stars, steps: Stars, throw: int) -> Array:
+        """Return the increase of the squares, shape (n,), when one throw is added to partial stars.
+
+        Parameters
+        ----------
+        stars
+            Steps of the throws before this one, shape (n, at least `throw`).
+        steps
+            Step of the throw in every star, shape (n,).
+        throw
+            Index of the throw.
+        """
         total = self.linear[throw, steps]
         count = self.linear.shape[1]
-        for other in range(throw):
-            table = self.pairs[other, throw].reshape(-1)
-            total += table[stars[:, other].astype(np.intp) * count + steps]
+        for earlier in range(throw):
+            table = self.pairs[earlier, throw].reshape(-1)
+            total += table[stars[:, earlier].astype(np.intp) * count + steps]
         return np.asarray(total)
 
 
 def pair_table(norm: StarNorm) -> PairTable:
-    """Build the table of a root mean square without decisions."""
+    """Return the table of a root mean square that has no decisions besides the star."""
     weights = np.sqrt(norm.grid.weights)[:, None]
     first = (norm.constant * weights).reshape(-1)
     throws, steps = norm.moves.shape[:2]
     moves = (norm.moves * weights).reshape(throws * steps, -1)
     gram = moves @ moves.T
-    own = np.diag(gram).reshape(throws, steps)
-    linear = own + 2.0 * (moves @ first).reshape(throws, steps)
+    squares = np.diag(gram).reshape(throws, steps)
+    linear = squares + 2.0 * (moves @ first).reshape(throws, steps)
     pairs = 2.0 * gram.reshape(throws, steps, throws, steps).transpose(0, 2, 1, 3)
-    size = float(np.linalg.norm(first)) + float(np.sqrt(own).max(axis=1).sum())
+    size = float(np.linalg.norm(first)) + float(np.sqrt(squares).max(axis=1).sum())
     return PairTable(float(first @ first), linear, np.ascontiguousarray(pairs), _ROUNDING * size**2)
 
 
 @dataclass(frozen=True, eq=False)
 class PairObjective:
-    """A weighted sum of root mean squares, under limits of others.
+    """Weighted sum of root mean squares, under limits on root mean squares.
 
     Attributes
     ----------
     terms, limits
-        With the weight of each, and with its maximum.
+        Pairs (weight, table) and (maximum, table).
     """
 
     terms: tuple[tuple[float, PairTable], ...]
     limits: tuple[tuple[float, PairTable], ...]
 
     @classmethod
-    def of(cls, problem: StarProblem) -> PairObjective:
-        """Build the objective of a problem with root mean squares only, and no decisions besides the star."""
+    def from_problem(cls, problem: StarProblem) -> PairObjective:
+        """Build the objective of a problem of root mean squares whose only decision is the star."""
         terms, limits = (
-            tuple((number, pair_table(norm)) for number, norm in each) for each in (problem.terms, problem.limits)
+            tuple((number, pair_table(norm)) for number, norm in pairs) for pairs in (problem.terms, problem.limits)
         )
         return cls(terms, limits)
 
@@ -98,7 +110,7 @@ class PairObjective:
         return [table for _, table in (*self.terms, *self.limits)]
 
     def values(self, squares: Array) -> Array:
-        """The objective from the squares of terms and limits, shape (n, tables); infinite over a limit."""
+        """Return the objective, shape (n,), infinite over a limit, from squares of all tables, shape (n, tables)."""
         total = np.zeros(len(squares))
         for k, (weight, _) in enumerate(self.terms):
             total += weight * np.sqrt(np.maximum(squares[:, k], 0.0))
@@ -106,8 +118,8 @@ class PairObjective:
             total[squares[:, k] > maximum**2 * (1.0 + 1e-9) + table.rounding] = np.inf
         return total
 
-    def below(self, squares: Array) -> float:
-        """Return the least objective that rounding allows, from one row of squares."""
+    def lower_value(self, squares: Array) -> float:
+        """Return a lower bound of the objective under rounding errors, from one row of squares, shape (tables,)."""
         minimum = sum(
             weight * float(np.sqrt(max(squares[k] - table.rounding, 0.0)))
             for k, (weight, table) in enumerate(self.terms)

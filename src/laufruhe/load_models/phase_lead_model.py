@@ -1,7 +1,7 @@
-"""A problem whose shafts come earlier by angles that are open: what stands, and what each of them brings (P13).
+"""Loads of an engine with geared shafts whose leads are open, with derivatives in the leads (P13).
 
-Every load that adds up over parts is the sum of what stands and of what each shaft carries; that comes earlier by as
-much as its shaft leads, also where gas makes it. Unbalances are columns beside it, as everywhere (P1).
+A load is the sum of the load of the fixed parts and of the loads of each shaft with an open lead. The load of a shaft,
+gas included, comes earlier by the lead of the shaft. Loads are affine in the unbalances (P1).
 """
 
 from __future__ import annotations
@@ -22,52 +22,61 @@ from laufruhe.problem.measure import Measure, kinks_of, load_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
 FINE = 1440
-"""Angles between which a mean is averaged where no program stands at them."""
+"""Number of averages over the cycle in the rows of a mean, if no unbalances are open and rows are cheap."""
 
 
 @dataclass(frozen=True, eq=False)
-class Share:
-    """The spectra of one shaft, or of the fixed rest: per operating point, and per unit of every column."""
+class LoadShare:
+    """Load of one shaft, or of the fixed parts.
 
-    own: list[Spectrum]
+    Attributes
+    ----------
+    bare
+        Spectrum with every unbalance decision at zero, for each operating point.
+    columns
+        For each column of the decision vector, the spectrum of one unit for each operating point.
+    """
+
+    bare: list[Spectrum]
     columns: list[list[Spectrum]]
 
 
 @dataclass(frozen=True, eq=False)
 class PhaseLeadNorm:
-    """A norm at some leads, and what each lead changes of its rows there.
+    """Norm of affine rows at given leads, and the derivatives of the rows in each lead.
 
     Attributes
     ----------
     norm
-        Its rows at these leads.
-    moved
-        Of every lead the same rows differentiated by it, (k, d) and (k, d, n), and the slope that its shaft brings.
+        Norm of the rows at these leads.
+    derivatives
+        For each lead: derivative of the constant rows, shape (k, d), derivative of the slope, shape (k, d, n), and
+        the part of the slope that its shaft causes, shape (k, d, n).
     angles
-        Of the rows of one signal, shape (points, steps) [rad]; None where leads change nothing.
+        Crank angles of the rows of one signal [rad], shape (points, steps); None if leads change nothing.
     """
 
     norm: AffineNorm
-    moved: tuple[tuple[Array, Array, Array], ...]
+    derivatives: tuple[tuple[Array, Array, Array], ...]
     angles: Array | None = None
 
 
 class PhaseLeadModel:
-    """Loads at any leads.
+    """Loads of an engine at any leads of its geared shafts.
 
     Parameters
     ----------
     problem
-        Whose decisions are leads and unbalances.
+        Problem whose decisions are leads and unbalances.
 
     Attributes
     ----------
     lower, upper, start
-        Of the leads [rad].
+        Bounds and baseline values of the leads [rad], shape (leads,).
     names
-        Of their shafts.
+        Names of the shafts with an open lead.
     whole
-        Of the engine with its leads at their start.
+        Loads of the whole engine with the leads at their baseline values.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -78,58 +87,84 @@ class PhaseLeadModel:
         self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
         self.whole = AffineModel(replace(problem, decisions=problem.unbalances), True, True)
         self.domains = self.whole.domains
-        self._shafts = [AffineModel(carried(problem, name.__eq__), True, True) for name in self.names]
-        self._still = AffineModel(carried(problem, lambda name: name not in self.names), True, True)
-        self._known: dict[Measure, tuple[Share, list[Share]]] = {}
+        self._shafts = [AffineModel(problem_of_shafts(problem, name.__eq__), True, True) for name in self.names]
+        self._fixed = AffineModel(problem_of_shafts(problem, lambda name: name not in self.names), True, True)
+        self._cache: dict[Measure, tuple[LoadShare, list[LoadShare]]] = {}
 
-    def shares(self, measure: Measure) -> tuple[Share, list[Share]]:
-        """Return the spectra of a load from the fixed rest and from each shaft, over a common period."""
-        if measure not in self._known:
+    def shares(self, measure: Measure) -> tuple[LoadShare, list[LoadShare]]:
+        """Return the load of a measure from the fixed parts and from each shaft, over a common period."""
+        if measure not in self._cache:
             engine = self.problem.engine
-            found = [_share(model.spectra(measure.load)) for model in (self._still, *self._shafts)]
-            each = [signal for share in found for by in (share.own, *share.columns) for signal in by]
-            base = common_base([engine.cycle.base_order, *(signal.base for signal in each)])
-            count = max(len(signal.with_finer_base(base).coefficients) for signal in each)
-            still, *shafts = (_each(share, lambda own: own.with_finer_base(base).padded(count)) for share in found)
-            self._known[measure] = still, shafts
-        return self._known[measure]
+            shares = [_share(model.spectra(measure.load)) for model in (self._fixed, *self._shafts)]
+            signals = [signal for share in shares for column in (share.bare, *share.columns) for signal in column]
+            base = common_base([engine.cycle.base_order, *(signal.base for signal in signals)])
+            count = max(len(signal.with_finer_base(base).coefficients) for signal in signals)
+            fixed, *shafts = (
+                _mapped(share, lambda signal: signal.with_finer_base(base).padded(count)) for share in shares
+            )
+            self._cache[measure] = fixed, shafts
+        return self._cache[measure]
 
     def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
-        """A measure at some leads, its means averaged about their angles where asked (P7)."""
+        """Return a measure at given leads, with derivatives in the leads.
+
+        Parameters
+        ----------
+        measure
+            Measure of loads or masses.
+        leads
+            Leads [rad], shape (leads,).
+        samples
+            Number of samples over the common period.
+        averaged
+            Whether the rows of a mean are averages over the step about each sample (P7).
+        """
         if not measure.is_load:
             norm = self.whole.norm(measure, samples)
-            none = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
-            return PhaseLeadNorm(norm, (none,) * len(self.names))
-        still, shafts = self.shares(measure)
-        by = leads - self.start
-        led = [_moved(share, float(d)) for share, d in zip(shafts, by, strict=True)]
-        total = _sum(still, led)
-        bends = kinks_of(measure, total.own, self.problem.engine)
+            zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
+            return PhaseLeadNorm(norm, (zeros,) * len(self.names))
+        fixed, shafts = self.shares(measure)
+        changes = leads - self.start
+        shifted = [_shifted(share, float(change)) for share, change in zip(shafts, changes, strict=True)]
+        total = _sum(fixed, shifted)
+        kinks = kinks_of(measure, total.bare, self.problem.engine)
         averaged = averaged and measure.norm.averages
 
         def rows(signals: Sequence[Spectrum]) -> tuple[Grid, Array]:
             step = signals[0].period / samples
             signals = [signal.averaged(step) for signal in signals] if averaged else signals
-            found = load_rows(measure, self.problem.points, signals, self.problem.engine, samples, bends)
-            return found.grid, found.vectors
+            sampled = load_rows(measure, self.problem.points, signals, self.problem.engine, samples, kinks)
+            return sampled.grid, sampled.vectors
 
-        grid, constant = rows(total.own)
-        slope = _stacked([rows(own)[1] for own in total.columns], constant)
-        moved = []
-        for share in led:
-            steep = _derived(share)
-            own = rows(steep.own)[1]
-            rising, flat = (_stacked([rows(each)[1] for each in by.columns], constant) for by in (steep, share))
-            moved.append((own, rising, flat))
-        steps = total.own[0].period * np.arange(samples) / samples
-        angles = np.array([np.concatenate([steps, own]) for own in bends])
-        return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(moved), angles)
+        grid, constant = rows(total.bare)
+        slope = _stacked([rows(column)[1] for column in total.columns], constant)
+        derivatives = []
+        for share in shifted:
+            derivative = _mapped(share, lambda signal: signal.derivative)
+            constant_derivative = rows(derivative.bare)[1]
+            slope_derivative, shaft_slope = (
+                _stacked([rows(column)[1] for column in part.columns], constant) for part in (derivative, share)
+            )
+            derivatives.append((constant_derivative, slope_derivative, shaft_slope))
+        steps = total.bare[0].period * np.arange(samples) / samples
+        angles = np.array([np.concatenate([steps, kinks_of_signal]) for kinks_of_signal in kinks])
+        return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(derivatives), angles)
 
     def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[PhaseLeadNorm, ...]]:
-        """Terms and limits that are loads or masses at some leads, and all of these norms in their order."""
+        """Return the problem in the unbalances at given leads, and its norms with derivatives, terms before limits.
+
+        Parameters
+        ----------
+        leads
+            Leads [rad], shape (leads,).
+        samples
+            Number of samples over the common period.
+        averaged
+            Whether the rows of means are averages over the step about each sample (P7).
+        """
 
         def norm(measure: Measure) -> PhaseLeadNorm:
-            # without a program peaks are sought as finely as results are measured (M6), and means hardly averaged
+            # without open unbalances samples are cheap: peaks have those of results (M6), means short averages
             times = 1 if self.domains or not measure.is_load else measure.norm.refinement
             if times == 1 and averaged and not self.domains:
                 times = max(round(FINE / samples), 1)
@@ -138,57 +173,56 @@ class PhaseLeadModel:
         terms = [(term.weight, norm(term.measure)) for term in self.problem.load_terms]
         limits = [(limit.maximum, norm(limit.measure)) for limit in self.problem.load_limits]
         program = AffineProblem(
-            tuple((weight, led.norm) for weight, led in terms), tuple((maximum, led.norm) for maximum, led in limits),
+            tuple((weight, term.norm) for weight, term in terms),
+            tuple((maximum, limit.norm) for maximum, limit in limits),
             self.domains, samples,
         )  # fmt: skip
-        return program, tuple(led for _, led in (*terms, *limits))
+        return program, tuple(norm for _, norm in (*terms, *limits))
 
     def counted(self, measure: Measure, shaft: int) -> list[Spectrum]:
-        """Return the counted spectra of a shaft at its starting lead, one per operating point with a weight."""
+        """Return the counted orders of a shaft's load at its baseline lead, for each operating point with a weight."""
         shares = measure.shares(self.problem.points)
-        own = self.shares(measure)[1][shaft].own
-        return [
-            narrow_signal(measure, each, self.problem.engine) for each, share in zip(own, shares, strict=True) if share
-        ]
+        signals = self.shares(measure)[1][shaft].bare
+        engine = self.problem.engine
+        return [narrow_signal(measure, signal, engine) for signal, share in zip(signals, shares, strict=True) if share]
 
 
-def carried(problem: Problem, belongs: Callable[[str], bool]) -> Problem:
-    """The problem of what the shafts of some names carry alone, nothing else of the engine in it."""
+def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> Problem:
+    """Return the problem of an engine reduced to the parts on some shafts, by a test of the shaft name."""
     engine = problem.engine
-    parts = tuple(part for part in engine.slider_cranks if belongs(part.shaft.name))
-    # the others stay as places without an unbalance, so that every decision keeps its column
-    rotors = tuple(r if belongs(r.shaft.name) else replace(r, unbalance=0.0) for r in engine.rotors)
-    own = {rotor.name for rotor in rotors if belongs(rotor.shaft.name)}
+    parts = tuple(part for part in engine.slider_cranks if is_included(part.shaft.name))
+    # other rotors stay without unbalance, so that every decision keeps its column
+    rotors = tuple(r if is_included(r.shaft.name) else replace(r, unbalance=0.0) for r in engine.rotors)
+    included = {rotor.name for rotor in rotors if is_included(rotor.shaft.name)}
     decisions = [
-        replace(d, drives=tuple(v if v.rotor in own else replace(v, gain=0.0) for v in d.rotor_drives))
+        replace(d, drives=tuple(v if v.rotor in included else replace(v, gain=0.0) for v in d.rotor_drives))
         for d in problem.unbalances
     ]
     return replace(problem, engine=replace(engine, slider_cranks=parts, rotors=rotors), decisions=tuple(decisions))
 
 
-def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> Share:
-    return Share([own for own, _ in spectra], [list(each) for each in zip(*(by for _, by in spectra), strict=True)])
+def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> LoadShare:
+    by_column = zip(*(columns for _, columns in spectra), strict=True)
+    return LoadShare([bare for bare, _ in spectra], [list(column) for column in by_column])
 
 
-def _moved(share: Share, lead: float) -> Share:
-    return _each(share, lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else share
+def _shifted(share: LoadShare, lead: float) -> LoadShare:
+    return _mapped(share, lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else share
 
 
-def _derived(share: Share) -> Share:
-    return _each(share, lambda signal: signal.derivative)
+def _mapped(share: LoadShare, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
+    return LoadShare(
+        [change(signal) for signal in share.bare], [[change(signal) for signal in column] for column in share.columns]
+    )
 
 
-def _each(share: Share, change: Callable[[Spectrum], Spectrum]) -> Share:
-    return Share([change(own) for own in share.own], [[change(own) for own in by] for by in share.columns])
-
-
-def _sum(still: Share, led: Sequence[Share]) -> Share:
-    own = [reduce(add, each) for each in zip(still.own, *(share.own for share in led), strict=True)]
+def _sum(fixed: LoadShare, shafts: Sequence[LoadShare]) -> LoadShare:
+    bare = [reduce(add, signals) for signals in zip(fixed.bare, *(share.bare for share in shafts), strict=True)]
     columns = [
-        [reduce(add, each) for each in zip(*by, strict=True)]
-        for by in zip(still.columns, *(share.columns for share in led), strict=True)
+        [reduce(add, signals) for signals in zip(*parts, strict=True)]
+        for parts in zip(fixed.columns, *(share.columns for share in shafts), strict=True)
     ]
-    return Share(own, columns)
+    return LoadShare(bare, columns)
 
 
 def _stacked(columns: Sequence[Array], constant: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Measures that a simulation gives and no expression has (E28b): an extension names it in their channel."""
+"""Measures from simulations in time, which an extension provides by the name in the channel (E28b)."""
 
 from __future__ import annotations
 
@@ -10,57 +10,60 @@ from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
-COARSER = 4
-"""Times as long as those of the last word steps of a search are."""
+COARSE_STEP = 4
+"""Time step of simulations during a search, over that of the final evaluation."""
 
 
 class Peaks(Protocol):
-    """Local maxima of several measures, those of one after those of the other; the largest is the measure.
+    """Local maxima in time of several measures; each measure is the largest of its maxima.
 
-    Points are the open numbers of mounts, then columns of unbalances.
+    The maxima of all measures stand in one vector, in the order of the measures. A point is the vector of the open
+    numbers of the mounts, followed by the columns of the unbalances, shape (n,).
     """
 
     @property
     def is_known(self) -> bool:
-        """Return True if the simulation has the peaks."""
+        """Return True if the simulation can give local maxima."""
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Number of peaks of every measure."""
+        """Number of local maxima of every measure."""
 
-    def values(self, asked: Array, /) -> Array:
-        """Return the peaks at a point; not numbers where there are none."""
+    def values(self, point: Array, /) -> Array:
+        """Return the local maxima at a point, shape (peaks,), NaN for missing ones."""
 
-    def slopes(self, asked: Array, /) -> Array:
-        """Return their derivatives, shape (peaks, numbers)."""
+    def slopes(self, point: Array, /) -> Array:
+        """Return the derivatives of the local maxima at a point, shape (peaks, n)."""
 
 
 def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
-    """Return the simulated measures that are minimised or limited, except those whose rows are known.
+    """Return the simulated measures in the objective and the limits, except those with linearised rows.
 
     Raises
     ------
     ModelError
-        If several simulations are asked.
+        If the measures need more than one simulation.
     """
-    asked = [m for m in problem.measures if m.channel.simulation and m not in problem.known_rows]
-    if len({measure.channel.simulation for measure in asked}) > 1:
+    measures = [m for m in problem.measures if m.channel.simulation and m not in problem.known_rows]
+    if len({measure.channel.simulation for measure in measures}) > 1:
         raise ModelError("channels of two simulations are asked together; ask for those of one")
-    return tuple(dict.fromkeys(asked))
+    return tuple(dict.fromkeys(measures))
 
 
-def peaks_of(problem: Problem, coarser: int, roughly: bool = False) -> Peaks | None:
-    """Return the peaks of all simulated measures; None where there are no such measures.
+def peaks_of(problem: Problem, step_factor: int, is_coarse: bool = False) -> Peaks | None:
+    """Return the local maxima of all simulated measures, or None if there are no such measures.
 
     Parameters
     ----------
-    coarser
-        Times as long as those of the last word steps are.
-    roughly
-        Whether the simulation may leave out what costs most.
+    problem
+        Problem with open mounts.
+    step_factor
+        Time step over that of the final evaluation.
+    is_coarse
+        Whether the simulation may leave out its most expensive part.
     """
     measures = simulated_measures(problem)
     if not measures:
         return None
-    found: Peaks = call_by_name(f"{measures[0].channel.simulation}:peaks", problem, measures, coarser, roughly)
-    return found
+    peaks: Peaks = call_by_name(f"{measures[0].channel.simulation}:peaks", problem, measures, step_factor, is_coarse)
+    return peaks

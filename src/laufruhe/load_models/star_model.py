@@ -1,9 +1,8 @@
-"""A problem as norms of rows that are affine in its star and its decisions (S11).
+"""Problem with a decided crank star as norms of rows that are affine in the star and the decisions (S11).
 
-Throws add up: the rows of any star are those of one star, plus what it changes when
-each throw is moved to its step. Gas stays out of it, because even firing of equal
-cylinders gives the same roll moment in whatever order. All numbers come from the exact
-model, one throw moved at a time.
+Loads of throws add up. The rows of any star are those of one star, the origin, plus the change when each throw moves to
+its step. The exact model computes the change of one throw at a time. Gas is evaluated at the origin only, because even
+firing of equal cylinders gives the same roll moment in every order.
 """
 
 from __future__ import annotations
@@ -24,49 +23,69 @@ from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
+# relative difference of slopes that counts as none
 _SAME_SLOPE = 1e-11
+# relative rounding error of rows that cancel
 _ROUNDING = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
 class StarNorm:
-    """N(V0 + sum_k D[k, p_k] + (B + sum_k E[k, p_k]) x) over the steps p_k of the throws.
+    """Norm N(V0 + sum_k D[k, p_k] + (B + sum_k E[k, p_k]) x) for the star with throw k on step p_k.
 
     Attributes
     ----------
-    constant, moves
-        V0 and D, shapes (k, d) and (throws, steps, k, d).
-    slope, turns
-        B and E, shapes (k, d, n) and (throws, steps, k, d, n); no E where unbalances act
-        alike in every star.
+    norm
+        Norm N.
+    constant
+        Rows V0 of the origin star, shape (k, d).
+    moves
+        Change D of the rows when a throw moves to a step, shape (throws, steps, k, d).
+    slope
+        Derivative B of the rows of the origin star, shape (k, d, n).
+    slope_moves
+        Change E of the derivative, shape (throws, steps, k, d, n); None if unbalances act alike in every star.
     grid
-        Weights of the rows.
+        Weights and order of the rows.
     """
 
     norm: Norm
     constant: Array
     moves: Array
     slope: Array
-    turns: Array | None
+    slope_moves: Array | None
     grid: Grid
 
     def at(self, star: Sequence[int]) -> AffineNorm:
-        """The norm of one star."""
-        chosen = np.arange(len(star)), np.asarray(star, dtype=np.intp)
-        constant = _cancelled(self.constant, self.moves[chosen])
-        slope = self.slope if self.turns is None else _cancelled(self.slope, self.turns[chosen])
+        """Return the norm of one star, from the step of every throw."""
+        indices = np.arange(len(star)), np.asarray(star, dtype=np.intp)
+        constant = _sum_with_zeros(self.constant, self.moves[indices])
+        slope = self.slope if self.slope_moves is None else _sum_with_zeros(self.slope, self.slope_moves[indices])
         return AffineNorm(self.norm, constant, slope, self.grid)
 
 
-def _cancelled(first: Array, moves: Array) -> Array:
-    whole = first + moves.sum(axis=0)
-    reach = np.abs(first).max(initial=0.0) + np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim))).sum()
-    return np.where(np.abs(whole) <= _ROUNDING * reach, 0.0, whole)
+def _sum_with_zeros(first: Array, moves: Array) -> Array:
+    # sums that are rounding errors become zero
+    total = first + moves.sum(axis=0)
+    scale = np.abs(first).max(initial=0.0) + np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim))).sum()
+    return np.where(np.abs(total) <= _ROUNDING * scale, 0.0, total)
 
 
 @dataclass(frozen=True, eq=False)
 class StarProblem:
-    """Rows of terms and limits of every star at one number of samples."""
+    """Problem of all stars at one number of samples.
+
+    Attributes
+    ----------
+    terms
+        Pairs (weight, norm) of the objective.
+    limits
+        Pairs (maximum, norm).
+    domains
+        Sets of the decisions.
+    samples
+        Number of samples over the common period.
+    """
 
     terms: tuple[tuple[float, StarNorm], ...]
     limits: tuple[tuple[float, StarNorm], ...]
@@ -75,33 +94,33 @@ class StarProblem:
 
     @property
     def compressed(self) -> StarProblem:
-        """The same with root mean squares in few rows (S12)."""
+        """Problem whose root mean squares have as few rows as possible (S12)."""
         terms, limits = (
-            tuple((number, compressed(norm) if norm.norm.is_euclidean else norm) for number, norm in each)
-            for each in (self.terms, self.limits)
+            tuple((number, compress_norm(norm) if norm.norm.is_euclidean else norm) for number, norm in pairs)
+            for pairs in (self.terms, self.limits)
         )
         return replace(self, terms=terms, limits=limits)
 
     def at(self, star: Sequence[int]) -> AffineProblem:
-        """The problem of one star."""
+        """Return the problem of one star, from the step of every throw."""
         terms = tuple((weight, norm.at(star)) for weight, norm in self.terms)
         limits = tuple((maximum, norm.at(star)) for maximum, norm in self.limits)
         return AffineProblem(terms, limits, self.domains, self.samples)
 
 
 class StarModel:
-    """Spectra of one star and of every single move of a throw.
+    """Loads of the origin star, and of all stars that differ from it in one throw.
 
     Parameters
     ----------
     phasing
-        What is open.
+        Open crank star.
     space
-        Stars allowed.
+        Allowed stars.
     geometry
-        Bank angle and split pin [rad].
+        Bank angle and split pin [rad], or None each.
     origin
-        Star that the moves are counted from; the first of the space when left out.
+        Star from which moves of throws are counted; the first star of the space if None.
     """
 
     def __init__(
@@ -114,10 +133,10 @@ class StarModel:
         self.phasing, self.space, self.geometry = phasing, space, geometry
         self.layout: Layout = phasing.layout(*geometry)
         self._origin = space.first if origin is None else origin
-        self.problem = normalised(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
+        self.problem = with_upright_angles(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
         self._whole = AffineModel(self.problem, keep_all=True)
-        self._still = self._motored(self._origin)
-        self._moved = {
+        self._origin_motored = self._motored(self._origin)
+        self._one_moved = {
             (k, p): self._motored(tuple(p if j == k else step for j, step in enumerate(self._origin)))
             for k in range(1, space.throws)
             for p in range(space.phases)
@@ -125,39 +144,42 @@ class StarModel:
         }
         self.base = common_base([model.base for model in self.models])
         for model in self.models:
-            model.base, model.lead = self.base, self._whole
+            model.base, model.kink_model = self.base, self._whole
         self.domains = self._whole.domains
         self._cache: dict[tuple[int, bool], StarProblem] = {}
 
     @property
     def models(self) -> list[AffineModel]:
-        """Models of the stars from which all other stars are composed."""
-        return [self._whole, self._still, *self._moved.values()]
+        """Load models of the stars that determine all other stars."""
+        return [self._whole, self._origin_motored, *self._one_moved.values()]
 
     @property
     def samples(self) -> int:
-        """Steps of the problem's fidelity that fall into one period of the loads."""
+        """Number of samples over one period of the loads that the fidelity of the problem asks for."""
         return self._whole.full_samples
 
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)
         candidate = Candidate(throws, None, *self.geometry, without_gas=True)
-        return AffineModel(normalised(self.phasing.realise(candidate)), keep_all=True)
+        return AffineModel(with_upright_angles(self.phasing.realise(candidate)), keep_all=True)
 
     def at(self, samples: int, averaged: bool = False) -> StarProblem:
-        """Rows of every star at `samples` steps over the period of the loads; those of means averaged (P7)."""
-        means = averaged and any(measure.is_load and measure.norm.averages for measure in self.problem.measures)
-        key = samples, means
+        """Return the problem of all stars at a number of samples over the period of the loads.
+
+        Rows of means are averages over the step about each sample if `averaged` (P7).
+        """
+        averages_means = averaged and any(m.is_load and m.norm.averages for m in self.problem.measures)
+        key = samples, averages_means
         if key not in self._cache:
-            self._cache[key] = self._rows(samples, means).compressed
+            self._cache[key] = self._rows(samples, averages_means).compressed
         return self._cache[key]
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
-        whole, still = self._whole.at(samples, averaged), self._still.at(samples, averaged)
-        moved = {key: model.at(samples, averaged) for key, model in self._moved.items()}
+        whole, motored = self._whole.at(samples, averaged), self._origin_motored.at(samples, averaged)
+        moved = {place: model.at(samples, averaged) for place, model in self._one_moved.items()}
         return StarProblem(
-            self._norms(whole.terms, still.terms, {key: a.terms for key, a in moved.items()}),
-            self._norms(whole.limits, still.limits, {key: a.limits for key, a in moved.items()}),
+            self._norms(whole.terms, motored.terms, {place: problem.terms for place, problem in moved.items()}),
+            self._norms(whole.limits, motored.limits, {place: problem.limits for place, problem in moved.items()}),
             self.domains,
             samples,
         )
@@ -165,31 +187,35 @@ class StarModel:
     def _norms(
         self,
         whole: tuple[tuple[float, AffineNorm], ...],
-        still: tuple[tuple[float, AffineNorm], ...],
+        motored: tuple[tuple[float, AffineNorm], ...],
         moved: dict[tuple[int, int], tuple[tuple[float, AffineNorm], ...]],
     ) -> tuple[tuple[float, StarNorm], ...]:
-        out = []
-        for number, ((weight, all_of), (_, rest)) in enumerate(zip(whole, still, strict=True)):
-            own = {place: norms[number][1] for place, norms in moved.items()}
-            moves = self._apart({place: norm.constant for place, norm in own.items()}, rest.constant)
-            # most turn alike, which is seen before room is made for all of them
-            minimum = _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
-            alike = all(np.abs(norm.slope - rest.slope).max(initial=0.0) <= minimum for norm in own.values())
-            turned = None if alike else self._apart({place: norm.slope for place, norm in own.items()}, rest.slope)
-            out.append((weight, StarNorm(all_of.norm, all_of.constant, moves, all_of.slope, turned, all_of.grid)))
-        return tuple(out)
+        star_norms = []
+        for number, ((weight, norm), (_, origin)) in enumerate(zip(whole, motored, strict=True)):
+            moved_norms = {place: norms[number][1] for place, norms in moved.items()}
+            moves = self._changes({place: other.constant for place, other in moved_norms.items()}, origin.constant)
+            # slopes mostly agree, which saves the memory for their changes
+            negligible = _SAME_SLOPE * np.abs(origin.slope).max(initial=0.0)
+            is_same = all(
+                np.abs(other.slope - origin.slope).max(initial=0.0) <= negligible for other in moved_norms.values()
+            )
+            slopes = {place: other.slope for place, other in moved_norms.items()}
+            slope_moves = None if is_same else self._changes(slopes, origin.slope)
+            star_norm = StarNorm(norm.norm, norm.constant, moves, norm.slope, slope_moves, norm.grid)
+            star_norms.append((weight, star_norm))
+        return tuple(star_norms)
 
-    def _apart(self, rows: dict[tuple[int, int], Array], still: Array) -> Array:
-        out = np.zeros((self.space.throws, self.space.phases, *still.shape))
-        for place, own in rows.items():
-            np.subtract(own, still, out=out[place])
-        return out
+    def _changes(self, rows: dict[tuple[int, int], Array], origin: Array) -> Array:
+        changes = np.zeros((self.space.throws, self.space.phases, *origin.shape))
+        for place, moved in rows.items():
+            np.subtract(moved, origin, out=changes[place])
+        return changes
 
 
-def normalised(problem: Problem) -> Problem:
-    """Unbalances that may take any angle, counted from upright and not from a throw.
+def with_upright_angles(problem: Problem) -> Problem:
+    """Return the problem with unbalances of free angle counted from upright, and not from their throw.
 
-    A disc looks the same from every angle, so that they act alike in every star.
+    Their set, a disc, is the same from every angle. Counted from upright, they act alike in every star.
     """
     return replace(problem, decisions=tuple(_upright(decision) for decision in problem.decisions))
 
@@ -210,9 +236,10 @@ def _upright(decision: Decision) -> Decision:
 
 
 def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
-    """Sums of these, shape (..., k, d), are as long in as few rows as they are: Q of a QR keeps every length (S12).
+    """Return rows of shape (..., m, 1) whose sums have the same lengths as those of `parts`, shape (..., k, d) (S12).
 
-    None where they are as many as their numbers.
+    They are the rows of R in a QR decomposition, because Q keeps every length. The result is None if R would have no
+    fewer rows than k d.
     """
     k, d = parts[0].shape[-2:]
     flat = [part.reshape(-1, k * d) for part in parts]
@@ -220,19 +247,20 @@ def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
     if len(matrix) <= matrix.shape[1]:
         return None
     small = np.asarray(np.linalg.qr(matrix, mode="r")).T
-    own = np.split(small, np.cumsum([len(part) for part in flat])[:-1])
-    return [few.reshape(*part.shape[:-2], small.shape[1], 1) for few, part in zip(own, parts, strict=True)]
+    split = np.split(small, np.cumsum([len(part) for part in flat])[:-1])
+    return [rows.reshape(*part.shape[:-2], small.shape[1], 1) for rows, part in zip(split, parts, strict=True)]
 
 
-def compressed(norm: StarNorm) -> StarNorm:
-    """The same root mean square in as few rows as there are columns (S12)."""
+def compress_norm(norm: StarNorm) -> StarNorm:
+    """Return a root mean square with no more rows than it has columns (S12)."""
     root = np.sqrt(norm.grid.weights)[:, None]
     parts = [norm.constant * root, norm.moves * root, np.moveaxis(norm.slope * root[..., None], -1, 0)]
-    if norm.turns is not None:
-        parts.append(np.moveaxis(norm.turns * root[..., None], -1, 2))
-    few = compress_rows(parts)
-    if few is None:
+    if norm.slope_moves is not None:
+        parts.append(np.moveaxis(norm.slope_moves * root[..., None], -1, 2))
+    compressed = compress_rows(parts)
+    if compressed is None:
         return norm
-    (constant, moves, slope), turns = few[:3], None if norm.turns is None else np.moveaxis(few[3], 2, -1)
+    constant, moves, slope = compressed[:3]
+    slope_moves = None if norm.slope_moves is None else np.moveaxis(compressed[3], 2, -1)
     grid = Grid(np.ones(len(constant)), len(constant))
-    return StarNorm(norm.norm, constant, moves, np.moveaxis(slope, 0, -1), turns, grid)
+    return StarNorm(norm.norm, constant, moves, np.moveaxis(slope, 0, -1), slope_moves, grid)

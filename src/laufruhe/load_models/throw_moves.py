@@ -1,6 +1,6 @@
-"""Throws, bank and split pin as deviations from a star, its firing order kept (S20).
+"""Throws, bank angle and split pin as deviations from a star at a fixed firing order (S20).
 
-Nothing here asks whether a deviation is a number or a symbol.
+Deviations may be numbers or CasADi symbols.
 """
 
 from __future__ import annotations
@@ -17,31 +17,39 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing
 
-REACH = math.radians(60.0)
-# [rad]
-STAYS = 1e-8
-APART = 1e-6
-"""What cylinders that move fire apart at least [rad]: those that fire at once have no order."""
+# largest deviation of a throw without bounds [rad]
+MAX_DEVIATION = math.radians(60.0)
+# deviation that counts as zero [rad]
+ZERO_DEVIATION = 1e-8
+MIN_INTERVAL = 1e-6
+"""Smallest firing interval of open throws [rad], because simultaneous firings have no order."""
 
 
 class ThrowMoves:
-    """The open angles of a star, their bounds, and their effect on its firing intervals.
+    """Open angles of a crank: their bounds, and their effect on the firing intervals.
 
     Parameters
     ----------
     phasing
-        What is open.
+        Open crank star with the bounds of its angles.
     layout
-        Of the star.
+        Layout of the cylinders.
     start
-        The star and its firing order.
+        Star with firing order from which deviations are counted.
     intervals
-        Allowed.
+        Allowed firing intervals [rad].
+
+    Attributes
+    ----------
+    size
+        Number of open angles: throws, then bank angle, then split pin.
+    lower, upper
+        Bounds of the deviations [rad], shape (size,).
     """
 
     def __init__(self, phasing: Phasing, layout: Layout, start: Candidate, intervals: Intervals) -> None:
         self.phasing, self.layout, self.start = phasing, layout, start
-        self.intervals = Intervals(max(intervals.minimum, min(APART, intervals.maximum)), intervals.maximum)
+        self.intervals = Intervals(max(intervals.minimum, min(MIN_INTERVAL, intervals.maximum)), intervals.maximum)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
         self._open_bank, self._open_split = phasing.is_geometry_open
         self.size = len(self._throws) + self._open_bank + self._open_split
@@ -52,19 +60,19 @@ class ThrowMoves:
         start, phasing = self.start, self.phasing
         for k in self._throws:
             pair = phasing.throw_bounds[k] if phasing.throw_bounds else None
-            low.append(-REACH if pair is None else pair[0] - start.throws[k])
-            high.append(REACH if pair is None else pair[1] - start.throws[k])
-        for is_open, bounds, given in (
+            low.append(-MAX_DEVIATION if pair is None else pair[0] - start.throws[k])
+            high.append(MAX_DEVIATION if pair is None else pair[1] - start.throws[k])
+        for is_open, bounds, initial in (
             (self._open_bank, phasing.bank, start.bank_angle),
             (self._open_split, phasing.split, start.split_pin),
         ):
-            if is_open and bounds is not None and given is not None:
-                low.append(bounds[0] - given)
-                high.append(bounds[1] - given)
+            if is_open and bounds is not None and initial is not None:
+                low.append(bounds[0] - initial)
+                high.append(bounds[1] - initial)
         return np.array(low), np.array(high)
 
     def angles(self, x: Any) -> tuple[list[Any], Any, Any]:
-        """Throws, bank and split pin at deviations x of length `size`."""
+        """Return the throws, bank angle and split pin [rad] at deviations x, shape (size,)."""
         start, position = self.start, len(self._throws)
         bank, split = start.bank_angle, start.split_pin
         if self._open_bank:
@@ -74,7 +82,7 @@ class ThrowMoves:
             split = split + x[position]
         first = start.throws[0]
         if bank is not None and start.bank_angle is not None:
-            # cylinder 1 stays at its dead centre when phi = 0
+            # crank angle zero stays the dead centre of cylinder 1
             first = first + 0.5 * (bank - start.bank_angle)
         if split is not None and start.split_pin is not None:
             first = first + 0.5 * (split - start.split_pin)
@@ -83,9 +91,9 @@ class ThrowMoves:
         return throws, bank, split
 
     def candidate(self, x: Array) -> Candidate:
-        """The design at deviations x."""
-        # a rounding beside a step would pass for another firing angle
-        throws, bank, split = self.angles(np.where(np.abs(x) < STAYS, 0.0, x))
+        """Return the crank at deviations x [rad], shape (size,)."""
+        # a rounding error beside a step would count as another firing angle
+        throws, bank, split = self.angles(np.where(np.abs(x) < ZERO_DEVIATION, 0.0, x))
         return replace(
             self.start,
             throws=tuple(float(angle) % math.tau for angle in throws),
@@ -93,8 +101,8 @@ class ThrowMoves:
             split_pin=None if split is None else float(split),
         )
 
-    def firing(self, x: Any) -> tuple[list[Any], list[str]]:
-        """Firing intervals, linear in the deviations (S20), and their names."""
+    def firing_intervals(self, x: Any) -> tuple[list[Any], list[str]]:
+        """Return the firing intervals [rad], linear in the deviations x (S20), and their names."""
         throws, bank, split = self.angles(x)
         start, cycle, pins = self.start, self.phasing.cycle, self.layout.pins
         order = start.firing_order or ()
@@ -108,6 +116,6 @@ class ThrowMoves:
             if split is not None and start.split_pin is not None:
                 moved = moved + side * (split - start.split_pin)
             moments.append(math.tau * turn + moved)
-        following = [*moments[1:], moments[0] + cycle.angle]
-        rows = [b - a for a, b in zip(moments, following, strict=True)]
-        return rows, [f"firing interval after cylinder {number}" for number in order]
+        next_moments = [*moments[1:], moments[0] + cycle.angle]
+        intervals = [b - a for a, b in zip(moments, next_moments, strict=True)]
+        return intervals, [f"firing interval after cylinder {number}" for number in order]

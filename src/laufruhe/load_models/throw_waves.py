@@ -1,12 +1,12 @@
-"""Loads of throws as sums of waves of their angles, with coefficients from the exact model (S26, S30).
+"""Loads of throws as sums of waves in their angles, with coefficients from the exact model (S26, S30).
 
-Whatever turns with a throw loads by order h as c_h e^{i h theta}: its slider-cranks, their gas and the unbalances
-that ride on it. A norm of loads is then one of rows that are affine in cos(h theta) and sin(h theta) of
-every throw, and in the unbalances.
+Parts that turn with a throw at angle theta have the load c_h e^{i h theta} in order h: its slider-cranks, their gas and
+the unbalances on it. A measure of loads is a norm of rows that are affine in cos(h theta) and sin(h theta) of every
+throw, and in the unbalances.
 
-Where the bank angle is open, a cylinder alone with its axis upright loads by A, with the axis a quarter turn further by
-B, and in roll by C. On the bank b = s beta its axis leans by b, and it is later by b: order h is e^{i h (theta - b)}
-times A_h cos b + B_h sin b + C_h, waves of b of the orders h - 1, h and h + 1. A split pin makes it later alone.
+If the bank angle beta is open, the load of a cylinder on bank b = s beta, with s = 1 or -1, leans by b and comes later
+by b. Order h is e^{i h (theta - b)} (A_h cos b + B_h sin b + C_h), which are waves in b of the orders h - 1, h and
+h + 1. An open split pin only shifts the load in time.
 """
 
 from __future__ import annotations
@@ -20,7 +20,14 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
-from laufruhe.load_models.isolated_cylinders import QUARTERS, isolate, leaning, motored, only_rotors, working
+from laufruhe.load_models.isolated_cylinders import (
+    BANK_SAMPLES,
+    isolate_cylinder,
+    isolate_rotors,
+    motored,
+    only_gas_of,
+    split_by_bank,
+)
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms.norm import amplitudes, mean_square
@@ -29,49 +36,53 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, mass_rows, narrow_signal
 from laufruhe.problem.problem import Problem
 
-_NOTHING, _FEW = 1e-10, 24
-_MANY = 96
+# smallest share of the load that keeps one of the lowest orders, and number of these orders
+_TINY_SHARE, _LOWEST_ORDERS = 1e-10, 24
+# number of orders with the stricter share of `share_left_out`
+_LOW_ORDERS = 96
+# number of orders of a signal with kinks that are summed one by one
 _LISTED = 4096
 Wave = tuple[Fraction, ...]
+"""Multiple of the throw angle, and of every other open angle, in the phase of a wave."""
 PEAK_STEPS = 2
-"""Parts of a step about which peaks are averaged: none is more than the peak, however short."""
+"""Number of averages per step in rows of peaks; an average over any interval is at most the peak."""
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
-    """A cylinder that turns with one throw, or the unbalances that ride on it.
+class MovingPart:
+    """Cylinder, or all unbalances, that turn with one throw.
 
     Attributes
     ----------
     pin
-        Its throw.
+        Index of the throw.
     cylinder
-        Its number from 0; None of unbalances.
-    found
-        Its loads alone; where the bank angle is open, of a cylinder upright, a quarter turn further and upside down.
+        Index of the cylinder; None for unbalances.
+    evaluations
+        Loads of this part only: one evaluation, or one for each bank angle of `BANK_SAMPLES` if the bank angle is open.
     ahead
-        Angle that makes them those at theta = 0, no whole turns and open angles at zero [rad].
-    riding
-        Unbalances by the names of their rotors.
+        Angle by which the loads come earlier when the throw and all open angles are at zero [rad].
+    unbalances
+        Unbalance of every rotor on the throw, by its name [kg m].
     """
 
     pin: int
     cylinder: int | None
-    found: tuple[Evaluation, ...]
+    evaluations: tuple[Evaluation, ...]
     ahead: float
-    riding: dict[str, complex]
+    unbalances: dict[str, complex]
 
 
 @dataclass(frozen=True, eq=False)
 class WaveNorm:
-    """N(V0 + B x + sum_p Re sum_h W_ph e^{i h theta_p}), and how far orders left out may move it.
+    """Norm N(V0 + B x + sum_p Re sum_h W_ph e^{i h theta_p}) over parts p and orders h.
 
     Attributes
     ----------
     fixed
-        V0 and B.
+        Norm of the rows V0 + B x of all that does not turn with a throw.
     waves
-        W of every moving part, shape (parts, orders, k, d), at theta = 0 and no whole turns.
+        W of every moving part with all open angles at zero, shape (parts, orders, k, d).
     left_out
         What the orders that are left out amount to at most [SI].
     """
@@ -81,217 +92,248 @@ class WaveNorm:
     left_out: float
 
 
-def averages(problem: Problem, measure: Measure) -> bool:
-    """Return True if the rows are averages about angles: of means (P7), or of peaks that gas bends (no less)."""
-    bends = problem.has_gas and measure.depends_on_gas and measure.norm.refinement > 1
-    return measure.is_load and (measure.norm.averages or bends)
+def uses_averages(problem: Problem, measure: Measure) -> bool:
+    """Return True if rows are averages about samples: of means (P7), or of peaks of loads with kinks by gas."""
+    has_kinks = problem.has_gas and measure.depends_on_gas and measure.norm.refinement > 1
+    return measure.is_load and (measure.norm.averages or has_kinks)
 
 
-def averaged(problem: Problem, measure: Measure, signal: Spectrum, samples: int) -> Spectrum:
-    """A signal as its rows are taken at so many steps of its period."""
-    if not averages(problem, measure):
+def averaged_signal(problem: Problem, measure: Measure, signal: Spectrum, samples: int) -> Spectrum:
+    """Return the signal whose samples are the rows of a measure: the signal, or its averages over the steps."""
+    if not uses_averages(problem, measure):
         return signal
     return signal.averaged(signal.period / (samples if measure.norm.averages else PEAK_STEPS * samples))
 
 
 class ThrowWaves:
-    """Norms of a problem as waves of its throws.
+    """Norms of a problem as sums of waves in the angles of its throws.
 
     Attributes
     ----------
     orders
-        Of the throw, and of every angle that is open beside throws, in each wave, shape (waves, 1 + open).
+        Multiples of the throw angle, and of bank angle and split pin if open, in each wave, shape (waves, 1 + open).
+    parts
+        Cylinders and unbalances that turn with the throws.
+    rest
+        Loads of the remaining rotors, affine in the unbalances.
+    times
+        Orders in time that are kept.
+    base
+        Order of the common period.
 
     Parameters
     ----------
     problem
-        Nothing of its phasing open, its throws anywhere; unbalances that are open ride on no throw.
+        Problem of a crank with its throws at any angles. No open unbalance turns with a throw.
     layout
-        Of its engine.
-    rides
-        Throw that every rotor turns with; rotors left out stand still.
+        Layout of the cylinders.
+    rotor_throws
+        Index of the throw that each rotor turns with; rotors that turn with none are left out.
     is_geometry_open
-        Whether the bank angle and split pins are open.
+        Whether the bank angle and the split pin are open.
     turns
-        What an open angle adds to every throw: side of cylinder 1 where throws are counted from its dead centre.
+        Change of all throw angles per unit of an open angle: the side of cylinder 1 if throws are counted from its
+        dead centre, or 0.
     """
 
     share_left_out: tuple[float, float] = 1e-4, 1e-3
-    """Of the moving parts' root mean square, that orders left out may hold, of the first few next to nothing; bounds
-    are lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
-    _followed: tuple[float, float] = 1e-4, 3e-5
+    """Largest share of a moving part's root mean square in omitted orders, by which bounds are lowered.
+
+    The first number is for up to `_LOW_ORDERS` orders. The second is for higher orders of loads inside the crankcase,
+    where a jump of the pressure has orders without end."""
+    _arc_shares: tuple[float, float] = 1e-4, 3e-5
 
     def __init__(
-        self, problem: Problem, layout: Layout, rides: dict[str, int],
+        self, problem: Problem, layout: Layout, rotor_throws: dict[str, int],
         is_geometry_open: tuple[bool, bool] = (False, False), turns: float = 0.0,
     ) -> None:  # fmt: skip
         self.problem, self.layout, self._is_geometry_open, self._turns = problem, layout, is_geometry_open, turns
         self.throws = len(layout.throw_positions)
         if any(is_geometry_open) and self.throws == 1:
-            # one throw is cheap to follow
-            self.share_left_out, self._followed = (1e-6, 1e-6), (1e-9, 1e-9)
+            # one throw is cheap
+            self.share_left_out, self._arc_shares = (1e-6, 1e-6), (1e-9, 1e-9)
         engine = problem.engine
-        still = tuple(replace(rotor, unbalance=0.0j) if rotor.name in rides else rotor for rotor in engine.rotors)
+        remaining = tuple(
+            replace(rotor, unbalance=0.0j) if rotor.name in rotor_throws else rotor for rotor in engine.rotors
+        )
         inside = any(measure.is_inside for measure in problem.measures)
-        self.parts = [*self._cylinders(inside), *self._riding(rides, inside)]
-        self.rest = AffineModel(replace(motored(problem), engine=only_rotors(engine, still, inside)), keep_all=True)
-        self.times = self._kept()
-        every = sorted({wave for part in self.parts for wave, *_ in self._waves_of(part)})
-        self.orders = np.array([[float(order) for order in wave] for wave in every])
-        self._place_of = {wave: place for place, wave in enumerate(every)}
-        self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
+        self.parts = [*self._cylinders(inside), *self._unbalances(rotor_throws, inside)]
+        self.rest = AffineModel(
+            replace(motored(problem), engine=isolate_rotors(engine, remaining, inside)), keep_all=True
+        )
+        self.times = self._kept_orders()
+        waves = sorted({wave for part in self.parts for wave, *_ in self._waves_of(part)})
+        self.orders = np.array([[float(order) for order in wave] for wave in waves])
+        self._place_of = {wave: place for place, wave in enumerate(waves)}
+        self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in remaining]
         self.base = common_base([order for order in (*self.times, *self._turning, Fraction(1)) if order])
         self.rest.base = self.base
 
-    def _cylinders(self, inside: bool) -> Iterator[Moving]:
-        # alpha = 0 when phi = 0; for loads inside the crankcase each cylinder stands beside idle ones
+    def _cylinders(self, inside: bool) -> Iterator[MovingPart]:
+        # each cylinder at its dead centre at crank angle zero; loads inside the crankcase keep the idle cylinders
         engine, layout = self.problem.engine, self.layout
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
-            acting, late = working(self.problem, part.name), layout.late[k] if layout.late else 0.0
-            banks = QUARTERS if self._is_geometry_open[0] else (layout.banks[k],)
+            problem, late = only_gas_of(self.problem, part.name), layout.late[k] if layout.late else 0.0
+            banks = BANK_SAMPLES if self._is_geometry_open[0] else (layout.banks[k],)
             turned = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
-            found = tuple(evaluate(acting, isolate(engine, k, inside, each)) for each in turned)
-            # what is not open makes the cylinder later, or sooner
+            evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in turned)
+            # fixed angles shift the cylinder in time
             ahead = 0.0 if self._is_geometry_open[0] else -layout.banks[k]
-            yield Moving(pin, k, found, ahead + (0.0 if self._is_geometry_open[1] else layout.pin_offsets[k]), {})
+            yield MovingPart(
+                pin, k, evaluations, ahead + (0.0 if self._is_geometry_open[1] else layout.pin_offsets[k]), {}
+            )
 
-    def _riding(self, rides: dict[str, int], inside: bool) -> Iterator[Moving]:
-        # unbalances that ride on every throw
+    def _unbalances(self, rotor_throws: dict[str, int], inside: bool) -> Iterator[MovingPart]:
+        # unbalances on every throw
         engine, layout = self.problem.engine, self.layout
-        for pin in sorted(set(rides.values())):
-            own = [rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance]
+        for pin in sorted(set(rotor_throws.values())):
+            rotors = [rotor for rotor in engine.rotors if rotor_throws.get(rotor.name) == pin and rotor.unbalance]
             k = layout.pins.index(pin)
             angle = engine.slider_cranks[k].throw - layout.pin_offsets[k]
-            if own:
-                found = evaluate(motored(self.problem), only_rotors(engine, own, inside))
-                yield Moving(pin, None, (found,), -angle, {rotor.name: rotor.unbalance for rotor in own})
+            if rotors:
+                evaluation = evaluate(motored(self.problem), isolate_rotors(engine, rotors, inside))
+                yield MovingPart(pin, None, (evaluation,), -angle, {rotor.name: rotor.unbalance for rotor in rotors})
 
-    def _waves_of(self, part: Moving) -> Iterator[tuple[Wave, int, int]]:
+    def _waves_of(self, part: MovingPart) -> Iterator[tuple[Wave, int, int]]:
         side = Fraction(0 if part.cylinder is None else self.layout.side(part.cylinder))
-        for j, step in enumerate((-1, 0, 1) if len(part.found) > 1 else (0,)):
+        for j, step in enumerate((-1, 0, 1) if len(part.evaluations) > 1 else (0,)):
             for h, order in enumerate(self.times):
                 turned = order * Fraction(self._turns)
-                each = (turned - (order + step) * side, turned - order * side)
-                yield (order, *(m for m, is_open in zip(each, self._is_geometry_open, strict=True) if is_open)), h, j
+                multiples = (turned - (order + step) * side, turned - order * side)
+                yield (
+                    (order, *(m for m, is_open in zip(multiples, self._is_geometry_open, strict=True) if is_open)),
+                    h,
+                    j,
+                )
 
     @property
-    def followed(self) -> float:
-        """Share of the heaviest order above which an order is followed along an arc; others count as their size."""
-        return self._followed[any(map(self._is_bent_peak, self.problem.measures))]
+    def min_arc_share(self) -> float:
+        """Share of the largest order above which an order is bounded along its arc; smaller ones count by size."""
+        return self._arc_shares[any(map(self._is_averaged_peak, self.problem.measures))]
 
-    def _is_bent_peak(self, measure: Measure) -> bool:
-        return averages(self.problem, measure) and not measure.norm.averages
+    def _is_averaged_peak(self, measure: Measure) -> bool:
+        return uses_averages(self.problem, measure) and not measure.norm.averages
 
     @property
     def _loads(self) -> list[Measure]:
         return [measure for measure in self.problem.measures if measure.is_load]
 
-    def counted(self, measure: Measure, found: Evaluation) -> list[Spectrum]:
-        """Return the counted spectra of a load, one per operating point with a weight."""
+    def counted(self, measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
+        """Return the counted orders of the load of a measure, for each operating point with a weight."""
         engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
             narrow_signal(measure, signal, engine)
-            for signal, share in zip(found.signals(measure.load), shares, strict=True)
+            for signal, share in zip(evaluation.signals(measure.load), shares, strict=True)
             if share > 0.0
         ]
 
-    def _kept(self) -> tuple[Fraction, ...]:
-        """The lowest orders, up to where what follows is next to nothing for every measure."""
-        # what rides on a throw turns once a turn
+    def _kept_orders(self) -> tuple[Fraction, ...]:
+        """Return the orders that each measure needs, so that higher ones have at most `share_left_out`."""
+        # unbalances on the throws turn in order 1
         kept = {Fraction(1)}
         for measure in self._loads:
             squares: dict[Fraction, float] = {}
-            every = (found for part in self.parts for found in part.found)
-            for signal in (one for found in every for one in self.counted(measure, found)):
+            evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
+            for signal in (signal for evaluation in evaluations for signal in self.counted(measure, evaluation)):
                 sizes = np.square(np.abs(signal.coefficients)).reshape(len(signal.coefficients), -1).sum(axis=1)
                 for j in np.flatnonzero(sizes):
                     order = int(j) * signal.base
                     squares[order] = squares.get(order, 0.0) + float(sizes[j])
             ordered = sorted(squares)
             tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
-            few, many = self.share_left_out
-            many = many if measure.is_inside and not self._is_bent_peak(measure) else few
-            shares = [_NOTHING if k < _FEW else few if k < _MANY else many for k in range(len(ordered))]
-            told = zip(ordered, tail, shares, strict=True)
-            kept |= {order for order, rest, share in told if rest > share**2 * tail[0]}
+            low_share, high_share = self.share_left_out
+            high_share = high_share if measure.is_inside and not self._is_averaged_peak(measure) else low_share
+            shares = [
+                _TINY_SHARE if k < _LOWEST_ORDERS else low_share if k < _LOW_ORDERS else high_share
+                for k in range(len(ordered))
+            ]
+            remainders = zip(ordered, tail, shares, strict=True)
+            kept |= {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
         return tuple(sorted(kept))
 
     def left_out(self, measure: Measure, samples: int) -> float:
-        """Return the most that the omitted orders amount to, wherever the throws stand [SI]."""
+        """Return the largest change of a measure by the omitted orders, for throws at any angles [SI]."""
         return sum(self._left_out(measure, part, samples) for part in self.parts) if measure.is_load else 0.0
 
-    def _left_out(self, measure: Measure, part: Moving, samples: int) -> float:
+    def _left_out(self, measure: Measure, part: MovingPart, samples: int) -> float:
         # |A cos b + B sin b + C| is no more than all three
-        every = [self.counted(measure, found) for found in part.found]
-        if len(every) == 1:
-            return self.tail(measure, every[0], samples)
+        signals = [self.counted(measure, evaluation) for evaluation in part.evaluations]
+        if len(signals) == 1:
+            return self.tail(measure, signals[0], samples)
         total = 0.0
-        for u, a, d in zip(*every, strict=True):
-            still = (u + d).mapped(lambda values: 0.5 * values)
-            leaning = (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values), a + still.mapped(np.negative)
-            total = max(total, sum(self.tail(measure, [one], samples) for one in (still, *leaning)))
+        for u, a, d in zip(*signals, strict=True):
+            constant = (u + d).mapped(lambda values: 0.5 * values)
+            leaning = (
+                (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values),
+                a + constant.mapped(np.negative),
+            )
+            total = max(total, sum(self.tail(measure, [signal], samples) for signal in (constant, *leaning)))
         return total
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
-        """Return the most that omitted orders of signals amount to, including those beyond the last [SI]."""
+        """Return the largest norm of the omitted orders of signals, orders beyond the last listed one included [SI]."""
         total, kept = 0.0, np.array([float(order) for order in self.times])
-        for one in signals:
-            # of what bends at an angle so many orders are listed that those beyond are next to nothing
-            signal = one if one.kinks is None else one.padded(_LISTED)
-            out = ~orders_equal(signal.orders, kept)
-            rest = signal.with_coefficients(np.where(out[:, None, None], signal.coefficients, 0.0))
+        for short in signals:
+            # kinks have orders without end; those beyond the listed ones are negligible
+            signal = short if short.kinks is None else short.padded(_LISTED)
+            is_omitted = ~orders_equal(signal.orders, kept)
+            omitted = signal.with_coefficients(np.where(is_omitted[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
-                # neither is more than the root mean square, nor rows of averages more than their lengths
-                maximum = np.sqrt(mean_square(rest))
+                # neither norm exceeds the root mean square, and averages do not exceed the sum of amplitudes
+                maximum = np.sqrt(mean_square(omitted))
                 if measure.norm.averages:
-                    maximum = np.minimum(maximum, _averaged(signal, out, samples * float(self.base)))
+                    maximum = np.minimum(maximum, _averaged_amplitudes(signal, is_omitted, samples * float(self.base)))
                 total = max(total, float(maximum.max(initial=0.0)))
                 continue
-            whole = amplitudes(rest)
-            if averages(self.problem, measure):
-                whole = _averaged(signal, out, PEAK_STEPS * samples * float(self.base))
-            # no peak, nor any peak to peak, is more than twice the sum of the lengths
-            total = max(total, 2.0 * float(whole.max(initial=0.0)))
+            size = amplitudes(omitted)
+            if uses_averages(self.problem, measure):
+                size = _averaged_amplitudes(signal, is_omitted, PEAK_STEPS * samples * float(self.base))
+            # a peak, or a peak to peak, is at most twice the sum of the amplitudes
+            total = max(total, 2.0 * float(size.max(initial=0.0)))
         return total
 
     def norm(self, measure: Measure, samples: int) -> WaveNorm:
-        """A measure at equal steps over the period, means averaged about them so that bounds hold between (P7)."""
+        """Return a measure at `samples` steps over the period; means are averaged over each step (P7)."""
         fixed = self.rest.norm(
-            measure, samples, averaged=True, peaks=PEAK_STEPS if averages(self.problem, measure) else 0
+            measure, samples, averaged=True, peaks=PEAK_STEPS if uses_averages(self.problem, measure) else 0
         )
         count = len(self.parts) * len(self.orders) * fixed.constant.size
         if count > MOST_NUMBERS:
             raise ModelError(f"{2e-6 * count:.0f} million numbers at once")
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
-        for own, part in zip(waves, self.parts, strict=True):
+        for coefficients, part in zip(waves, self.parts, strict=True):
             if measure.is_load or (measure.is_mass and part.cylinder is None):
-                rows = self._own_rows(measure, part, samples)
+                rows = self._part_rows(measure, part, samples)
                 for wave, h, j in self._waves_of(part):
-                    own[self._place_of[wave]] += rows[j][h]
+                    coefficients[self._place_of[wave]] += rows[j][h]
         return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
-    def _own_rows(self, measure: Measure, part: Moving, samples: int) -> list[ComplexArray]:
+    def _part_rows(self, measure: Measure, part: MovingPart, samples: int) -> list[ComplexArray]:
         times = np.array([float(order) for order in self.times])
         turned = np.exp(1j * times * part.ahead)[:, None, None]
         if measure.is_load:
-            every = [found.signals(measure.load) for found in part.found]
-            by_point = [self._components([self._coefficients(one) for one in own]) for own in zip(*every, strict=True)]
-            return [self._rows_of(measure, own, samples) * turned for own in zip(*by_point, strict=True)]
+            by_bank = [evaluation.signals(measure.load) for evaluation in part.evaluations]
+            by_point = [
+                self._components([self._coefficients(signal) for signal in signals])
+                for signals in zip(*by_bank, strict=True)
+            ]
+            return [self._rows_of(measure, component, samples) * turned for component in zip(*by_point, strict=True)]
         return [np.asarray((times == 1.0)[:, None, None] * turned * self._weights(measure, part))]
 
     @staticmethod
-    def _components(found: list[ComplexArray]) -> list[ComplexArray]:
-        if len(found) == 1:
-            return found
-        a, b, still = leaning(*found)
-        return [0.5 * (a - 1j * b), still, 0.5 * (a + 1j * b)]
+    def _components(by_bank: list[ComplexArray]) -> list[ComplexArray]:
+        # coefficients of e^{-i b}, 1 and e^{i b} in the bank angle b
+        if len(by_bank) == 1:
+            return by_bank
+        a, b, constant = split_by_bank(*by_bank)
+        return [0.5 * (a - 1j * b), constant, 0.5 * (a + 1j * b)]
 
-    def _weights(self, measure: Measure, part: Moving) -> ComplexArray:
+    def _weights(self, measure: Measure, part: MovingPart) -> ComplexArray:
         engine = self.problem.engine
         rows = [
             mass_rows(
-                measure, [replace(r, unbalance=turn * part.riding.get(r.name, 0.0)) for r in engine.rotors]
+                measure, [replace(r, unbalance=turn * part.unbalances.get(r.name, 0.0)) for r in engine.rotors]
             ).vectors
             for turn in (1.0, 1.0j)
         ]
@@ -300,40 +342,40 @@ class ThrowWaves:
     def _coefficients(self, signal: Spectrum) -> ComplexArray:
         return np.array([signal.at(float(order)) for order in self.times])
 
-    def _rows_of(self, measure: Measure, own: Sequence[ComplexArray], samples: int) -> ComplexArray:
-        """Rows of every order of coefficients at the operating points, shape (orders, k, d)."""
+    def _rows_of(self, measure: Measure, by_point: Sequence[ComplexArray], samples: int) -> ComplexArray:
+        """Return rows of every order, shape (orders, k, d), from load coefficients at every operating point."""
         steps, times = [round(order / self.base) for order in self.times], np.array([float(t) for t in self.times])
         angles = math.tau / float(self.base) * np.arange(samples) / samples
         waves, blocks = np.exp(1j * np.outer(times, angles)), []
-        for values, share in zip(own, measure.shares(self.problem.points), strict=True):
+        for values, share in zip(by_point, measure.shares(self.problem.points), strict=True):
             series = np.zeros((max(steps) + 1, *values.shape[1:]), complex)
             series[steps] = values
-            one = averaged(self.problem, measure, Spectrum(self.base, series), samples)
-            # as load_rows has them: what counts of every place, at one angle after the other
-            counted = narrow_signal(measure, one, self.problem.engine).coefficients[steps]
+            signal = averaged_signal(self.problem, measure, Spectrum(self.base, series), samples)
+            # the order of rows is that of `load_rows`: all samples of one place, then the next place
+            counted = narrow_signal(measure, signal, self.problem.engine).coefficients[steps]
             if share > 0.0 and counted.shape[1]:
                 rows = np.einsum("hpd,hs->hpsd", counted, waves)
                 blocks.append(rows.reshape(len(steps), -1, counted.shape[-1]))
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((len(steps), 1, 1), complex)
 
-    def arcs(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Bounds of the throws in a box of all angles, which open ones turn, as what rides on them knows them [rad]."""
+    def throw_bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Return bounds of the throws [rad] in a box of open angles, with the turn by bank angle and split pin."""
         ends = self._turns * lower[self.throws :].sum(), self._turns * upper[self.throws :].sum()
         return lower[: self.throws] + min(ends), upper[: self.throws] + max(ends)
 
-    def samples(self, measure: Measure, wanted: int) -> int:
-        """Steps at which squares are exact, or as many as wanted."""
+    def samples(self, measure: Measure, default: int) -> int:
+        """Return the number of samples at which a mean square is exact, or `default` for other norms."""
         turning = (*self.times, *self._turning)
         highest = max((order for order in turning if measure.counted([float(order)])[0]), default=Fraction(1))
-        return 2 * int(highest / self.base) + 2 if measure.norm.is_euclidean else wanted
+        return 2 * int(highest / self.base) + 2 if measure.norm.is_euclidean else default
 
 
-def _averaged(signal: Spectrum, out: Mask, steps: float) -> Array:
-    # bound of averaged orders, including those beyond the listed ones
-    sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
-    whole = np.sinc(signal.orders[out] / steps) ** 2 @ sizes
+def _averaged_amplitudes(signal: Spectrum, is_omitted: Mask, steps: float) -> Array:
+    # sum of the amplitudes of omitted orders after averaging, orders beyond the listed ones included
+    sizes = np.linalg.norm(signal.coefficients[is_omitted], axis=-1)
+    total = np.sinc(signal.orders[is_omitted] / steps) ** 2 @ sizes
     if signal.kinks is None:
-        return np.asarray(whole)
+        return np.asarray(total)
     count, base = len(signal.coefficients), float(signal.base)
-    further = signal.kinks.beyond_averaged(count, base, steps / base)
-    return np.asarray(whole + np.linalg.norm(further, axis=-1))
+    beyond = signal.kinks.beyond_averaged(count, base, steps / base)
+    return np.asarray(total + np.linalg.norm(beyond, axis=-1))

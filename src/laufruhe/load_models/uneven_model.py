@@ -1,8 +1,8 @@
-"""Norms of loads over throws at any angles as smooth expressions, with coefficients from the exact model (S19).
+"""Measures of loads as smooth CasADi expressions of throws, bank angle, split pin and unbalances (S19).
 
-What a cylinder loads by turns with its throw and leans with its bank, its gas with its firing dead centre
-phi_k = 2 pi l_k - (theta_k + o_k - beta_k); a rotor that rides on a throw turns with it. The number of turns l_k is the
-firing order's, and stays while the throws move (S23).
+The load of a cylinder turns with its throw and leans with its bank. Its gas follows the firing dead centre
+phi_k = 2 pi l_k - (theta_k + o_k - beta_k), with throw theta_k, pin offset o_k and bank angle beta_k. The number of
+turns l_k belongs to the firing order, and is fixed (S23). A rotor on a throw turns with it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
+from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
 from laufruhe.load_models.turned_loads import OrderSelection, TurnedLoads
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
@@ -38,26 +38,25 @@ from laufruhe.problem.problem import Phasing, Problem
 
 LEAST_SAMPLES = 72
 NEGLIGIBLE, LEFT_OUT = 1e-9, 1e-2
-"""Shares of the root mean square, of forces and of the torque of gas, that orders left out may hold together."""
+"""Largest share of the root mean square in the omitted orders: of forces, and of the roll moment of gas."""
 INSIDE_LEFT_OUT, HIGHEST = 1e-2, 24.0
-"""The same of a load inside the crankcase, and the last order that is known of it: a pressure that jumps has no end of
-them."""
+"""Largest share for loads inside the crankcase, and highest order: a jump of the pressure has orders without end."""
 ROLL = 3
-"""Of the components of a wrench."""
+"""Index of the roll moment in a wrench."""
 
 
 @dataclass(frozen=True, eq=False)
 class UnevenSymbols:
-    """Variables of the program.
+    """Variables of a smooth program, as CasADi symbols or numbers.
 
     Attributes
     ----------
     throws
-        Angle of every throw [rad], the first given by cylinder 1's dead centre.
+        Angle of every throw [rad], with cylinder 1 at its dead centre at crank angle zero.
     bank, split
-        Bank angle and split pin [rad], symbols or numbers.
+        Bank angle and split pin [rad]; None if the layout has none.
     unbalances
-        Columns of the unbalance decisions.
+        Decision vector of the unbalances.
     """
 
     throws: Sequence[Any]
@@ -67,110 +66,118 @@ class UnevenSymbols:
 
 
 class UnevenModel:
-    """Smooth norms of a problem over throws, bank, split pin and unbalances.
+    """Measures of a problem as smooth expressions of throws, bank angle, split pin and unbalances.
 
     Parameters
     ----------
     problem
-        Of the star that the program starts from, with its firing order.
+        Problem of the star from which a program starts, with its firing order.
     layout
-        Of that star.
-    rides
-        Throw that every rotor turns with; rotors left out stand still beside the throws.
+        Layout of that star.
+    rotor_throws
+        Index of the throw that each rotor turns with; rotors that turn with none are left out.
     left_out
-        Share of the root mean square of the roll moment that orders left out may hold together, where gas acts.
+        Largest share of the root mean square of the roll moment in omitted orders, if gas acts.
     """
 
-    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int], left_out: float = LEFT_OUT) -> None:
-        self.problem, self.layout, self.rides = problem, layout, rides
+    def __init__(
+        self, problem: Problem, layout: Layout, rotor_throws: dict[str, int], left_out: float = LEFT_OUT
+    ) -> None:
+        self.problem, self.layout, self.rotor_throws = problem, layout, rotor_throws
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
         self._left_out = left_out
-        self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], Lines] = {}
+        self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], SymbolicSpectrum] = {}
 
-    def _points(self, quantity: Measure) -> list[OperatingPoint]:
-        return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
+    def _points(self, measure: Measure) -> list[OperatingPoint]:
+        return [p for p in self.problem.points if measure.points is None or p.name in measure.points]
 
-    def rows(self, measure: Measure, at: UnevenSymbols) -> tuple[Any, Grid]:
-        """Vectors whose norm a measure is, and where they stand (P1).
+    def rows(self, measure: Measure, symbols: UnevenSymbols) -> tuple[Any, Grid]:
+        """Return the rows of a measure, shape (k, d), and their grid (P1).
 
-        Of a norm that knows nothing but squares these are the orders' own (Parseval); of
-        others the values at angles over a period.
+        Rows are coefficients of orders for a root mean square (Parseval), and values at samples for other norms.
         """
         if measure.is_mass:
             counted = counted_rotors(measure, self.problem.engine.rotors)
-            rows = [(self._unbalance(r, at) / radius_of(r)).T for r in counted]
+            rows = [(self._unbalance(r, symbols) / radius_of(r)).T for r in counted]
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
         chosen = self._points(measure)
-        whole = sum(point.weight for point in chosen)
+        total_weight = sum(point.weight for point in chosen)
         blocks: list[Any] = []
         weights: list[Array] = []
         if measure.norm.is_euclidean:
             for point in chosen:
-                found = self._signal(measure, point, at)
-                half = np.where(found[0].orders == 0.0, 1.0, 0.5) * point.weight / whole / len(found)
-                blocks += [part.T for place in found for part in (place.real, place.imaginary)]
-                weights += [half] * (2 * len(found))
+                places = self._signal(measure, point, symbols)
+                half = np.where(places[0].orders == 0.0, 1.0, 0.5) * point.weight / total_weight / len(places)
+                blocks += [part.T for place in places for part in (place.real, place.imaginary)]
+                weights += [half] * (2 * len(places))
             return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
-        # one map for all orders: the wrench alone is sampled
-        mapped = measure.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting)
-        signals = [[self._counted(measure, p, at)] if mapped else self._signal(measure, p, at) for p in chosen]
-        # points keep orders of their own: every signal has as many steps as the finest needs
+        # rigid mounts have one map for all orders, so that the wrench can be sampled first
+        is_mapped_later = measure.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting)
+        signals = [
+            [self._counted(measure, p, symbols)] if is_mapped_later else self._signal(measure, p, symbols)
+            for p in chosen
+        ]
+        # orders differ between points: all have the samples that the highest order needs
         steps = max(_steps(place) for places in signals for place in places)
         for point, places in zip(chosen, signals, strict=True):
             values = [place.sampled(steps) for place in places]
-            if mapped:
+            if is_mapped_later:
                 values = [values[0] @ ca.DM(m.real).T for m in self._maps(measure, 0.0, point)]
             blocks += values
-            weights.append(np.full(len(values) * steps, point.weight / whole / len(values) / steps))
+            weights.append(np.full(len(values) * steps, point.weight / total_weight / len(values) / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
-    def _signal(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> list[Lines]:
-        # per mount, for the block, or per place inside the crankcase
-        if quantity.is_inside:
-            return self._inside(quantity, point, at)
-        counted = self._counted(quantity, point, at)
-        if isinstance(quantity.channel, LoadChannel) and quantity.channel.part is not None:
-            return [counted.mapped(np.eye(6)[quantity.channel.part])]
-        by_order = [self._maps(quantity, float(h), point) for h in counted.orders]
+    def _signal(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> list[SymbolicSpectrum]:
+        # one spectrum for each mount, one for the block, or one for each place inside the crankcase
+        if measure.is_inside:
+            return self._inside(measure, point, symbols)
+        counted = self._counted(measure, point, symbols)
+        if isinstance(measure.channel, LoadChannel) and measure.channel.part is not None:
+            return [counted.mapped(np.eye(6)[measure.channel.part])]
+        by_order = [self._maps(measure, float(h), point) for h in counted.orders]
         return [counted.map_orders([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
-    def _inside(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> list[Lines]:
-        # S37
+    def _inside(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> list[SymbolicSpectrum]:
+        # loads inside the crankcase, by every place (S37)
         engine = self.problem.engine
 
         def signal(loads: PointLoads) -> Spectrum:
-            return narrow_signal(quantity, quantity.load.signal(loads).series, engine).truncated(HIGHEST)
+            return narrow_signal(measure, measure.load.signal(loads).series, engine).truncated(HIGHEST)
 
-        return self._turned(point, at, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
+        return self._turned(point, symbols, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
 
     def _turned(
-        self, point: OperatingPoint, at: UnevenSymbols, signal: Callable[[PointLoads], Spectrum],
-        felt: Sequence[OrderSelection], beside: bool,
-    ) -> list[Lines]:  # fmt: skip
+        self, point: OperatingPoint, symbols: UnevenSymbols, signal: Callable[[PointLoads], Spectrum],
+        selections: Sequence[OrderSelection], keep_places: bool,
+    ) -> list[SymbolicSpectrum]:  # fmt: skip
         k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
-        turned = TurnedLoads(self.problem, k, signal, at.bank is not None, felt, beside)
-        placed = [self._place(k, part, at) for k, part in enumerate(parts)]
-        stars = [a - b - math.tau * _turns_of(part) for (a, b), part in zip(placed, parts, strict=True)]
-        return turned.lines(stars, [bank for _, bank in placed], lambda rotor: self._unbalance(rotor, at))
+        turned = TurnedLoads(self.problem, k, signal, symbols.bank is not None, selections, keep_places)
+        angles = [self._place(k, part, symbols) for k, part in enumerate(parts)]
+        stars = [pin - bank - math.tau * _turns_of(part) for (pin, bank), part in zip(angles, parts, strict=True)]
+        return turned.spectra(stars, [bank for _, bank in angles], lambda rotor: self._unbalance(rotor, symbols))
 
-    def _counted(self, quantity: Measure, point: OperatingPoint, at: UnevenSymbols) -> Lines:
-        # a block on soft mounts feels the first orders of its gas alone
-        gain = self._gain(quantity, point) if quantity.on_mounts else None
-        found = self.wrench(point, at, gain)
-        counted = np.flatnonzero(quantity.counted(found.orders))
-        return found.select(counted) if len(counted) else Lines(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
+    def _counted(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> SymbolicSpectrum:
+        # only the lowest orders of gas move a block on soft mounts
+        gain = self._gain(measure, point) if measure.on_mounts else None
+        wrench = self.wrench(point, symbols, gain)
+        counted = np.flatnonzero(measure.counted(wrench.orders))
+        return (
+            wrench.select(counted)
+            if len(counted)
+            else SymbolicSpectrum(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
+        )
 
-    def _maps(self, quantity: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
-        weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
-        every = self._map(quantity, order, point.speed)
-        return [weights @ every[k] for k in quantity.places([mount.name for mount in self.problem.engine.mounts])]
+    def _maps(self, measure: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
+        weights = np.diag(measure.direction_weights or (1.0, 1.0, 1.0))
+        every = self._map(measure, order, point.speed)
+        return [weights @ every[k] for k in measure.places([mount.name for mount in self.problem.engine.mounts])]
 
-    def _map(self, quantity: Measure, order: float, speed: float) -> NDArray[np.complex128]:
+    def _map(self, measure: Measure, order: float, speed: float) -> NDArray[np.complex128]:
         if self._mounting is None:
             raise ValueError("an engine without mounts has no mount forces")
-        if quantity.channel is channels.MOUNT_FORCE:
+        if measure.channel is channels.MOUNT_FORCE:
             return mount_maps(self._mounting, order, speed)
         base = as_order(order)
         units = np.stack([np.zeros((6, 6)), np.eye(6)]).astype(complex)
@@ -178,52 +185,56 @@ class UnevenModel:
         travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
-    def _gain(self, quantity: Measure, point: OperatingPoint) -> Callable[[float], float] | None:
+    def _gain(self, measure: Measure, point: OperatingPoint) -> Callable[[float], float] | None:
         if isinstance(self._mounting, RigidMounting):
             return None
-        return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
+        return lambda h: float(np.abs(self._map(measure, h, point.speed)[:, :, 3]).max())
 
-    def wrench(self, point: OperatingPoint, at: UnevenSymbols, gain: Callable[[float], float] | None = None) -> Lines:
-        """Wrench by order; the roll moment of gas of the orders that a gain leaves to matter."""
+    def wrench(
+        self, point: OperatingPoint, symbols: UnevenSymbols, gain: Callable[[float], float] | None = None
+    ) -> SymbolicSpectrum:
+        """Return the wrench at an operating point; `gain` weights the orders of the roll moment for their selection."""
         if gain is not None:
-            return self._wrench(point, at, gain)
-        if (point, at) not in self._wrenches:
-            self._wrenches[point, at] = self._wrench(point, at, lambda _: 1.0)
-        return self._wrenches[point, at]
+            return self._wrench(point, symbols, gain)
+        if (point, symbols) not in self._wrenches:
+            self._wrenches[point, symbols] = self._wrench(point, symbols, lambda _: 1.0)
+        return self._wrenches[point, symbols]
 
-    def _wrench(self, point: OperatingPoint, at: UnevenSymbols, gain: Callable[[float], float]) -> Lines:
+    def _wrench(
+        self, point: OperatingPoint, symbols: UnevenSymbols, gain: Callable[[float], float]
+    ) -> SymbolicSpectrum:
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
-        others = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
+        unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
         roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain)
-        (found,) = self._turned(point, at, _wrench_of, [*others, roll], False)
-        return found
+        (wrench,) = self._turned(point, symbols, _wrench_of, [*unweighted, roll], False)
+        return wrench
 
-    def _place(self, k: int, part: SliderCrank, at: UnevenSymbols) -> tuple[Any, Any]:
+    def _place(self, k: int, part: SliderCrank, symbols: UnevenSymbols) -> tuple[Any, Any]:
         side = self.layout.side(k)
-        bank = side * at.bank if at.bank is not None else part.bank
-        offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
-        return at.throws[self.layout.pins[k]] + offset, bank
+        bank = side * symbols.bank if symbols.bank is not None else part.bank
+        offset = -side * symbols.split if symbols.split is not None else self.layout.pin_offsets[k]
+        return symbols.throws[self.layout.pins[k]] + offset, bank
 
-    def _unbalance(self, rotor: Rotor, at: UnevenSymbols) -> Any:
-        """U of a rotor as (re, im), turned with the throw that it rides on."""
+    def _unbalance(self, rotor: Rotor, symbols: UnevenSymbols) -> Any:
+        """Return the unbalance of a rotor (re, im) [kg m], turned with its throw."""
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
         for domain in self.domains:
             for drive in domain.decision.rotor_drives:
                 if drive.rotor != rotor.name:
                     continue
-                columns = at.unbalances[domain.columns]
+                columns = symbols.unbalances[domain.columns]
                 for j, direction in enumerate(domain.set.directions):
                     d = drive.of(direction)
                     real = real + d.real * columns[j]
                     imaginary = imaginary + d.imag * columns[j]
-                # the rotor stands at the decision's start in the design as given
-                given = drive.of(domain.decision.start)
-                real, imaginary = real - given.real, imaginary - given.imag
-        if rotor.name not in self.rides:
+                # the unbalance of the rotor has the baseline value of the decision in it
+                initial = drive.of(domain.decision.start)
+                real, imaginary = real - initial.real, imaginary - initial.imag
+        if rotor.name not in self.rotor_throws:
             return ca.vertcat(real, imaginary)
-        pin = self.rides[rotor.name]
-        turn = at.throws[pin] - self._start[pin]
+        pin = self.rotor_throws[rotor.name]
+        turn = symbols.throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
 
@@ -241,30 +252,30 @@ def _wrench_of(loads: PointLoads) -> Spectrum:
     return loads.wrench.mapped(lambda wrench: wrench[:, None, :])
 
 
-def _steps(lines: Lines) -> int:
-    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / lines.base))
+def _steps(spectrum: SymbolicSpectrum) -> int:
+    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(spectrum.orders.max()) / spectrum.base))
 
 
-def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
-    """The throw that each rotor turns with: found by moving one throw at a time."""
+def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
+    """Return the index of the throw that each rotor turns with, by a trial move of one throw at a time."""
     count = len(candidate.throws)
     throws = tuple(math.tau * k / count for k in range(count))
-    return dict(_rides_of(phasing, replace(candidate, throws=throws, firing_order=None, without_gas=True)))
+    return dict(_rotor_throws_of(phasing, replace(candidate, throws=throws, firing_order=None, without_gas=True)))
 
 
 @lru_cache(maxsize=16)
-def _rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
-    out = {}
+def _rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
+    rotor_throws = {}
     before = rotor_states(phasing.realise(candidate))
     for k in range(len(candidate.throws)):
         throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))
         after = rotor_states(phasing.realise(replace(candidate, throws=throws)))
-        out.update({name: k for name, state in after.items() if state != before[name]})
-    return out
+        rotor_throws.update({name: k for name, state in after.items() if state != before[name]})
+    return rotor_throws
 
 
 def rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
-    """Unbalance of every rotor, and what open ones drive it with."""
+    """Return the unbalance of every rotor, with the gains of the decisions that drive it, by rotor name."""
     gains: dict[str, list[complex]] = {rotor.name: [] for rotor in problem.engine.rotors}
     for decision in problem.decisions:
         for drive in decision.rotor_drives:

@@ -223,7 +223,7 @@ def test_time_that_runs_out_proves_nothing() -> None:
     phasing = problem_of(tables()).phasing
     (family,), _ = families_of(phasing, by_firing=True)
     model = FiringModel(phasing, family.space, family.geometry)
-    objective = PairObjective.of(model.at(model.samples))
+    objective = PairObjective.from_problem(model.at(model.samples))
     cut = enumerate_orders(objective, 5, 1, time_limit=0.0)
     assert not cut.complete
     assert cut.lower_bound == 0.0

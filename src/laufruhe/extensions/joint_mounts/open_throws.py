@@ -16,8 +16,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from laufruhe.load_models.throw_waves import Moving, ThrowWaves
-from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.load_models.throw_waves import MovingPart, ThrowWaves
+from laufruhe.load_models.uneven_model import rotor_throws_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.evaluation import with_default_sampling
@@ -57,8 +57,8 @@ class OpenThrows:
     def wrenches(self, point: int) -> list[Spectrum]:
         """Return the wrench of each open throw at an angle of zero, at an operating point."""
 
-        def turned(part: Moving) -> Spectrum:
-            wrench = part.found[0].loads[point].wrench.series
+        def turned(part: MovingPart) -> Spectrum:
+            wrench = part.evaluations[0].loads[point].wrench.series
             return wrench.with_coefficients(wrench.coefficients * np.exp(1j * wrench.orders * part.ahead)[:, None])
 
         parts = self.waves.parts
@@ -77,7 +77,7 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
         return None
     realised, weights_on_throws = (
         with_default_sampling(replace(phasing.realise(candidate), phasing=None)),
-        rides_of(phasing, candidate),
+        rotor_throws_of(phasing, candidate),
     )
     if any(drive.rotor in weights_on_throws for decision in realised.decisions for drive in decision.rotor_drives):
         return None

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from laufruhe.extensions.robust.tolerance import Tolerances, tolerances_of, with_errors
 from laufruhe.extensions.robust.worst_case import MOST_NODES, Terms, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
-from laufruhe.load_models.batch import by_feature
+from laufruhe.load_models.batch import feature_rows
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import BatchNorm
 from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, with_common_base
@@ -85,7 +85,7 @@ def objective_values(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
     for weight, norm in terms:
-        rows = np.ascontiguousarray(by_feature(norm))
+        rows = np.ascontiguousarray(feature_rows(norm))
         total += weight * BatchNorm(norm.norm, rows, norm.grid).values(features)
     return total
 

@@ -287,7 +287,7 @@ class _Program:
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
         active_multipliers = replace(solution.multipliers, terms=terms)
         fine_problem, _ = self.at(2 * max(self.angles, samples), averaged=True)
-        weighted = fine_problem.shared(shares)
+        weighted = fine_problem.with_weighted_groups(shares)
         bound = best_bound(weighted, solution.x, active_multipliers)
         self.shares = [float(share) for share in shares]
         prices = bound.multipliers.shadow_prices(weighted)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.extensions.run_ups.boxes import bounds_runs
-from laufruhe.load_models.simulated import COARSER
+from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -45,7 +45,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     is_single_start = starts == 1
     first = None if relaxed is None or is_single_start else place_of(problem, relaxed)
     search = MountSearch(
-        search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSER
+        search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSE_STEP
     )
     has_bound = divides(problem) and bounds_runs(problem)
     search.run()

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.phase_lead_model import PhaseLeadModel, carried
+from laufruhe.load_models.phase_lead_model import PhaseLeadModel, problem_of_shafts
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
@@ -47,7 +47,8 @@ class LeadSwing:
         self._steps = FINE_SPEED * fidelity.samples
         names = model.names
         engines = [
-            carried(problem, test).engine for test in (lambda n: n not in names, *(name.__eq__ for name in names))
+            problem_of_shafts(problem, test).engine
+            for test in (lambda n: n not in names, *(name.__eq__ for name in names))
         ]
         angles = problem.engine.cycle.angle * np.arange(self._steps) / self._steps
         self._points: list[tuple[float, list[_Part]]] = []

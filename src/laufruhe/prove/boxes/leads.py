@@ -136,7 +136,7 @@ class LeadBoxes:
         tilts = np.zeros((2, len(middle), len(under.gradient)))
         measures = [*(self._terms if program.terms else ()), *self._limits]
         for measure, led, z in zip(measures, norms, rows, strict=True):
-            for s, (constant, steep, flat) in enumerate(led.moved):
+            for s, (constant, steep, flat) in enumerate(led.derivatives):
                 slopes[s] += float(np.vdot(z, constant))
                 tilts[:, s] += [z.ravel() @ each.reshape(z.size, -1) for each in (flat, steep)]
                 if measure.is_load:
@@ -168,7 +168,7 @@ class LeadBoxes:
             used = np.flatnonzero(size[k])
             if len(used) and len(angles) and led.angles is not None:
                 rows = led.angles[0 if len(led.angles) == 1 else self._point_of_signal(measure, k)]
-                period = float(self.model.shares(measure)[0].own[0].period)
+                period = float(self.model.shares(measure)[0].bare[0].period)
                 distance = np.abs(np.mod(rows[used, None] + by - angles + 0.5 * period, period) - 0.5 * period)
                 kinks = np.maximum(half - distance, 0.0) @ slopes + (distance <= half) @ jumps
                 total += float(size[k][used] @ kinks)

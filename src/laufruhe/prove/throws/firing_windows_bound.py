@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
+from laufruhe.load_models.amplitudes import AmplitudeObjective, dual_directions
 from laufruhe.machine.firing import firing_lattice
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.crank_stars import Stars, StarSpace
@@ -96,7 +96,7 @@ def star_bounds(costs: Array, stars: Stars) -> Array:
 def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
     """Return the least of x_k a_p over the window of step p, shape (directions, throws, steps)."""
     lower, upper = windows(phasing, intervals)
-    v = directions(objective)
+    v = dual_directions(objective)
     orders = np.array(objective.orders, dtype=float)
     out = np.empty((len(v), space.throws, space.phases))
     places = np.array(space.places)

@@ -109,7 +109,7 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
         constant += float(np.vdot(z, norm.constant))
         moves += np.einsum("kd,tpkd->tp", z, norm.moves)
         gradient += np.einsum("kd,kdn->n", z, norm.slope)
-        if norm.turns is not None:
+        if norm.slope_moves is not None:
             is_turning = True
-            turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
+            turns += np.einsum("kd,tpkdn->tpn", z, norm.slope_moves)
     return Cut(constant, moves, gradient, turns if is_turning else None, fine.domains, ROUNDING * scale)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
+from laufruhe.load_models.affine import AffineNorm, AffineProblem, typical_size
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import seconds_left
 from laufruhe.numerics.norms import Cones
@@ -164,12 +164,12 @@ def build_program(
     """
     import clarabel
 
-    unit = reach(problem, [norm for _, norm in problem.terms])
+    unit = typical_size(problem, [norm for _, norm in problem.terms])
     blocks: list[RowBlock] = []
     columns = problem.size
     for norm, size in [
         *((norm, unit) for _, norm in problem.terms),
-        *((norm, reach(problem, [norm])) for _, norm in problem.limits),
+        *((norm, typical_size(problem, [norm])) for _, norm in problem.limits),
     ]:
         blocks.append(RowBlock(norm, norm.norm.cones(norm.grid), size, columns))
         columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1

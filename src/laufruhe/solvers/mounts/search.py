@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.simulated import COARSER
+from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, timed_rounds
@@ -104,7 +104,7 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: Place | None = None, keep_baseline: bool = False, coarser: int = COARSER,
+        first: Place | None = None, keep_baseline: bool = False, coarser: int = COARSE_STEP,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         report_progress("starts of the mounts")

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.simulated import COARSER, Peaks, peaks_of, simulated_measures
+from laufruhe.load_models.simulated import COARSE_STEP, Peaks, peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limit_time, seconds_left, until_time_limit
 from laufruhe.numerics.workers import SERIAL, current_executor, speculation, worker_count
@@ -158,7 +158,7 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
     limits = problem.mount_limits if problem.unbalances else problem.limits
     plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.simulation))
     limits = tuple(limit for limit in limits if not limit.measure.channel.simulation)
-    peaks = peaks_of(problem, COARSER, roughly=True)
+    peaks = peaks_of(problem, COARSE_STEP, is_coarse=True)
     scores = np.full((len(points), 2), math.inf)
     for k, row in until_time_limit(enumerate(points)):
         try:

@@ -79,7 +79,7 @@ class StaticCases:
         collector, rows = self._constraints.named(case.name), stops.tolist()
         size = float(np.linalg.norm(np.linalg.solve(self._root.T, settled(self._mounting, case).motion)))
         y = size * collector.free((y / size).T).T
-        stop_rows, gaps = mounts.own[rows, :], self._stops.gaps[stops]
+        stop_rows, gaps = mounts.spring_travels[rows, :], self._stops.gaps[stops]
         stop_forces = ca.DM(self._stops.stiffness[stops]) * (
             _excess_travel(stop_rows @ y, gaps) - _excess_travel(-(stop_rows @ y), gaps)
         )

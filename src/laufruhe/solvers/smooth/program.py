@@ -22,12 +22,12 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
-from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted
+from laufruhe.load_models.block_loads import FixedCrankLoads, OpenCrankLoads, SymbolicLoads
+from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted_squares
 from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
-from laufruhe.load_models.simulated import COARSER
+from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import UnevenModel, rides_of
+from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
@@ -83,7 +83,7 @@ class SmoothProgram:
 
     def __init__(
         self, problem: Problem, unit: float, margin: float = 0.0, moves: ThrowMoves | None = None,
-        slack: float = 0.0, softest: float = SOFTEST, coarser: int = COARSER,
+        slack: float = 0.0, softest: float = SOFTEST, coarser: int = COARSE_STEP,
     ) -> None:  # fmt: skip
         self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
         self._softest = softest
@@ -118,12 +118,12 @@ class SmoothProgram:
             self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
         self.program = self._build()
 
-    def _loads_of(self, moves: ThrowMoves | None) -> Loads:
+    def _loads_of(self, moves: ThrowMoves | None) -> SymbolicLoads:
         if moves is None:
             # the affine model gives loads and unbalances, which do not depend on the mounts
-            return FixedThrows(self.problem, AffineModel(off_resonance(self.problem)), self._unbalance_columns)
-        model = UnevenModel(self.problem, moves.layout, rides_of(moves.phasing, moves.start))
-        return MovedThrows(self.problem, moves, model, self._throw_deviations, self._unbalance_columns)
+            return FixedCrankLoads(self.problem, AffineModel(off_resonance(self.problem)), self._unbalance_columns)
+        model = UnevenModel(self.problem, moves.layout, rotor_throws_of(moves.phasing, moves.start))
+        return OpenCrankLoads(self.problem, moves, model, self._throw_deviations, self._unbalance_columns)
 
     def _build(self) -> NonlinearProgram:
         minimum = ca.MX(0.0)
@@ -133,7 +133,7 @@ class SmoothProgram:
             self._limit(limit)
         self._hold_unbalances()
         if self.moves is not None:
-            rows, names = self.moves.firing(self._throw_deviations)
+            rows, names = self.moves.firing_intervals(self._throw_deviations)
             for row, name in zip(rows, names, strict=True):
                 self._constraints.add(row, self.moves.intervals.minimum, self.moves.intervals.maximum, name)
         largest = ca.vertcat(*(top for top, _ in self._constraints.heads)) if self._constraints.heads else ca.MX(0, 1)
@@ -270,7 +270,7 @@ class SmoothProgram:
             numbers = self.problem.numbers([self._mount_numbers[k] for k in range(self._count)], self._decisions)
             rows = numbers.mounts or [list(mount.stiffness) for mount in self._mounting.mounts]
             return sum((k for row in rows for k in row[:3]), ca.MX(0.0))
-        pairs = transmitted(self._points, quantity)
+        pairs = transmitted_squares(self._points, quantity)
         if not pairs:
             orders = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
             names = ", ".join(f"{order:g}" for order in orders[:MOST_NAMED]) or "none"
@@ -296,7 +296,7 @@ class SmoothProgram:
             return
         if quantity.channel is channels.TRANSMISSIBILITY:
             maximum = limit.maximum
-            for force, rigid in transmitted(self._points, quantity):
+            for force, rigid in transmitted_squares(self._points, quantity):
                 self._constraints.add(
                     ca.sqrt(force / rigid), -np.inf, maximum, limit.name, maximum=((limit, "at most"), 1.0)
                 )

@@ -128,7 +128,7 @@ def enumerate_orders(
     """
     best, nodes, is_late = BestStars(count, cylinders), 0, False
     stars = np.zeros((1, cylinders), dtype=np.uint8)
-    squares = np.array([[table.constant + table.placed(stars, stars[:, 0], 0)[0] for table in objective.tables]])
+    squares = np.array([[table.constant + table.increments(stars, stars[:, 0], 0)[0] for table in objective.tables]])
     queue: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
     with limit_time(time_limit):
         while queue and not is_late:
@@ -148,9 +148,9 @@ def enumerate_orders(
             for start in range(0, len(rows), _BLOCK):
                 row, step = rows[start : start + _BLOCK], steps[start : start + _BLOCK].astype(np.uint8)
                 extended = stars[row]
-                increments = [table.placed(extended, step, depth) for table in objective.tables]
+                increments = [table.increments(extended, step, depth) for table in objective.tables]
                 extended[:, depth] = step
                 queue.append((depth + 1, extended, squares[row] + np.stack(increments, axis=1)))
     best_squares = np.array([table.squares(best.stars[:1])[0] for table in objective.tables if len(best.values)])
-    minimum = objective.below(best_squares) if len(best.values) else float("inf")
+    minimum = objective.lower_value(best_squares) if len(best.values) else float("inf")
     return StarSearchResult(best.stars, best.values, 0.0 if is_late else minimum, not is_late, nodes)

@@ -162,7 +162,7 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         if phasing.cylinders > MOST_SLOTS:
             raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
         model = family.model(phasing)
-        pairs = PairObjective.of(model.at(model.samples))
+        pairs = PairObjective.from_problem(model.at(model.samples))
         search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
         result = enumeration_result(phasing, family, search, "every firing order looked at, pair by pair of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)

@@ -144,7 +144,7 @@ class ThrowPrograms:
         for norm in norms:
             by_order = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
             sizes += by_order / (float(by_order.max()) or 1.0)
-        self._followed = int(np.flatnonzero(sizes > waves.followed * sizes.max()).max(initial=0)) + 1
+        self._followed = int(np.flatnonzero(sizes > waves.min_arc_share * sizes.max()).max(initial=0)) + 1
         self._by_laps: dict[tuple[int, ...], ThrowProgram] = {}
         self._proofs: list[Multipliers] = []
         self.conflict: set[str] = set()
@@ -277,7 +277,7 @@ class ThrowPrograms:
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
     ) -> ThrowBox | FathomedPart:
         """Bound a box by multipliers of other boxes or by its cone program."""
-        columns = self._riders.columns(*self.waves.arcs(lower, upper))
+        columns = self._riders.columns(*self.waves.throw_bounds(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._followed], lower, upper)
         for proof in self._proofs if is_new else ():
             value, _ = self._bound(program.rows, columns, proof, arc_box)
@@ -302,7 +302,7 @@ class ThrowPrograms:
             return FathomedPart(cut)
         middle, spread = mixture.middle(solution.x)
         middle = np.clip(middle, *ends)
-        arcs_at_middle, _ = self.waves.arcs(middle, middle)
+        arcs_at_middle, _ = self.waves.throw_bounds(middle, middle)
         for pin, column, distance in self._riders.spread(columns, solution.x[: mixture.unbalances], arcs_at_middle):
             spread[pin] += float(program.unbalance_sizes[column]) * distance
         return ThrowBox(program, *ends, max(value, floor), middle, spread)

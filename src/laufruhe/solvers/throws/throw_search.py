@@ -11,8 +11,8 @@ from functools import cache, cached_property, partial
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
-from laufruhe.load_models.uneven_model import rides_of
+from laufruhe.load_models.throw_waves import ThrowWaves, averaged_signal, uses_averages
+from laufruhe.load_models.uneven_model import rotor_throws_of
 from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import common_base
@@ -296,9 +296,9 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         problem, final = best.result.problem, best.result.final
         loss = 0.0
         for term in self._problem.objective:
-            if averages(problem, term.measure):
+            if uses_averages(problem, term.measure):
                 signals = with_common_base(problem.engine.cycle.base_order, final.signals(term.measure.load))
-                averaged_signals = [averaged(problem, term.measure, signal, samples) for signal in signals]
+                averaged_signals = [averaged_signal(problem, term.measure, signal, samples) for signal in signals]
                 # averages have rows between the samples, peaks do not
                 steps = 4 * samples if term.measure.norm.averages else samples
                 rows = load_rows(term.measure, problem.points, averaged_signals, final.engine, steps)
@@ -313,7 +313,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
         phasing = self._phasing
         candidate, realised = self._first_crank(windows, left_out)
-        rides = rides_of(phasing, candidate)
+        rides = rotor_throws_of(phasing, candidate)
         riders = Riders(realised, rides, candidate.throws)
         waves = self._waves(riders.problem, candidate, rides)
 

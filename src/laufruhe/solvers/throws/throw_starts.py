@@ -151,7 +151,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     firsts = np.array([pattern.moments[members[0]] for members in pattern.members])[orders]
     throws = angle_of(layout.dead_centre_turn(0)) + firsts[:, :1] - firsts
     if objective is not None:
-        values = objective.of_angles(layout.throw_positions, throws)
+        values = objective.values_at_angles(layout.throw_positions, throws)
         best = np.argsort(values, kind="stable")[: 4 * _STARTS]
     else:
         values, best = np.zeros(len(orders)), np.arange(len(orders))

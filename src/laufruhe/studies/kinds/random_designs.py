@@ -71,7 +71,7 @@ class RandomDesigns(Sampled):
         values = sizes * np.exp(1j * angles)
         rows = np.full((len(u), len(names)), math.nan)
         rows[:, names.index("objective")] = designs.objective(values)
-        rows[:, names.index(WITHIN)] = designs.within(values)
+        rows[:, names.index(WITHIN)] = designs.are_feasible(values)
         for k, decision in enumerate(problem.unbalances):
             for entry, numbers in zip(decision_values(decision, decision.start), (sizes, angles), strict=False):
                 rows[:, names.index(entry.name)] = numbers[:, k]

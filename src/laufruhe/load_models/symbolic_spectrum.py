@@ -1,0 +1,79 @@
+"""Spectra with CasADi expressions as coefficients (C8)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import base_of
+
+
+@dataclass(frozen=True, eq=False)
+class SymbolicSpectrum:
+    """Spectrum of a signal whose coefficients are CasADi expressions.
+
+    Attributes
+    ----------
+    orders
+        Orders, shape (n,).
+    real, imaginary
+        Real and imaginary parts of the coefficients, expressions of shape (d, n).
+    """
+
+    orders: Array
+    real: Any
+    imaginary: Any
+
+    @property
+    def base(self) -> float:
+        """Order of the common period of all orders."""
+        return float(base_of(self.orders.tolist()))
+
+    def sampled(self, steps: int) -> Any:
+        """Return values at equal steps over the common period, shape (steps, d)."""
+        cosine, sine = cosines_and_sines(self.orders.tolist(), self.base, steps)
+        return (self.real @ cosine - self.imaginary @ sine).T
+
+    def select(self, indices: NDArray[np.intp]) -> SymbolicSpectrum:
+        """Return the spectrum with the orders at these indices only."""
+        columns = indices.tolist()
+        return SymbolicSpectrum(self.orders[indices], self.real[:, columns], self.imaginary[:, columns])
+
+    def mapped(self, matrix: Array) -> SymbolicSpectrum:
+        """Return the spectrum with the components of all orders multiplied by a real matrix, shape (m, d)."""
+        m = ca.DM(matrix.copy())
+        return SymbolicSpectrum(self.orders, m @ self.real, m @ self.imaginary)
+
+    def map_orders(self, matrices: Sequence[NDArray[np.complex128]]) -> SymbolicSpectrum:
+        """Return the spectrum with the components of each order multiplied by a complex matrix, shape (m, d) each."""
+        pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
+        columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]
+        real = [a @ x - b @ y for (a, b), (x, y) in zip(pairs, columns, strict=True)]
+        imaginary = [a @ y + b @ x for (a, b), (x, y) in zip(pairs, columns, strict=True)]
+        return SymbolicSpectrum(self.orders, ca.horzcat(*real), ca.horzcat(*imaginary))
+
+
+def sum_spectra(spectra: Sequence[SymbolicSpectrum]) -> SymbolicSpectrum:
+    """Return the sum of spectra, order by order."""
+    orders = np.unique(np.concatenate([spectrum.orders for spectrum in spectra]))
+    real, imaginary = 0.0, 0.0
+    for spectrum in spectra:
+        selection = ca.DM.zeros(len(spectrum.orders), len(orders))
+        for k, column in enumerate(np.searchsorted(orders, spectrum.orders)):
+            selection[k, int(column)] = 1.0
+        selection = ca.sparsify(selection)
+        real, imaginary = real + spectrum.real @ selection, imaginary + spectrum.imaginary @ selection
+    return SymbolicSpectrum(orders, real, imaginary)
+
+
+def cosines_and_sines(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
+    """Return cosines and sines of orders at equal steps over the period of order `base`, shape (n, samples) each."""
+    angles = 2.0 * np.pi / base * np.arange(samples) / samples
+    phases = np.outer(orders, angles)
+    return ca.DM(np.cos(phases)), ca.DM(np.sin(phases))
