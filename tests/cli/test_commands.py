@@ -178,7 +178,7 @@ def test_solve_and_evaluate_have_places_of_their_own(here: Path) -> None:
     before = (here / "results/scene/result.json").read_bytes()
     run("evaluate", path, "--no-plots")
     assert (here / "results/scene/result.json").read_bytes() == before
-    assert (here / "results/scene-as-given/result.json").is_file()
+    assert (here / "results/scene-initial/result.json").is_file()
     refused(run("evaluate", path, "--out", "results/scene"), "--out", "holds the results of laufruhe solve")
 
 
@@ -189,7 +189,7 @@ def test_what_others_made_is_never_touched(here: Path) -> None:
     for out in (".", "mine", "..", here):
         refused(run("solve", path, "--out", out), "--out")
     assert run("evaluate", path, "--no-plots").exit_code == 0
-    (here / "results/scene-as-given/cycle.png").write_text("mine")
+    (here / "results/scene-initial/cycle.png").write_text("mine")
     refused(run("evaluate", path), "results", "'cycle.png', which Laufruhe did not make")
     for name, text in (("trace.csv", "1,2\n"), ("package.json", '{"name": 1}'), ("deep.json", "[" * 5000),
                        ("book.json", '{"title": "mine"}'), ("list.json", '[{"problem": 1}]')):  # fmt: skip
@@ -197,7 +197,7 @@ def test_what_others_made_is_never_touched(here: Path) -> None:
         refused(run("check", path, "--json", name), "--json", "did not make")
         assert (here / name).read_text() == text
     assert (here / "mine/report.md").read_text() == "mine"
-    assert (here / "results/scene-as-given/cycle.png").read_text() == "mine"
+    assert (here / "results/scene-initial/cycle.png").read_text() == "mine"
     for _ in range(2):
         assert run("check", path, "--json", "own.json").exit_code == 0
 
@@ -291,7 +291,7 @@ class TestUnwritable:
 
 def test_a_name_of_dots_stays_under_results(here: Path) -> None:
     assert run("evaluate", written(here, scenes.GIVEN, "..."), "--no-plots").exit_code == 0
-    assert tree(here / "results") == {f"problem-as-given/{name}" for name in PAGES | TABLES}
+    assert tree(here / "results") == {f"problem-initial/{name}" for name in PAGES | TABLES}
 
 
 def test_markup_in_a_title_is_text(here: Path) -> None:

@@ -23,7 +23,7 @@ def test_explain_says_what_is_left_out(tmp_path: Path) -> None:
     path = written(tmp_path, scenes.SHAKING_ONLY)
     answer = RUN.invoke(app, ["explain", str(path), "--tolerance", "1e-2"])
     assert answer.exit_code == 0, answer.output
-    for text in ("Computed:", "Left out:", "Cost:", "gas: the problem describes none", "loads Fx"):
+    for text in ("Computed:", "Neglected:", "Cost:", "gas: the problem describes none", "loads Fx"):
         assert text in answer.output
     assert re.search(r"samples of force components, one in \d+\n", answer.output)
     assert list(tmp_path.iterdir()) == [path]

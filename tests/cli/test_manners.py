@@ -152,7 +152,7 @@ def test_a_file_that_may_not_be_read_is_told_as_any_other_fault(
 def test_quiet_says_nothing_and_writes_all(here: Path) -> None:
     found = run.invoke(app, ["evaluate", str(SINGLE), "-q", "--no-plots"])
     assert (found.exit_code, found.output) == (0, "")
-    assert (here / "results" / "tractor-single-as-given" / "result.json").is_file()
+    assert (here / "results" / "tractor-single-initial" / "result.json").is_file()
     assert run.invoke(app, ["check", str(SINGLE), "-q"]).output == ""
     assert "does not exist" in run.invoke(app, ["check", "none.toml", "-q"]).output
 
@@ -197,7 +197,7 @@ def test_a_problem_may_come_from_standard_input(here: Path, words: list[str]) ->
     reader._standard_input.cache_clear()
     found = run.invoke(app, [*words, "-"], input=SINGLE.read_bytes())
     assert found.exit_code == 0, found.output
-    assert (here / "results" / "stdin-as-given").is_dir() == (words[0] == "evaluate")
+    assert (here / "results" / "stdin-initial").is_dir() == (words[0] == "evaluate")
     reader._standard_input.cache_clear()
     found = run.invoke(app, [*words, "-"], input=b"title = 5")
     assert found.exit_code == 2
@@ -289,7 +289,7 @@ def test_a_star_search_tells_value_and_bound_that_enclose_the_answer(tmp_path: P
 @pytest.mark.parametrize(("kind", "ends"), [("svg", {".svg"}), ("both", {".svg", ".png"})])
 def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[str]) -> None:
     assert run.invoke(app, ["evaluate", str(SINGLE), "-q", "--format", kind]).exit_code == 0
-    folder = here / "results" / "tractor-single-as-given"
+    folder = here / "results" / "tractor-single-initial"
     assert {path.suffix for path in folder.glob("bars.*")} == ends
     assert "(bars.svg)" in (folder / "report.md").read_text(encoding="utf-8") or kind == "both"
     assert (folder / "bars.svg").read_text(encoding="utf-8").count("<svg") == 1

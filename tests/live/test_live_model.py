@@ -111,7 +111,7 @@ def test_sliders_have_the_units_of_the_file():
 
 def test_a_page_too_large_says_so(every, monkeypatch):
     monkeypatch.setattr("laufruhe.live.parts.MOST_MB", 1e-3)
-    assert "at the most" in every[1].too_large
+    assert "carries at most" in every[1].too_large
 
 
 def test_a_problem_with_nothing_open_has_no_sliders():

@@ -82,7 +82,7 @@ def test_files_of_a_sag_study_are_in_the_units_of_a_reader(tmp_path: Path) -> No
     answer = CliRunner().invoke(app, ["study", str(path), "--out", str(tmp_path / "out")])
     assert answer.exit_code == 0, answer.output
     report = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
-    assert "| highest mode, at most [Hz] | static sag, as given [mm] |" in report
+    assert "| highest mode, at most [Hz] | static sag, initial [mm] |" in report
     with xr.open_dataset(tmp_path / "out" / "p.nc") as data:
         assert data["objective"].attrs["units"] == "m"
         assert "constraints.highest_mode.max" in data.coords
@@ -164,7 +164,7 @@ def test_studies_of_newer_mounts_have_the_loads_of_their_designs(tmp_path: Path,
     draws.write_text(draws.read_text().replace("random designs", "speed map").replace("draws = 4", lines))
     (tmp_path / "kept.jsonl").unlink(missing_ok=True)
     seen = computed(draws)
-    last = np.flatnonzero((seen["design"].values == "as given") & (seen["speed"].values == seen["speed"].values.max()))
+    last = np.flatnonzero((seen["design"].values == "initial") & (seen["speed"].values == seen["speed"].values.max()))
     told = float(seen["value"].values[last[0], 0])
     assert told == pytest.approx(objective_value(scene, evaluate(scene, scene.engine)), rel=1e-5)
 

@@ -117,12 +117,12 @@ def test_from_the_shell(tmp_path: Path) -> None:
     assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
     solved = CliRunner().invoke(app, ["solve", str(path), "--no-plots", "--out", str(out)])
     assert solved.exit_code == 0, solved.output
-    assert "the design as given stands on a resonance" in solved.output
+    assert "the initial design is on a resonance" in solved.output
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))
     assert (result["objective"]["initial"], result["objective"]["reduction"]) == (None, None)
     assert result["mounts"][0]["initial"] == {"mean": None, "max": None, "rms": None}
     assert "bounce mode at 23.3333 Hz" in result["message"]
     report = (out / "report.md").read_text(encoding="utf-8")
-    assert "The design as given has none: the bounce mode" in report
+    assert "The initial design has no finite loads: the bounce mode" in report
     assert " inf" not in report
     assert " nan" not in report

@@ -54,7 +54,7 @@ def test_what_was_decided_is_marked() -> None:
     assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
     assert not scene.cranks
     labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]
-    assert "weight, decided" in labels
+    assert "weight, optimised" in labels
     front, side = reaches(scene)
     assert front
     assert side

@@ -70,7 +70,7 @@ def test_polar_diagrams_are_the_samples() -> None:
     assert len(figure.axes) == 4
     for m, axes in enumerate(figure.axes):
         lines = {line.get_label(): line.get_xydata() for line in axes.lines}
-        for label, design in (("as given", result.initial), ("as decided", result.final)):
+        for label, design in (("initial", result.initial), ("final", result.final)):
             samples = channel_samples(design, 0)[:, m, 1:]
             path = np.asarray(lines[label])[:-1]
             assert len(path) >= 720
@@ -163,9 +163,9 @@ def test_a_spectrum_is_the_mean_amplitude() -> None:
 def test_an_evaluated_design_has_one_series(maker: object) -> None:
     assert callable(maker)
     given, decided = texts(maker(scenes.stated(scenes.TIGHT))), texts(maker(scenes.solved(scenes.TIGHT)))
-    assert "as given" in given
-    assert "as decided" not in given
-    assert "as decided" in decided
+    assert "initial" in given
+    assert "final" not in given
+    assert "final" in decided
 
 
 def test_an_engine_without_mounts_shows_shaking_loads() -> None:

@@ -36,7 +36,7 @@ def test_a_case_without_a_design_says_so_in_its_place() -> None:
     low, high = axes.get_xlim()
     assert low < shown["no design"] < high
     assert "21\u2009051" in shown, "no exponents on bars"
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["as given", "proven optimum"]
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["initial", "proven optimum"]
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_a_case_without_a_design_says_so_in_its_place() -> None:
     [([1000.0, 2000.0, 4000.0, 8000.0], "log"), ([1000.0, 2000.0, 3000.0, 4000.0], "linear"), ([1.0, 2.0], "linear")],
 )
 def test_values_that_grow_by_a_factor_stand_on_a_logarithmic_axis(speeds: list[float], scale: str) -> None:
-    data = part([1.0 + speed for speed in speeds], ["as given"] * len(speeds), speed=list(speeds))
+    data = part([1.0 + speed for speed in speeds], ["nothing open"] * len(speeds), speed=list(speeds))
     data = data.assign_coords(case=("point", ["one"] * len(speeds)))
     axes = draw(KINDS["layout comparison"].picture(data)).axes[0]
     assert axes.get_xscale() == scale

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from laufruhe.present.numbers import aligned, number, trimmed, with_unit
+from laufruhe.present.numbers import aligned, fixed, number, percent, trimmed, with_unit
 
 
 @pytest.mark.parametrize(
@@ -30,3 +30,9 @@ def test_units_are_readable() -> None:
 
 def test_columns_share_their_decimals() -> None:
     assert [aligned(value, 5439.4) for value in (5439.4, 95.17, 1.862)] == ["5439.4", "95.2", "1.9"]
+
+
+def test_nothing_is_printed_with_a_sign_or_decimals() -> None:
+    assert [fixed(value, 2) for value in (-1e-9, 0.0, 0.005001, -2.0)] == ["0", "0", "0.01", "-2.00"]
+    assert [percent(share) for share in (-1e-9, 0.0, -0.25)] == ["0 %", "0 %", "-25.0 %"]
+    assert aligned(1e-9, 5439.4) == "0"

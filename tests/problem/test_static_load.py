@@ -71,7 +71,7 @@ def test_an_objective_at_its_static_part_says_so(name: str, static: float) -> No
     assert part is not None
     assert part.is_floor
     assert part.static == pytest.approx(static, rel=1e-5)
-    assert "nothing that turns can bring the objective below it" in static_sentence(problem, evaluation)
+    assert "No rotating part can bring the objective below it" in static_sentence(problem, evaluation)
 
 
 def test_an_alternating_objective_names_what_it_leaves_out() -> None:
@@ -83,7 +83,7 @@ def test_an_alternating_objective_names_what_it_leaves_out() -> None:
     assert part.whole == objective_value(given, evaluation)
     assert part.alternating == objective_value(problem, evaluation)
     assert static_sentence(problem, evaluation).startswith(
-        "Left out is the steady reaction to the mean torque, 160.5 N"
+        "The steady reaction to the mean torque, 160.5 N alone, is left out"
     )
 
 

@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 from cli import scenes
+from laufruhe.errors import LaufruheWarning
 from laufruhe.files.reader import load
 from laufruhe.physics.torque import torque_parts
 from laufruhe.present.tables import Table
@@ -88,9 +89,9 @@ def test_orders_are_those_of_the_curves(result: Result, folder: Path) -> None:
     """Amplitudes by order against a Fourier transform of the forces in the other file, one axis at a time."""
     curves, orders = (pd.read_csv(folder / f"{name}.csv") for name in ("forces", "orders"))
     point = result.problem.points[1].name
-    force = curves[curves["point"] == point]["as given: shaking force z [N]"].to_numpy()
+    force = curves[curves["point"] == point]["initial: shaking force z [N]"].to_numpy()
     found = 2.0 * np.abs(np.fft.rfft(force)) / len(force)
-    own = orders[orders["point"] == point].set_index("order")["as given: shaking force [N]"]
+    own = orders[orders["point"] == point].set_index("order")["initial: shaking force [N]"]
     for order in (2.0, 4.0):
         # two turns are transformed
         assert own[order] == pytest.approx(found[int(2 * order)], rel=1e-6)
@@ -191,8 +192,8 @@ def test_what_only_the_report_knows_is_a_file_too() -> None:
     assert "crankshaft-torque" in found
     assert set(found) <= {name.removesuffix(".csv") for name in result_files()}
     assert any(isinstance(cell, float) for row in found["crankshaft-torque"].rows for cell in row)
-    work = np.array([row[found["torque"].head.index("as given: work stored [J]")] for row in found["torque"].rows])
-    whole = np.array([row[found["torque"].head.index("as given: torque of all [N m]")] for row in found["torque"].rows])
+    work = np.array([row[found["torque"].head.index("initial: work stored [J]")] for row in found["torque"].rows])
+    whole = np.array([row[found["torque"].head.index("initial: torque of all [N m]")] for row in found["torque"].rows])
     # the work is what the torque does beyond its mean
     half = len(work) // len(result.problem.points)
     step = result.final.engine.cycle.angle / half
@@ -310,3 +311,11 @@ def test_what_turns_with_and_against_the_crank_adds_up_to_the_order() -> None:
     sizes = np.hypot(lateral, vertical)
     assert sizes.max() == pytest.approx(row[4] + row[6], rel=1e-5)
     assert sizes.min() == pytest.approx(abs(row[4] - row[6]), abs=1e-5 * sizes.max() + 1e-9)
+
+
+def test_old_names_of_designs_are_read_with_a_warning(result: Result) -> None:
+    for old, new in (("as given", "initial"), ("as decided", "final")):
+        with pytest.warns(LaufruheWarning, match=f"'{old}' is now '{new}'"):
+            assert result.designs[old] is result.designs[new]
+    with pytest.raises(KeyError):
+        result.designs["before"]

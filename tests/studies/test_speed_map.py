@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from laufruhe import load
 from laufruhe.cli import app
-from laufruhe.errors import InputError
+from laufruhe.errors import InputError, LaufruheWarning
 from laufruhe.numerics.norms import NORMS
 from laufruhe.plots.picture import draw
 from laufruhe.problem.channels import MOUNT_FORCE, MOUNT_TRAVEL, mounting_in
@@ -56,24 +56,31 @@ def test_values_are_those_of_the_exact_model(tmp_path: Path) -> None:
     speeds = sorted({1000.0, 1500.0, 2000.0, 2500.0, round(rated, 9)})
     result = solve(problem)
     assert data["measure"].values.tolist() == ["mean mount force"]
-    for design, engine in (("as given", problem.engine), ("as decided", result.final.engine)):
+    for design, engine in (("initial", problem.engine), ("final", result.final.engine)):
         one = data.isel(point=np.flatnonzero(data["design"].values == design))
         assert one["speed"].values.tolist() == pytest.approx(speeds)
         for speed, value in zip(one["speed"].values, one["value"].values[:, 0], strict=True):
             at = replace(problem, points=(replace(problem.points[0], speed=speed * RPM),))
             assert value == pytest.approx(evaluate(at, engine).value(Measure(MOUNT_FORCE)), rel=1e-9)
-    assert set(data["proof"].values) == {"as given", "global"}
+    assert set(data["proof"].values) == {"nothing open", "global"}
     assert result.objective is not None
-    found = data["value"].values[(data["design"].values == "as decided") & np.isclose(data["speed"].values, rated)]
+    found = data["value"].values[(data["design"].values == "final") & np.isclose(data["speed"].values, rated)]
     # a solve ends on finer steps than an evaluation asks for
     assert found.item() == pytest.approx(result.objective.value, rel=2e-5)
+
+
+def test_old_names_of_designs_are_read_with_a_warning(tmp_path: Path) -> None:
+    text = part(str(elastic(tmp_path)), 'from = "100 rpm", to = "1500 rpm", points = 3', 'designs = ["as decided"]')
+    with pytest.warns(LaufruheWarning, match="'as decided' is now 'final'"):
+        (table,) = load_study(written(tmp_path, text, "study")).study.parts
+    assert table.settings()["designs"] == ["final"]
 
 
 @pytest.mark.slow
 def test_orders_peak_where_they_meet_a_mode(tmp_path: Path) -> None:
     """Of a damped block: the highest peak of order 2 lies within two percent of half a natural frequency."""
     path = elastic(tmp_path)
-    speeds, more = 'from = "100 rpm", to = "1500 rpm", step = "2 rpm"', 'by_order = true\ndesigns = ["as given"]'
+    speeds, more = 'from = "100 rpm", to = "1500 rpm", step = "2 rpm"', 'by_order = true\ndesigns = ["initial"]'
     measures = '\nmeasures = [{ quantity = "maximum mount travel", limit = "1 mm" }]'
     data = computed(tmp_path, part(str(path), speeds, more + measures))
     modes = mounting_in(load(path).engine).modes.frequencies
@@ -96,7 +103,7 @@ def test_a_resonance_that_nothing_damps_is_a_gap(tmp_path: Path) -> None:
     path = elastic(tmp_path, "0")
     mode = float(mounting_in(load(path).engine).modes.frequencies[0])
     speeds = f'from = "{20.0 * mode!r} rpm", to = "{40.0 * mode!r} rpm", points = 3'
-    data = computed(tmp_path, part(str(path), speeds, 'designs = ["as given"]'))
+    data = computed(tmp_path, part(str(path), speeds, 'designs = ["initial"]'))
     struck = np.isnan(data["value"].values[:, 0])
     assert struck.tolist() == [False, True, False]
 
@@ -116,10 +123,10 @@ def test_what_no_design_keeps_is_said_and_not_drawn(tmp_path: Path) -> None:
     limit = '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1 N"\n'
     (tmp_path / "quiet.toml").write_text(text + limit, encoding="utf-8")
     data = computed(tmp_path, part("quiet.toml", 'from = "1000 rpm", to = "3000 rpm", points = 3', "by_order = true"))
-    decided = data["design"].values == "as decided"
+    decided = data["design"].values == "final"
     assert np.isnan(data["value"].values[decided]).all()
     assert np.isfinite(data["value"].values[~decided]).all()
-    assert [row[-1] for row in KINDS["speed map"].table(data)[0].rows] == [*["as given"] * 2, *["infeasible"] * 2]
+    assert [row[-1] for row in KINDS["speed map"].table(data)[0].rows] == [*["nothing open"] * 2, *["infeasible"] * 2]
     draw(KINDS["speed map"].picture(data))
 
 
@@ -130,7 +137,7 @@ BAD = [
     ('from = "1 m", to = "3000 rpm", points = 3', "", "is not a unit of a speed of rotation"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'operating_point = "idle"', "has no 'idle'"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "mean force" }]', "mean mount force"),
-    ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "balancer mass" }]', "speed changes"),
+    ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "balancer mass" }]', "on speed"),
     (
         'from = "1000 rpm", to = "3000 rpm", points = 3',
         'measures = [{ quantity = "mean mount force", limit = "1 m" }]',

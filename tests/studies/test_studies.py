@@ -100,7 +100,7 @@ def test_fraction_at_its_optimum_beats_every_fraction_swept(tmp_path: Path, smal
     assert data[SPEED].attrs["units"] == "m/s"
     best = data["optimum"].values
     assert set(data["proof"].values[best]) == {"global"}
-    assert set(data["proof"].values[~best]) == {"as given"}
+    assert set(data["proof"].values[~best]) == {"nothing open"}
     assert np.isnan(data["lower_bound"].values[~best]).all()
     for speed in (8.0, 12.0):
         line = data[SPEED].values == speed
@@ -127,7 +127,7 @@ def test_a_couple_is_in_newton_metres_and_needs_no_mounts(tmp_path: Path, small:
     kind = part("counterweight fraction", ["free"], SPEEDS.format(2), more='metric = "rms rocking couple"')
     answer = CliRunner().invoke(app, ["study", str(study(tmp_path, kind)), "--out", str(tmp_path / "out")])
     assert answer.exit_code == 0, answer.output
-    assert "rms rocking couple, as given [N m]" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "rms rocking couple, initial [N m]" in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     with xr.open_dataset(tmp_path / "out" / "p.nc") as data:
         assert data["objective"].attrs["units"] == "N m"
         assert data.sizes["mount"] == 0
@@ -140,7 +140,7 @@ def test_sizing_has_every_set_of_shafts_once(tmp_path: Path) -> None:
     force, moment = "force left + force right", "moment left + moment right"
     assert data["shafts"].values.tolist() == ["none", force, moment, f"{force} + {moment}"]
     none, with_force, with_moment, both = data["objective"].values
-    assert data["proof"].values.tolist() == ["as given", "global", "global", "global"]
+    assert data["proof"].values.tolist() == ["nothing open", "global", "global", "global"]
     assert both <= min(with_force, with_moment)
     assert max(with_force, with_moment) <= none * (1.0 + 1e-4)
     alone = solve(load(PROBLEMS / f"{name}.toml"))
@@ -179,9 +179,9 @@ def test_nothing_open_is_not_called_an_optimum(tmp_path: Path) -> None:
     rows = [
         line for line in (tmp_path / "out" / "report.md").read_text(encoding="utf-8").splitlines() if "boxer" in line
     ]
-    assert rows[0].endswith("| as given |")
+    assert rows[0].endswith("| nothing open |")
     parts = json.loads(answer.stdout)["parts"]["p"]
-    assert parts["coords"]["proof"]["data"] == ["as given", "global"]
+    assert parts["coords"]["proof"]["data"] == ["nothing open", "global"]
     assert parts["data_vars"]["lower_bound"]["data"][0] is None
     assert parts["seconds"] > 0.0
 

@@ -130,7 +130,7 @@ BAD = [
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
     (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this problem"),
     (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
-    (study(problem="tractor-four-lanchester"), "leaves no balance factor open"),
+    (study(problem="tractor-four-lanchester"), "has no open balance factor"),
     (study("balancer sizing"), "nothing to size"),
     (study("layout comparison", problem="nowhere"), "file: is named by the study and does not exist; paths begin in"),
     (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "write it into the problem file first"),

@@ -50,7 +50,7 @@ def test_a_design_beyond_a_limit_is_no_decision() -> None:
     assert "-2.0e-01" not in page
     # a head says all, wherever a narrow screen puts its column
     assert {"error without gas", "error of auto 0.001", "regret of auto 0.001"} < set(INDEX)
-    assert "no fidelity decides as well" in index([_trade(quick)]).as_markdown("")
+    assert "no fidelity finds a design within 0.1 %" in index([_trade(quick)]).as_markdown("")
 
 
 @pytest.mark.slow

@@ -23,20 +23,20 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
     warn(problem, path)
     drawing = problem.drawing
     # the evaluation finds loads that no mount carries, and gas cycles that cannot be met
-    given = evaluate_start(drawing)
-    objective_value(drawing, given)
-    if not given.resonance:
-        given.violation(drawing.limits)
+    initial = evaluate_start(drawing)
+    objective_value(drawing, initial)
+    if not initial.resonance:
+        initial.violation(drawing.limits)
     # a problem that no method solves is not ok
     refuse(problem)
 
-    def as_given() -> str:
+    def initial_as_json() -> str:
         from laufruhe.report.json_result import as_json
         from laufruhe.solvers import evaluate_only
 
         return as_json(evaluate_only(problem, to_start_from=True))
 
-    return f"ok: {problem.summary}\n", as_given
+    return f"ok: {problem.summary}\n", initial_as_json
 
 
 def warn(problem: Problem, path: Path) -> None:

@@ -180,7 +180,7 @@ def solve(
 def evaluate(
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
-    out: o.AsGivenOption = None,
+    out: o.InitialOutOption = None,
     no_plots: o.NoPlotsOption = False,
     kind: o.FormatOption = o.Format.PNG,
     animate: o.AnimateOption = False,

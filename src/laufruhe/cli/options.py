@@ -36,7 +36,7 @@ PARTS = "Write all parts as JSON to FILE; - prints them."
 StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
 OUT = "Folder of the results.  [default: results/<name of the file>{}]"
 OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format(""))]
-AsGivenOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format("-as-given"))]
+InitialOutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format("-initial"))]
 PAGES = "Folder of the pages.  [default: results/trade]"
 PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
 

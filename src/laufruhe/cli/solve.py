@@ -21,7 +21,7 @@ from laufruhe.report import files
 from laufruhe.solvers.result import Result, Status
 
 # endings of their folders
-_SUFFIX = {"solve": "", "evaluate": "-as-given"}
+_SUFFIX = {"solve": "", "evaluate": "-initial"}
 
 Answer = Callable[[Problem, Listener], Result]
 

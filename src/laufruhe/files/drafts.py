@@ -26,7 +26,7 @@ _HEAD = """\
 {schema}
 # Numbers with a dimension are text with a unit: "120 mm", "1.25 kg", "2500 rpm"; bare ones are degrees or plain.
 # A number is left open, to be decided, as {{ between = [low, high] }}; start = value says where it stands now.
-# laufruhe check FILE validates, laufruhe solve FILE decides, laufruhe evaluate FILE takes the design as given.
+# laufruhe check FILE validates, laufruhe solve FILE decides, laufruhe evaluate FILE evaluates the initial design.
 
 title = {title}
 {engine}

@@ -1,7 +1,7 @@
 """Live model of a problem: loads that are affine in the open numbers (P1).
 
-The numbers are those of `AffineModel`, the norms are named, and the page takes them as results do. What no such
-map says is named, never left out without a word.
+The numbers are those of `AffineModel`, the norms are named, and the page takes them as results do. Measures that
+the model cannot compute are listed with a reason.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
-HOW, HERE = "laufruhe page {file} follows it", "decided here, or moved beside"
+HOW, SERVED = "use laufruhe page {file}", "the server optimises it, or use its own control"
 OBJECTIVE = "objective"
 NOTHING = "Nothing that is open here can be moved live."
 
@@ -60,7 +60,7 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
         objective=result.problem.drawing.objective_name, unit=result.problem.objective_unit or "",
     )  # fmt: skip
     values = decided(result.problem, {entry.name: entry.value for entry in result.decisions})
-    how = HERE if is_served else HOW.format(file=file)
+    how = SERVED if is_served else HOW.format(file=file)
     moving = _moving(result.problem, values)
     fixed = tuple(_unmoved(result.problem, how))
     model = replace(model, unmoved=fixed, why_not="" if moving.decisions else NOTHING)
@@ -97,7 +97,7 @@ def _filled(
     affine = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
     # source of values that the page cannot compute
-    known = "it is measured when sliders rest" if is_served else f"its value is that of the design decided; {HOW}"
+    known = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
     aside = f"cannot be followed live; {known.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)
     curves = _curves(collected, result)
@@ -235,10 +235,10 @@ def _reference(result: Result) -> Reference | None:
 
 def _unmoved(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     names = problem.phasing.open_names if problem.phasing is not None else ()
-    yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
+    yield from ((name, f"the crank star has no slider here; {how}") for name in names)
     for decision in problem.decisions:
         if not decision.is_affine:
-            yield decision.name, f"no slider here, because forces do not follow in proportion; {how}"
+            yield decision.name, f"no slider here, because forces are not affine in this number; {how}"
     for extra in problem.extras:
-        why = f"shown of the drawing, without {extra.words}, so no optimum stands beside it"
+        why = f"shown for the drawing, without {extra.words}; the optimum of the whole problem is not compared"
         yield from ((name, why) for name in extra.open_names or (problem.objective_name,))

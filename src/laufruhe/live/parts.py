@@ -171,7 +171,7 @@ class LiveModel:
         size = len(self._packed[1]) / 1e6
         if size <= MOST_MB:
             return ""
-        return f"The loads of this problem take {size:.1f} MB, and a page carries {MOST_MB:g} MB of them at the most."
+        return f"The loads of this problem take {size:.2g} MB; a page carries at most {MOST_MB:g} MB."
 
     @cached_property
     def _packed(self) -> tuple[list[dict[str, Any]], str]:

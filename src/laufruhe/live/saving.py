@@ -65,9 +65,9 @@ def saved_file(problem: Problem, result: Result, moving: Problem, values: Mappin
     except (Refused, InputError) as error:
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
     if not _equal_engines(read.engine, moving.engine) or read.fidelity != moving.fidelity:
-        return Saved(note="This design cannot be written as a problem file that is evaluated alike.")
+        return Saved(note="This design cannot be written as a problem file that gives the same engine.")
     files = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
-    note = f"Save it beside {' and '.join(files)}." if files else ""
+    note = f"Save it in the folder of {' and '.join(files)}." if files else ""
     return Saved(text, marks, note)
 
 

@@ -125,7 +125,7 @@ class Scene:
     rods
         True if sizes of the rods were open.
     state
-        "decided", or "open" in a design as given.
+        "optimised", or "open" in an initial design.
     """
 
     engine: Engine
@@ -151,7 +151,7 @@ class Scene:
         mounts = frozenset(mount.name for k, mount in enumerate(engine.mounts) if k in numbers)
         every = frozenset(part.shaft.name for part in engine.slider_cranks)
         cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("key", Kind.LEAD) & every
-        state = "decided" if is_changed(result) else "open"
+        state = "optimised" if is_changed(result) else "open"
         return cls(engine, driven("rotor"), mounts, masses, cranks, bool(sizes & _OF_RODS), state)
 
     @property

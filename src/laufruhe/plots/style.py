@@ -30,7 +30,7 @@ from laufruhe.plots.letters import families
 from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, round_ticks, typeset, width_of, wrap_lines
 from laufruhe.present.measures import evaluations_with_loads, is_changed
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import FINAL, INITIAL, Result
 
 # Okabe and Ito: distinct for colour-blind readers, and by lightness in print
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
@@ -206,10 +206,10 @@ class Series:
 
 
 def series_of(result: Result, loads: bool = False) -> list[Series]:
-    """Return the given and the decided design; only one if nothing was decided, or if one lacks loads."""
+    """Return the initial and the final design; only one if nothing was decided, or if one lacks loads."""
     if not is_changed(result):
-        return [Series(result.final, AFTER, "as given")]
-    both = [Series(result.initial, BEFORE, "as given"), Series(result.final, AFTER, "as decided")]
+        return [Series(result.final, AFTER, INITIAL)]
+    both = [Series(result.initial, BEFORE, INITIAL), Series(result.final, AFTER, FINAL)]
     return both[-len(evaluations_with_loads(result)) :] if loads else both
 
 

@@ -76,8 +76,8 @@ def _drawn(trade: Trade) -> Figure:
     hollow = "" if decides.all() else " Hollow: no design, or one beyond a limit."
     heading(
         drawn.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
-        f"Joined: beaten by none in both. Regrets under {_power(LEAST_REGRET)} are drawn as that.{hollow} "
-        "Computed with Laufruhe.", trade.problem.title,
+        f"Line: fidelities that no other beats in time and error. Regrets below {_power(LEAST_REGRET)} are drawn there."
+        f"{hollow} Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip
     return drawn.figure
 

@@ -37,7 +37,13 @@ def aligned(value: float, largest: float, digits: int = 5) -> str:
     """Return a number with as many decimals as the largest of its column needs for `digits` figures."""
     if value == 0.0 or largest <= 0.0 or not math.isfinite(largest) or not -4 <= math.log10(largest) < digits:
         return number(value, scale=largest)
-    return f"{value:.{digits - 1 - math.floor(math.log10(largest))}f}"
+    return fixed(value, digits - 1 - math.floor(math.log10(largest)))
+
+
+def fixed(value: float, decimals: int, sign: str = "") -> str:
+    """Return a number with fixed decimals; 0 where all its figures are zero. `sign` is "+" for a sign on all others."""
+    text = f"{value:{sign}.{decimals}f}"
+    return text if float(text) else "0"
 
 
 def trimmed(value: float, digits: int = 4) -> str:
@@ -71,7 +77,7 @@ def in_grams(value: float, unit: str, scale: float) -> str:
 
 def percent(share: float) -> str:
     """Return a relative change in percent, with sign."""
-    return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
+    return f"{fixed(100.0 * share, 1, '+')} %" if math.isfinite(share) else DASH
 
 
 def share(value: float, digits: int = 2) -> str:
@@ -79,19 +85,19 @@ def share(value: float, digits: int = 2) -> str:
     return f"{trimmed(100.0 * value, digits)} %"
 
 
-def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:
-    """Return a shadow price in readable units, such as N per kg; a dash for zero unless `counts`."""
+def price_of(price: float, unit: str, limit_unit: str, with_zero: bool = False) -> str:
+    """Return a shadow price in readable units, such as N per kg; a dash for zero unless `with_zero`."""
     if math.isnan(price):
         return "not known"
-    if not price and not counts:
+    if not price and not with_zero:
         return DASH
-    (name, factor), (of_name, of_factor) = readable(unit), readable(of)
-    units = f"{name} per {of_name}".strip() if of_name else name
-    return f"{number(price * factor / of_factor)} {units}".rstrip()
+    (name, factor), (limit_name, limit_factor) = readable(unit), readable(limit_unit)
+    units = f"{name} per {limit_name}".strip() if limit_name else name
+    return f"{number(price * factor / limit_factor)} {units}".rstrip()
 
 
 class Priced(Protocol):
-    """A limit or a bound with a price on either side."""
+    """Limit or bound with a price on either side."""
 
     @property
     def unit(self) -> str:
@@ -106,11 +112,11 @@ class Priced(Protocol):
         """Price of tightening the edge, if it differs."""
 
 
-def prices_of(priced: Priced, unit: str, counts: bool = False) -> str:
+def prices_of(priced: Priced, unit: str, with_zero: bool = False) -> str:
     """Return the shadow price of a limit or bound, and the price of tightening it if that differs."""
-    other = priced.tightening_price
-    if other is None or math.isnan(other):
-        return price_of(priced.shadow_price, unit, priced.unit, counts)
-    relaxed = price_of(priced.shadow_price, unit, priced.unit, counts=True)
-    tightened = "no design" if math.isinf(other) else price_of(other, unit, priced.unit, counts=True)
+    tightening = priced.tightening_price
+    if tightening is None or math.isnan(tightening):
+        return price_of(priced.shadow_price, unit, priced.unit, with_zero)
+    relaxed = price_of(priced.shadow_price, unit, priced.unit, with_zero=True)
+    tightened = "no design" if math.isinf(tightening) else price_of(tightening, unit, priced.unit, with_zero=True)
     return f"{relaxed} / {tightened}"

@@ -16,14 +16,14 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
     unit = problem.objective_unit or ""
     alone, rest, total = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
     if with_alternating_loads(problem).objective == problem.objective:
-        return f"Left out is the steady reaction to the mean torque, {alone} alone; with it the objective is {total}."
+        return f"The steady reaction to the mean torque, {alone} alone, is left out; with it the objective is {total}."
     lead = f"The steady reaction to the mean torque alone makes {alone}"
     if part.is_floor:
         return (
-            f"{lead}: nothing that turns can bring the objective below it. Without that mean it is {rest}; "
+            f"{lead}. No rotating part can bring the objective below it. Without that mean it is {rest}; "
             "alternating = true minimises this."
         )
     return (
-        f"{lead} ({share(part.static / part.whole)}), which nothing that turns can balance. "
+        f"{lead} ({share(part.static / part.whole)}), which no rotating part can balance. "
         f"Without that mean the objective is {rest} (alternating = true)."
     )

@@ -22,20 +22,20 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         Time of one evaluation with the chosen and with the exact physics.
     """
     pruned, exact = choice.numbers
-    fewer = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""
-    met = "" if choice.error_estimate <= tolerance else "; even the reference is no better: give a smoother gas trace"
+    ratio = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""
+    met = "" if choice.error_estimate <= tolerance else "; the reference is no better: use a smoother gas trace"
     lines = [
         f"{problem.title}",
-        f"Error of the objective: at most {choice.error_estimate:.1e} (asked {tolerance:g}{met})",
+        f"Error of the objective: at most {choice.error_estimate:.1e} (tolerance {tolerance:g}{met})",
         "",
         "Computed:",
         *(f"  {text}" for text in choice.description),
-        "Left out:",
+        "Neglected:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
         *_static(problem),
         "Cost:",
-        f"  {pruned} of {exact} samples of force components{fewer}",
-        f"  another design is evaluated in {milliseconds[0]:.3f} ms, exactly in {milliseconds[1]:.3f} ms",
+        f"  {pruned} of {exact} samples of force components{ratio}",
+        f"  one more design: {trimmed(milliseconds[0], 3)} ms; with exact physics: {trimmed(milliseconds[1], 3)} ms",
     ]
     return "\n".join(lines) + "\n"
 
@@ -62,5 +62,5 @@ def _static(problem: Problem) -> list[str]:
 
 
 def _line(what: str, why: str, share: float) -> str:
-    size = f"changes the objective by at most {share:.1e}" if share > 0.0 else "changes nothing"
+    size = f"changes the objective by at most {share:.1e}" if share > 0.0 else "does not change the objective"
     return f"  {what}: {why}; {size}"

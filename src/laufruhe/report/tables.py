@@ -121,7 +121,7 @@ def _rankings(result: Result) -> Table:
         for order in star.firing_orders
     ]  # fmt: skip
     unit = result.objective.unit if result.objective else ""
-    head = ["rank", f"objective [{unit or '-'}]", f"not under [{unit or '-'}]", "proven", "throws [deg]", "shafts",
+    head = ["rank", f"objective [{unit or '-'}]", f"lower bound [{unit or '-'}]", "proven", "throws [deg]", "shafts",
             "firing order", "intervals [deg]", "neighbours", "roll content"]  # fmt: skip
     for order in ranking_of(result).ranking[0].orders:
         # relative to the force of one throw, and that times the spacing
@@ -176,7 +176,7 @@ def _uneven_firing(result: Result) -> Table:
         [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
         for one in ranking_of(result).trade
     ]
-    return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"not under [{unit}]"], rows)
+    return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"lower bound [{unit}]"], rows)
 
 
 def _indicator(result: Result) -> Table:
@@ -201,7 +201,7 @@ def _indicator(result: Result) -> Table:
 
 def _willans(result: Result) -> Table:
     rows = [row for test in result.problem.friction for row in _test_rows(test)]
-    head = ["point", "what", "brake mean pressure [Pa]", "speed [rpm]", "fuel, as measured", "drag [Pa]",
+    head = ["point", "kind", "brake mean pressure [Pa]", "speed [rpm]", "fuel, as measured", "drag [Pa]",
             "least squares, as measured", "standard deviation [Pa]"]  # fmt: skip
     return Table(head, rows)
 
@@ -213,7 +213,7 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
         places = (none, RPM * x, none, y) if test.is_motored else (x, none, y, none)
         yield [test.at, "measured", *places, intercept + slope * x, none]
     target, line = test.asked, intercept + slope * test.asked
-    yield [test.at, "asked", *((none, RPM * target) if test.is_motored else (target, none)), none, none, line, none]
+    yield [test.at, "requested", *((none, RPM * target) if test.is_motored else (target, none)), none, none, line, none]
     told = (none, RPM * target, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
     yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
 
@@ -243,7 +243,7 @@ def _wear(result: Result) -> Table:
         for k, point in enumerate(result.problem.points):
             shares = [wear_of(path, angles) for path in bearing_paths(design, k).T]
             rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *shares]).tolist()]
-    head = ["design", "point", "direction from upright towards y [deg]", *(f"wear of {name} [-]" for name in names)]
+    head = ["design", "point", "direction from z towards y [deg]", *(f"wear of {name} [-]" for name in names)]
     return Table(head, rows)
 
 
@@ -255,8 +255,8 @@ def _turning(result: Result) -> Table:
         for k, point in enumerate(result.problem.points)
         for (kind, order), (forward, backward) in parts_of(result, design.engine, k).items()
     ]  # fmt: skip
-    head = ["design", "point", "of", "order", "turns with the crank", "its angle [deg]", "turns against it",
-            "its angle against it [deg]", "unit"]  # fmt: skip
+    head = ["design", "point", "load", "order", "forward", "forward angle [deg]", "backward", "backward angle [deg]",
+            "unit"]  # fmt: skip
     return Table(head, rows)
 
 

@@ -6,9 +6,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
+from laufruhe.errors import counted
 from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
 from laufruhe.fidelity.mount_knobs import RIGID
-from laufruhe.present.numbers import DASH, figure
+from laufruhe.present.numbers import DASH, figure, fixed, number
 from laufruhe.present.static_load import static_sentence
 from laufruhe.present.tables import Table
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -20,39 +21,38 @@ from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Trade, TradeRow, is_lo
 TITLE = "Speed against accuracy"
 ALIKE, SMALLEST = 1.3, 1e-4
 LOCAL = (
-    " What is open here has many optima. Every fidelity begins at the design of the reference and finds an optimum "
-    "nearby, in the time of its solve; where that design is worth a tenth more or less to it, it searches from nothing "
-    "too, which takes several times as long."
+    " This problem has many optima. Every fidelity starts at the design of the reference and finds an optimum "
+    "nearby, in the time of its solve. If its objective there differs by a tenth, it also searches from scratch, which "
+    "takes several times as long."
 )
-OF_STARS = " Stars are ranked by each fidelity's physics at few steps, and the best of them decided at its own."
-OF_MOUNTS = " Choices about modes and time would change with the mounts that are open: no design is decided with them."
+OF_STARS = " Each fidelity ranks the stars at few steps with its physics, and optimises the best ones at its own steps."
+OF_MOUNTS = " No design is optimised with reduced modes or in time, because these choices depend on the open mounts."
 HEAD = (
     "fidelity", "error", "error estimate", "another design", "gradient", "solve", "first design", "memory",
     "regret",
 )  # fmt: skip
 COLUMNS = (
-    "**Another design**: objective of a further design of a prepared problem. **Gradient**: with its derivatives by "
-    "all decisions. **Solve**: optimum at this fidelity's own angles, with all preparation. **First design**: "
-    "objective with all preparation. **Regret**: by how much the exact objective of the design found exceeds that of "
-    "the best design known, or by how much that design is beyond a limit by the exact model, where that is more than "
-    "0.1 %; it is below zero where it is less."
+    "**Another design**: time of the objective of one more design, with the problem prepared. **Gradient**: the same "
+    "with derivatives by all decisions. **Solve**: time of the optimum at this fidelity, with all preparation. "
+    "**First design**: time of the objective with all preparation. **Regret**: exact objective of this fidelity's "
+    "design over that of the best design known, minus one; it is negative for a better design. A design that breaks a "
+    "limit by more than 0.1 % in the exact model shows that excess instead."
 )
 INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
     "error without gas", "error of auto 0.001", "regret of two-order", "regret of auto 0.001", "uneven speed",
-    "why a dash",
+    "reason of a dash",
 )  # fmt: skip
 INDEX_COLUMNS = (
     "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
-    "*Regret*: by how much the exact objective of the design that a fidelity decides exceeds that of the best design "
-    "known; *beyond a limit*: by how much that design exceeds a limit by the exact model, where that is more than "
-    "0.1 %, so that it is no decision. Unbalances alone have one optimum, which each fidelity finds at its own angles; "
-    "even stars are ranked by each fidelity's own physics; what else is open is searched for from the design of the "
-    "reference, and from nothing too where that is worth a tenth more or less. Nothing is proven, of the reference "
-    "neither: the share by which another design is worse needs no proof. *Uneven speed*: change of the objective with "
-    "a flywheel that leaves 2 % of irregularity."
+    "*Regret*: exact objective of a fidelity's design over that of the best design known, minus one. "
+    "*Beyond a limit*: share by which that design breaks a limit in the exact model, stated above 0.1 %. "
+    "Problems with open unbalances alone have one optimum. Even stars are ranked by each fidelity's physics. "
+    "All other problems are searched from the design of the reference, and also from scratch if the objective there "
+    "differs by a tenth. No optimum is proven; the comparison needs no proof. *Uneven speed*: change of the objective "
+    "with a flywheel that leaves 2 % of irregularity."
 )
-OPEN_FLYWHEEL = "the flywheel is open, and a cheap model makes one that breaks its limits"
+OPEN_FLYWHEEL = "the flywheel is open; a cheap model chooses one that breaks its limits"
 
 
 def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
@@ -62,15 +62,15 @@ def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
     optimum = "" if math.isnan(trade.optimum) else f", of the optimum {minimum}"
     blocks: list[Block] = [
         Paragraph(
-            f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the design as given {initial}"
+            f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the initial design {initial}"
             f"{optimum}."
         ),
         Paragraph(f"**Take** {advice(trade)}", marked=True),
     ]
     if picture:
-        blocks.append(Illustration(picture, "Time against error of every fidelity; colour is regret", False))
+        blocks.append(Illustration(picture, "Time and error of every fidelity; the colour shows the regret", False))
     elif not problem.load_terms:
-        blocks.append(Paragraph("What is asked depends on no load, so every fidelity gives the same number."))
+        blocks.append(Paragraph("The objective depends on no load, so every fidelity gives the same number."))
     blocks.append(Table(HEAD, [_cells(row) for row in trade.rows]))
     if not trade.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
@@ -89,15 +89,15 @@ def _beyond(trade: Trade) -> list[str]:
         inertia, change = trade.flywheel
         lines.append(
             f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
-            f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
-            "No fidelity at constant speed sees that."
+            f"varies by some 2 %, the objective changes by {fixed(100.0 * change, 2, '+')} %. "
+            "No fidelity at constant speed includes this."
         )
     if trade.time_domain is not None:
         time = trade.time_domain
         lines.append(
             f"Time domain ({time.point}): mount forces integrated in time agree with the same equations in the "
-            f"frequency domain to {time.integration:.0e} of their peak. Hysteretic loss has no law in time; the "
-            f"viscous damping in its place changes them by up to {100.0 * time.loss:.2g} % of the peak."
+            f"frequency domain to {time.integration:.0e} of their peak. Hysteretic loss has no law in time. "
+            f"Viscous damping, which replaces it, changes them by up to {100.0 * time.loss:.2g} % of the peak."
         )
     return lines
 
@@ -139,16 +139,15 @@ def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
     """Return one line per problem, and their common findings; `refused` names problems without a trade."""
     rows = [*map(_index_row, trades), *([f"`{name}`", *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
     short = (
-        "`auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for modes or "
-        "sag need no loads.",
+        "`auto` is the safe choice: its error stays below a stated bound. Problems of modes or sag only need no loads.",
         f"{_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
-        "Where the second order of an engine cancels, all that remains is what these formulas leave out.",
-        f"{_cost(trades, NO_GAS, 'Leaving gas out costs')} Gas determines how the roll moment is balanced.",
-        f"{_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} Keeping a few modes saves nothing: all that "
-        "are excited take the same time.",
+        "If the second order of an engine cancels, only orders remain that these formulas neglect.",
+        f"{_cost(trades, NO_GAS, 'Neglecting gas costs')} Gas determines how the roll moment is balanced.",
+        f"{_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} A reduced number of modes saves no time: "
+        "all excited modes take the same time.",
         "More than 720 steps in a cycle improve peaks and proofs, not means.",
-        "Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
-        "balances the wrong load leaves the right one. Read both columns.",
+        "Regret may be far below the error, because an optimum is flat. It may also be far above it, because a shaft "
+        "then balances the wrong load. Read both columns.",
     )
     lead = f"Which fidelity to take, measured on {len(trades)} problem{'s' * (len(trades) > 1)}. In short:"
     rows = sorted(rows, key=lambda row: row[0].strip("[`"))
@@ -160,7 +159,10 @@ def _index_row(trade: Trade) -> list[str]:
     two, auto, gas = (_named(trade, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
     number, decided = choices(trade)
     deciding = (f"`{decided.name}`", _time(decided.solve)) if decided else (DASH, DASH)
-    name, uneven = trade.problem.name, DASH if trade.flywheel is None else f"{100.0 * trade.flywheel[1]:+.2f} %"
+    name, uneven = (
+        trade.problem.name,
+        DASH if trade.flywheel is None else f"{fixed(100.0 * trade.flywheel[1], 2, '+')} %",
+    )
     return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, _error(two), _error(gas),
             _error(auto), _regret(two), _regret(auto), uneven, _why_dashes(trade)]  # fmt: skip
 
@@ -170,12 +172,12 @@ def _why_dashes(trade: Trade) -> str:
     problem, (_, decided) = trade.problem, choices(trade)
     reasons = {
         "nothing is open": not is_open(problem),
-        "no design is found within the limits": is_open(problem) and math.isnan(trade.optimum),
+        "no design within the limits was found": is_open(problem) and math.isnan(trade.optimum),
         "the optimum is zero": trade.optimum == 0.0,
-        "no fidelity decides as well": decided is None and trade.optimum > 0.0,
-        "what is minimised feels no load": not problem.load_terms,
+        "no fidelity finds a design within 0.1 % of the best": decided is None and trade.optimum > 0.0,
+        "the objective depends on no load": not problem.load_terms,
         "there is no gas": _named(trade, NO_GAS) is None,
-        "a load inside is asked at even speed alone": bool(problem.load_terms) and trade.flywheel is None,
+        "a load inside the crankcase needs constant speed": bool(problem.load_terms) and trade.flywheel is None,
     }
     return "; ".join(why for why, holds in reasons.items() if holds)
 
@@ -191,18 +193,18 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
     broken = sum(row.violation > KEEPS for row in rows)
     if not errors:
-        return f"{what} nothing that these problems show."
-    text = f"{what} {_up_to(errors[-1])} of the number{_median(errors)}"
+        return f"{what} nothing in these problems."
+    text = f"{what} {_up_to(errors[-1])} of the value{_median(errors)}"
     if regrets:
         text += f"; of the design {_up_to(regrets[-1])}{_median(regrets)}"
     if broken:
-        text += f"; it takes {broken} design{'s' * (broken > 1)} beyond a limit"
+        text += f"; {counted(broken, 'design')} broke a limit"
     return text + "."
 
 
 def _median(shares: Sequence[float]) -> str:
     count = len(shares)
-    return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
+    return f" (median of {count} problems: {_percent(shares[count // 2])})" if count > 2 else ""
 
 
 def _up_to(share: float) -> str:
@@ -217,7 +219,14 @@ def _percent(share: float) -> str:
 
 def _cells(row: TradeRow) -> list[str]:
     times = map(_time, (row.evaluation, row.gradient, row.solve, row.fresh))
-    return [row.name, _share(row.error), _share(row.estimate), *times, f"{row.memory / 1e6:.2f} MB", _regret(row)]
+    return [
+        row.name,
+        _share(row.error),
+        _share(row.estimate),
+        *times,
+        f"{number(1e-6 * row.memory, 3)} MB",
+        _regret(row),
+    ]
 
 
 def _time(seconds: float) -> str:

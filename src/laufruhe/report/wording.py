@@ -29,13 +29,13 @@ def headline(result: Result) -> str:
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         return f"{result.message[:1].upper()}{result.message[1:]}." if result.message else "No design was found."
     if o is None:
-        return "The design as given, evaluated; nothing was to be minimised."
+        return "The initial design was evaluated; there is no objective."
     name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
     if not is_changed(result):
-        return f"{name} of the design as given: {figure(o.value, o.unit)}."
+        return f"{name} of the initial design: {figure(o.value, o.unit)}."
     if math.isinf(o.initial):
         text = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
-        return f"{text}; the design as given stands on a resonance."
+        return f"{text}; the initial design is on a resonance."
     if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     # a zero objective has no relative change
@@ -77,7 +77,7 @@ def fired(result: Result) -> str:
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
     spacing = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
-    sentence, do = f"{lead}, {spacing}.", "fire" if firing else "stand there"
+    sentence, do = f"{lead}, {spacing}.", "fire" if firing else "reach it"
     groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in simultaneous_firings(engine)]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
@@ -135,16 +135,16 @@ def explained(result: Result) -> str:
     """Return the certificate in two sentences."""
     c, o = result.certificate, result.objective
     if result.status is Status.INFEASIBLE:
-        ruled_out = "Every star and firing order allowed was ruled out" if result.problem.phasing is not None else ""
+        ruled_out = "All allowed stars and firing orders are ruled out" if result.problem.phasing is not None else ""
         needed = bool(result.conflict) and {one.name for one in result.reached if one.decisions} >= {*result.conflict}
-        text = f"{ruled_out or 'It is proven that no design keeps the limits named'}."
-        return text + needed * " Each limit that is named is needed for that: without it the others can be met."
+        text = f"{ruled_out or 'It is proven that no design meets the limits named'}."
+        return text + needed * " Without any one of these limits, the others can be met."
     if c is None or o is None:
         return "Nothing was decided, so there is nothing to prove."
     if result.status is Status.FAILED:
         bound = figure(c.lower_bound, o.unit, 6)
         minimum = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
-        return f"{minimum}The design found breaks a limit, so that nothing is proven of it."
+        return f"{minimum}The design found breaks a limit, so it has no proof."
     if c.kind is Proof.NONE:
         return f"{result.message[:1].upper()}{result.message[1:]}."
     if c.kind is Proof.LOCAL or not c.is_useful:
@@ -153,7 +153,7 @@ def explained(result: Result) -> str:
         )
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
-            f"For this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
+            f"At this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
         )
     gap = f"a gap of {share(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     return (
@@ -166,7 +166,8 @@ def explained(result: Result) -> str:
 
 def _conditions(residual: float) -> str:
     if not math.isfinite(residual):
-        return "no search ended at this design, so its optimality conditions are not known"
+        return "the optimality conditions are not known, because no search ended there"
     if residual > LOOSE:
-        return f"the optimality conditions, on which no bound rests, are met to {share(residual)} only"
-    return f"the optimality conditions hold with a residual of {residual:.1e}"
+        return f"the optimality conditions are met to {share(residual)} only; no bound depends on them"
+    how = f"with a residual of {residual:.1e}" if residual else "exactly"
+    return f"the optimality conditions hold {how}"

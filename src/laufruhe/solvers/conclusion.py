@@ -266,7 +266,7 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
     price_floor = max(_PRICE_FLOOR, min(certificate.gap, problem.tolerance))
     limits = limit_values(problem, design.evaluation, proof.prices, design.value, price_floor)
     proven = certificate.kind is Proof.GLOBAL
-    message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
+    message = f"the initial design has no finite loads: {initial.resonance}" if initial.resonance else ""
     if not is_feasible:
         message = violation_message(problem, design.evaluation)
     return Result(

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import html
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import LaufruheWarning, ModelError
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
@@ -33,7 +34,23 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-AS_GIVEN, AS_DECIDED = "as given", "as decided"
+INITIAL, FINAL = "initial", "final"
+OLD_NAMES = {"as given": INITIAL, "as decided": FINAL}
+"""Names of designs up to release 0.3, and the present ones."""
+
+
+def present_name(name: str) -> str:
+    """Return the present name of a design; warn about an old one."""
+    if name in OLD_NAMES:
+        warnings.warn(f"'{name}' is now '{OLD_NAMES[name]}'", LaufruheWarning, stacklevel=3)
+    return OLD_NAMES.get(name, name)
+
+
+class _Designs(dict[str, Evaluation]):
+    def __missing__(self, name: str) -> Evaluation:
+        if name not in OLD_NAMES:
+            raise KeyError(name)
+        return self[present_name(name)]
 
 
 class Status(StrEnum):
@@ -84,9 +101,7 @@ class ResultContent:
                 if math.isfinite(objective.initial)
                 else "on a resonance"
             )
-            lines.append(
-                f"  {objective.name} {f'{objective.value:.6g} {objective.unit}'.rstrip()} (as given {initial})"
-            )
+            lines.append(f"  {objective.name} {f'{objective.value:.6g} {objective.unit}'.rstrip()} (initial {initial})")
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
         lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in relevant_decisions(self.decisions)]
@@ -121,7 +136,7 @@ class Result(ResultContent):
     objective, certificate, decisions, limits
         Numbers of the design; None or empty if there is no design.
     initial, final
-        Evaluations of the baseline and of the optimised design by the exact model.
+        Evaluations of the initial and of the final design by the exact model.
     message
         Reason why there is no design, or a remark for the reader.
     conflict
@@ -174,9 +189,9 @@ class Result(ResultContent):
 
     @property
     def designs(self) -> dict[str, Evaluation]:
-        """Evaluations of baseline and optimised design by name; the baseline only if nothing was optimised."""
-        initial = {AS_GIVEN: self.initial}
-        return initial if self.final is self.initial else initial | {AS_DECIDED: self.final}
+        """Evaluations of the initial and the final design by name; the initial one alone if nothing was decided."""
+        final = {} if self.final is self.initial else {FINAL: self.final}
+        return _Designs({INITIAL: self.initial, **final})
 
     def forces(self, steps: int = STEPS) -> xr.Dataset:
         """Return loads on block, mounts and bearings, and mount deflections, over the crank angle [xarray]."""

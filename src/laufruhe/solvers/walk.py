@@ -1,4 +1,4 @@
-"""Check lower bounds by an independent local search from the optimised design.
+"""Check lower bounds by an independent local search from the final design.
 
 The search ("walk") uses bounds, limits and the exact model only. It shares no code with the method that found the
 design or its proof. A feasible design below the lower bound shows that the bound is wrong.

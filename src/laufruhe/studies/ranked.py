@@ -36,9 +36,9 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
         for k, (name, unit, factor, values) in enumerate(quantities)
     ]
     proven, count = int((data["proof"].values == "global").sum()), data.sizes["point"]
-    decided = "Each at its proven optimum" if proven == count else f"{proven} of {count} at a proven optimum"
+    claim = "All designs are proven optima" if proven == count else f"{proven} of {count} designs are proven optima"
     size = (p.WIDEST / columns, AROUND + ROW * len(names))
-    text = f"{words} {decided}, the best first."
+    text = f"{words} {claim}; the best is first."
     gap = 0.12 if len(quantities) == columns else 0.5
     return p.Picture(data.attrs["title"], text, panels, p.credit(data), size=size, columns=columns, gap=gap)
 
@@ -53,7 +53,7 @@ def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
     marks: list[p.Mark] = [p.Bars(places[known], values[known], 0.62, upright=False)]
     for place, value in zip(places.tolist(), values.tolist(), strict=True):
         is_known = math.isfinite(value)
-        text = number(value, scale=maximum) if is_known else "not told"
+        text = number(value, scale=maximum) if is_known else "no value"
         at = value if is_known else low
         marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, text))
     ticks = [(float(row), each) for row, each in enumerate(names)]

@@ -25,14 +25,14 @@ from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.result import Result
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept_report import by_point
+from laufruhe.studies.swept_report import NOTHING_OPEN, by_point
 from laufruhe.studies.text import Text
 
-AS_GIVEN, FAILED = "as given", "failed"
+FAILED = "failed"
 _WORDS = {
-    "objective_given": "{} of the design as given",
-    "objective": "{} of the design as decided",
-    "lower_bound": "{} that no design falls below",
+    "objective_given": "{} of the initial design",
+    "objective": "{} of the final design",
+    "lower_bound": "lower bound of the {}",
 }
 HIGHEST_ORDER = 12.0
 _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
@@ -47,22 +47,21 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
     if result.objective is None:
         return evaluate_only(problem, to_start_from=True), str(result.status), "none"
     is_closed = not problem.decisions and problem.phasing is None
-    proof = str(result.certificate.kind) if result.certificate else AS_GIVEN if is_closed else "none"
+    proof = str(result.certificate.kind) if result.certificate else NOTHING_OPEN if is_closed else "none"
     return result, str(result.status), proof
 
 
 Further: TypeAlias = Callable[[Evaluation], float]
-"""A further quantity of a design; `ModelError` says why it has none."""
+"""Further quantity of a design; `ModelError` states why it has none."""
 
 
 def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
     """Return the record of a scene [SI], NaN for missing values.
 
-    Its metric and the unit of that, status and proof ("as given" where nothing was open), the
-    objective as given, as decided, and what no design falls below; mean and maximum force by
-    mount [N], means over the operating points by their weights; what was decided, and forces by
-    order; how limits stand, and their shadow prices, by name; and the design in further quantities,
-    or why it has none.
+    Its metric and the unit of that, status and proof ("nothing open" without decisions), initial and
+    final objective, and lower bound; mean and maximum force by mount [N], means over the operating
+    points by their weights; values of the decisions, and forces by order; values of the limits and
+    their shadow prices, by name; and further quantities, or the reason why one has no value.
     """
     result, status, proof = decide_scene(problem)
     objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
@@ -156,7 +155,7 @@ def dataset(
     for name in _ON_MOUNTS:
         words = f"{name.replace('_', ' ')} of the mount's force"
         variables[name] = variable(("point", "mount"), _table(name, records, mounts), words, "N")
-    in_unit = {"long_name": "value decided, in decision_unit"}
+    in_unit = {"long_name": "final value, in decision_unit"}
     coords = {
         "mount": mounts,
         "decision": list(units),
@@ -178,15 +177,15 @@ def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple
     units = {name: of for record in records for name, of in record["limit_units"].items()}
     initial, final = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
     variables = {
-        "order_force_given": variable(("point", "order"), initial, "amplitude by order, as given", "N"),
-        "order_force": variable(("point", "order"), final, "amplitude by order, as decided", "N"),
+        "order_force_given": variable(("point", "order"), initial, "amplitude by order, initial design", "N"),
+        "order_force": variable(("point", "order"), final, "amplitude by order, final design", "N"),
     }
     coords: dict[str, Any] = {"order": [float(order) for order in orders]}
     if not units:
         return variables, coords
     value, price = (_table(name, records, list(units)) for name in ("limit_value", "shadow_price"))
-    words = "fall of the metric for a unit by which the limit is relaxed, in price_unit"
-    variables["limit_value"] = (("point", "limit"), value, {"long_name": "what is limited, in limit_unit"})
+    words = "decrease of the metric per unit by which the limit is relaxed, in price_unit"
+    variables["limit_value"] = (("point", "limit"), value, {"long_name": "value of the limited measure, in limit_unit"})
     variables["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
     prices = [f"{unit or '1'} per {of}" if of else unit for of in units.values()]
     return variables, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
@@ -201,7 +200,7 @@ def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[st
 class SweptPart(Part):
     """Cases at every combination of the swept values."""
 
-    metric: QuantityName | None = f.optional("What is compared, in place of the objective of the problem files.")
+    metric: QuantityName | None = f.optional("Metric of the comparison; replaces the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:

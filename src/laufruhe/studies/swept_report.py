@@ -20,6 +20,8 @@ MOST_ROWS, MOST_DOTS = 80, 40
 NEGLIGIBLE = 1e-9
 # width of a tick's letter [inch], and letters per line
 LETTER, LETTERS = 0.078, 18
+NOTHING_OPEN = "nothing open"
+"""Proof of a scene without decisions."""
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
 
@@ -52,7 +54,7 @@ def readable_metric(data: xr.Dataset) -> xr.Dataset:
 
 def claim_of(data: xr.Dataset) -> str:
     """Return the claim that holds for all decided designs."""
-    decided = (data["proof"].values != "as given") & np.isfinite(data["objective"].values)
+    decided = (data["proof"].values != NOTHING_OPEN) & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
 
 
@@ -69,7 +71,7 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
     metric, unit = data.attrs["metric"], data["objective"].attrs["units"]
     in_unit = f" [{unit}]" if unit else ""
     head = ["case", *named, *(with_unit(data[name]) for name in swept_names(data))]
-    head += [f"{metric}, as given{in_unit}", f"at the optimum{in_unit}", f"lower bound{in_unit}", "change"]
+    head += [f"{metric}, initial{in_unit}", f"final{in_unit}", f"lower bound{in_unit}", "change"]
     head += [*(["largest mount force [N]"] if data.sizes["mount"] else []), "proof"]
     rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MOST_ROWS))]
     return [marked_table(head, rows, data.sizes["point"] - len(rows))]
@@ -79,14 +81,14 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     initial, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
     best = without_rounding(best, initial)
     proof, status = str(row["proof"].item()), str(row["status"].item())
-    decided = proof != "as given"
+    decided = proof != NOTHING_OPEN
     change = percent(best / initial - 1.0) if decided and initial and best == best else NOTHING
     named = (row[name].item() for name in columns)
     cells = [number(value) if isinstance(value, float) else str(value) for value in named]
     cells += [number(initial), number(best) if decided else NOTHING, number(bound), change]
     if row.sizes["mount"]:
         cells.append(number(float(row["maximum"].max())))
-    cells.append("as given" if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
+    cells.append(NOTHING_OPEN if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
     optimum = bool(row["optimum"].item()) if "optimum" in row.coords else False
     return [f"**{cell}**" for cell in cells] if optimum else cells
 
@@ -159,10 +161,10 @@ def _with_unit(values: xr.DataArray, value: Any) -> str:
 
 
 def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Picture:
-    """Draw bars as given and at the optimum; one bar for points with nothing open, or where `once` says so."""
+    """Draw initial and final bars; one bar for points without decisions, or where `once` is true."""
     data = readable_metric(data)
     count = data.sizes["point"]
-    alone = data["proof"].values == "as given"
+    alone = data["proof"].values == NOTHING_OPEN
     single = alone if once is None else np.ones(count, dtype=bool)
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
     initial, best = data["objective_given"].values, data["objective"].values
@@ -187,7 +189,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
         )
         for row in rows
     ]
-    grey = "no shafts" if once is not None else "as given"
+    grey = "no shafts" if once is not None else "initial"
     legend = [p.Bars(colour="before", label=grey)] if plain.any() or not single.all() else []
     legend += [p.Bars(label=claim_of(data))] if not plain.all() else []
     lines = max(str(label).count("\n") for label in labels)

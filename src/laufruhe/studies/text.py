@@ -58,4 +58,4 @@ def statement_table(verdicts: Sequence[Verdict]) -> list[Text]:
         [v.statement, v.paper, value, "yes" if v.agrees else "**no**", v.why]
         for v, value in zip(verdicts, ours, strict=True)
     ]
-    return [marked_table(["what was said of", "said", "here", "confirmed", "why"], rows)]
+    return [marked_table(["statement", "source", "computed", "confirmed", "reason"], rows)]

@@ -163,8 +163,8 @@ def traded_part(problem: Problem) -> Problem:
 
 def _left_out(problem: Problem) -> tuple[str, ...]:
     reasons = {
-        f"Of {len(problem.ranks)} objectives in order the first is traded.": len(problem.ranks) > 1,
-        **{f"Traded is the drawing, without {extra.words}.": True for extra in problem.extras},
+        f"The trade takes the first of {len(problem.ranks)} objectives.": len(problem.ranks) > 1,
+        **{f"The trade takes the drawing, without {extra.words}.": True for extra in problem.extras},
     }
     return tuple(line for line, holds in reasons.items() if holds)
 

@@ -217,7 +217,7 @@ def test_shaft_of_three_cylinders_by_mass(mass: float, fall: float) -> None:
 @pytest.mark.parametrize(
     ("force", "following", "worth", "why"),
     [
-        (80.0, 100.0, True, "beside next"),
+        (80.0, 100.0, True, "against next"),
         (80.0, 81.0, False, "as smoothly"),
         (80.0, 70.0, False, "smoother"),
         (88.0, 200.0, False, "slight"),

@@ -147,7 +147,7 @@ def test_readings_stand_side_by_side() -> None:
     in_one = xr.Dataset(coords=judge_statements([table], {"": {"x": 3.0}}))
     (shown,) = rows(in_two)
     assert isinstance(shown, Table)
-    assert list(shown.head) == ["statement", "the source", "as printed", "confirmed", "as meant", "confirmed", "why"]
+    assert list(shown.head) == ["statement", "source", "as printed", "confirmed", "as meant", "confirmed", "reason"]
     assert shown.rows == [["s", "3", "2", "**no**", "3", "yes", "as printed: 2 found<br>as meant: 3 found"]]
     told = "as printed: 1 of 2 statements are confirmed. as meant: 2 of 2 statements are confirmed."
     assert count_confirmed([in_one, in_two]) == told

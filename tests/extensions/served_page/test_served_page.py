@@ -442,11 +442,11 @@ def test_a_ranking_says_what_it_is_about(page: Page) -> None:
         page.goto(address)
         settled(page)
         said = page.locator("fieldset:has(#ranking) .said")
-        expect(said).to_have_text("Best cranks found, all else decided for each:")
+        expect(said).to_have_text("Best cranks found, each with its best values of all other open numbers:")
         slide(page, "engine.rod_ratio", 0.2)
         expect(said).to_have_text("Ranked for earlier settings:")
         settled(page)
-        expect(said).to_have_text("Best cranks found, all else decided for each:")
+        expect(said).to_have_text("Best cranks found, each with its best values of all other open numbers:")
 
 
 def test_a_trace_that_changes_is_solved_again(page: Page, tmp_path: Path) -> None:

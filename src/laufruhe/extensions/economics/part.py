@@ -17,7 +17,7 @@ from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.present import picture as p
-from laufruhe.present.numbers import percent
+from laufruhe.present.numbers import fixed, percent
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_alternating_loads
 from laufruhe.studies.part import Part, Record, variable
@@ -31,17 +31,17 @@ LINE = 0.052
 
 
 _AT_LIMITS = {
-    "force": ("least objective", "{}"),
-    "lower_bound": ("what no design falls below", "{}"),
+    "force": ("minimum of the objective", "{}"),
+    "lower_bound": ("lower bound of the objective", "{}"),
     "gap": ("relative gap of the proof", "1"),
     "mass": ("mass on the shafts", "kg"),
-    "price": ("fall of the least objective per kilogram more", "{} / kg"),
+    "price": ("decrease of the objective per kilogram of shaft mass", "{} / kg"),
 }
 _FREE = {
-    "optimum": ("force", "least objective whatever the shafts weigh", "{}"),
-    "optimum_bound": ("lower_bound", "what no design falls below, whatever the shafts weigh", "{}"),
-    "optimum_mass": ("mass", "mass on the shafts at the least objective", "kg"),
-    "optimum_counterpart": ("counterpart", "objective of that design with its static part, or without", "{}"),
+    "optimum": ("force", "minimum of the objective without a mass limit", "{}"),
+    "optimum_bound": ("lower_bound", "lower bound of the objective without a mass limit", "{}"),
+    "optimum_mass": ("mass", "shaft mass at that minimum", "kg"),
+    "optimum_counterpart": ("counterpart", "objective of that design with or without its static part", "{}"),
 }
 
 
@@ -86,7 +86,7 @@ class Economics(Part):
 
     kind: Literal["economics"]
     alternating: bool = f.optional(
-        "Whether shafts are judged by loads without their mean over the cycle, which no shaft can balance.", True
+        "Judge shafts by loads without their mean over the cycle, which no shaft can balance.", True
     )
     mass_limits: list[f.Mass] = f.required("Largest masses of the shafts, ascending: the points of the front.")
     builds: list[BuildTable] = Field(min_length=1)
@@ -176,7 +176,7 @@ class Economics(Part):
             "shafts": variable("build", [record["shafts"] for record in records], "balancer shafts"),
             "cylinders": ("build", [record["cylinders"] for record in records], {"units": "1"}),
             "standing": ("build", [PLAIN, *(SHAFTS for _ in self.builds), *(NEXT for _ in following)]),
-            "claim": ("build", [claim.says or "" for claim in claims], {"long_name": "what the source says"}),
+            "claim": ("build", [claim.says or "" for claim in claims], {"long_name": "claim of the source"}),
             "claimed_fall": ("build", [claim.falls_by or np.nan for claim in claims], {"units": "1"}),
             "claimed_against": ("build", [claim.against for claim in claims]),
             "claimed_where": ("build", [claim.where for claim in claims]),
@@ -191,13 +191,13 @@ class Economics(Part):
         evaluate_design = {worth.build: worth for worth in worths(data)}
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
-                f"{data.attrs['counterpart']} [{unit}]", "beside plain", "worth building"]  # fmt: skip
+                f"{data.attrs['counterpart']} [{unit}]", "change from plain", "worth building"]  # fmt: skip
         rows = []
         for name in data["build"].values:
             row = data.sel(build=name)
             force, worth = float(row["optimum"]), evaluate_design.get(str(name))
             label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == NEXT else str(name)
-            cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
+            cells = [label, str(int(row["shafts"])), fixed(float(row["optimum_mass"]), 2), number(force)]
             change = NOTHING if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
             rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
@@ -221,10 +221,10 @@ class Economics(Part):
         )
         legend = [p.Line(colour=colour, label=name, width=2.5) for name, colour in colours.items()]
         legend.append(p.Line(dash=p.DASHES[0], width=1.2, label="more cylinders, no shafts, equal power"))
-        gap = f"no design lies lower by more than {100.0 * float(data['gap'].max()):.1g} %"
-        words = f"Dots: least force for this mass; diamonds: whatever they weigh. All are proven optima: {gap}. "
-        words += "Crank weights are free."
-        credit = p.credit(data)[:-1] + "; filled dots: no other point has less force, mass and shafts."
+        words = "Dots: smallest force for this mass; diamonds: smallest force without a mass limit. "
+        words += f"All are proven optima with a gap of at most {100.0 * float(data['gap'].max()):.1g} %. "
+        words += "The mass of crank weights does not count."
+        credit = p.credit(data)[:-1] + "; filled dots: no other point has less force with no more mass and shafts."
         return p.Picture(data.attrs["title"], words, [fronts], credit, (7.2, 4.6), legend=legend)
 
 
@@ -292,7 +292,11 @@ def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str,
         for k in range(force.shape[1]):
             beaten = min(rivals[:, :k].min(initial=np.inf), fewer[:, k].min(initial=np.inf))
             on_front[b, k] = force[b, k] <= rivals[:, k].min() and force[b, k] < (1.0 - SAME) * beaten
-    return ("build", "mass_limit"), on_front, {"long_name": "whether no other design is better in every respect"}
+    return (
+        ("build", "mass_limit"),
+        on_front,
+        {"long_name": "true if no other design is better in every respect"},
+    )
 
 
 def _with_shafts(data: xr.Dataset) -> list[str]:
@@ -305,8 +309,10 @@ def _front_rows(data: xr.Dataset) -> list[Text]:
     for limit, here in data.sel(build=built).groupby("mass_limit"):
         best = zip(here["force"].values.ravel(), here["efficient"].values.ravel(), strict=True)
         rows.append([f"{limit:g}", *(f"**{force:.1f}**" if efficient else f"{force:.1f}" for force, efficient in best)])
-    words = f"Least {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, every "
-    words += f"number proven to {100.0 * float(data['gap'].max()):.1g} %; bold: nothing else has less force, mass and "
+    words = (
+        f"Smallest {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, proven "
+    )
+    words += f"to {100.0 * float(data['gap'].max()):.1g} %. Bold: no other design has less force with no more mass and "
     return [words + "shafts.", marked_table(["mass [kg]", *built], rows)]
 
 

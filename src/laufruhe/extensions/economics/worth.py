@@ -45,7 +45,7 @@ LIMIT_NAME = "mass on shafts"
 PLAIN, SHAFTS, NEXT = "plain", "with shafts", "more cylinders"
 """Roles of engines in a comparison; the first is also the name of the engine without shafts."""
 Judgement: TypeAlias = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
-_ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
+_ALLOWED = f"tolerance {100.0 * PRINTED_FALL:.0f} points: effect of the unprinted rod ratio and gas trace"
 
 
 class FrontPoint(NamedTuple):
@@ -134,16 +134,16 @@ def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
     following = next_one.name
     further, ratio = 1.0 - engine.force / fewer, engine.force / next_one.force
     if further < 0.0:
-        why = f"fewer shafts do better: {percent(-further)} beside the best of them"
+        why = f"fewer shafts are better: {percent(-further)} against the best of them"
     elif further < NOTICEABLE:
         size = "negligible" if further < NEGLIGIBLE else "slight"
-        why = f"{size}: {percent(-further)} beside the best with fewer shafts"
+        why = f"{size}: {percent(-further)} against the best with fewer shafts"
     elif ratio > 1.0 + NEGLIGIBLE:
         why = f"{following} without shafts run smoother: {percent(1.0 / ratio - 1.0)}"
     elif ratio >= 1.0 - NEGLIGIBLE:
         why = f"{following} without shafts run as smoothly: {percent(1.0 / ratio - 1.0)}"
     else:
-        why = f"{percent(-further)}, and {percent(ratio - 1.0)} beside {following} without shafts"
+        why = f"{percent(-further)}, and {percent(ratio - 1.0)} against {following} without shafts"
     worth = further >= NOTICEABLE and ratio < 1.0 - NEGLIGIBLE
     return Worth(engine.name, 1.0 - engine.force / plain.force, further, ratio, worth, why)
 
@@ -155,7 +155,7 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
     for name in engines:
         row = data.sel(build=name)
         says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
-        statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
+        statement = f"{name}: against {against}" + (f" ({where})" if where else "")
         by_claim: list[Verdict] = []
         fall = 1.0 - engines[name].force / engines[against].force
         if says:
@@ -173,10 +173,10 @@ def _judged(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, s
     # whether a judgement holds, and by which rule
     if says == "negligible":
         maximum = 1.0 - engine.bound / against.force
-        return maximum < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
+        return maximum < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %, proven for all sizes of these shafts"
     if says == "noticeable":
         return 1.0 - engine.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
     if says == "better":
-        return engine.force < against.bound, "its force lies under the other's lower bound"
+        return engine.force < against.bound, "its force is below the other's lower bound"
     judgement = _worth(engines, engine)
     return judgement.worth == (says == "worth building"), f"W3: {judgement.why}"

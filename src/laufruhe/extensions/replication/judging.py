@@ -65,7 +65,8 @@ def rows(data: xr.Dataset) -> list[Text]:
     if not data.sizes.get("statement"):
         return []
     readings = [str(name) for name in data["by_reading"].values]
-    head = ["statement", "the source", *(cell for name in readings for cell in (name or "here", "confirmed")), "why"]
+    columns = (cell for name in readings for cell in (name or "computed", "confirmed"))
+    head = ["statement", "source", *columns, "reason"]
     return [marked_table(head, [_row(data.isel(statement=k), readings) for k in range(data.sizes["statement"])])]
 
 

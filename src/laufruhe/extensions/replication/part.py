@@ -1,4 +1,4 @@
-"""A source replicated: its cases computed, its statements judged, its figures drawn, all told by the study file."""
+"""Replication of a source: its cases are computed, its statements judged and its figures drawn, by a study file."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class Replication(Part):
     """Part of a paper or textbook: what it says beside what is computed here."""
 
     kind: Literal["replication"]
-    says: str = f.optional("What the source says, in a sentence.", "")
+    says: str = f.optional("Statement of the source, in a sentence.", "")
     cases: list[ReplicaCase] = Field(default_factory=list)  # type: ignore[assignment]
     numbers: dict[str, Any] = f.optional("Numbers by name: single numbers, lists, expressions or grids.", {})
     problems: dict[str, dict[str, Any]] = f.optional(
         "Tables of problem files, numbers in braces; `like` names one to start from.", {}
     )
-    quantities: dict[str, str | QuantityQuery] = f.optional("What is computed for every case, by name.", {})
+    quantities: dict[str, str | QuantityQuery] = f.optional("Quantities computed for every case, by name.", {})
     define: dict[str, str] = f.optional("Expressions that several others use.", {})
     statements: list[StatementTable] = Field(default_factory=list)
     picture_: PictureTable | None = Field(default=None, alias="picture")
@@ -178,7 +178,7 @@ class Replication(Part):
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
         """Return the source's words, and every statement beside our value."""
-        lead = [f"The source: {data.attrs['says']}"] if data.attrs["says"] else []
+        lead = [f"Source: {data.attrs['says']}"] if data.attrs["says"] else []
         return [*lead, *rows(data)]
 
     @staticmethod

@@ -34,7 +34,7 @@ def figure(result: Result) -> Figure:
         _lines(drawn.panels[1], degrees, 1e-5 * chambers.pressure)
         _lines(drawn.panels[2], degrees, chambers.torque)
         drawn.panels[2].plot(degrees, chambers.torque.sum(axis=0), color=INK, linewidth=1.6)
-    words = ("volume over\nthe least [cm³]", "pressure over\nthe crankcase [bar]", "torque [N m]")
+    words = ("volume above\nminimum [cm³]", "gauge\npressure [bar]", "torque [N m]")
     for axes, label in zip(drawn.panels, words, strict=False):
         axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
         axes.set(xlim=(0.0, degrees[-1]), ylabel=label)
@@ -44,7 +44,7 @@ def figure(result: Result) -> Figure:
     drawn.panels[-1].set_xlabel("angle of the eccentric shaft [°]")
     legend = [entry(f"chamber {k + 1}", color=colour, linewidth=2.0) for k, colour in enumerate(COLOURS)]
     legend += [] if chambers.torque is None else [entry("all", color=INK, linewidth=2.0)]
-    lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; each chamber fires a turn after the one before."
+    lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; the chambers fire one turn after another."
     return finish_page(drawn, result, "Chambers of a rotor", lines, legend)
 
 

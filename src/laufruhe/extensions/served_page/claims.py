@@ -30,7 +30,7 @@ class ClaimKind(StrEnum):
     HELD = "held"
     """A simpler problem, decided at few crank angles."""
     GIVEN = "given"
-    """The design as given; nothing was decided."""
+    """The initial design; nothing was decided."""
     NO_DESIGN = "no design"
 
 
@@ -137,13 +137,13 @@ def preview_claim(
 
 
 def initial_claim(position: int, problem: Problem, value: float | None, limits: Iterable[LimitValue]) -> Claim:
-    """Return the claim about the design as given, where nothing follows sliders."""
+    """Return the claim about the initial design, where nothing follows sliders."""
     if value is None or not math.isfinite(value):
-        words = "No objective" if value is None else "The design as given stands on a resonance"
+        words = "No objective" if value is None else "The initial design is on a resonance"
         return Claim(ClaimKind.GIVEN, position, "", words, breaks=breaks_words(limits))
     lead = figure(value, problem.objective_unit or "")
-    words = f"{problem.objective_name} of the design as given"
-    return Claim(ClaimKind.GIVEN, position, lead, words, value, "the design as given", breaks_words(limits))
+    words = f"{problem.objective_name} of the initial design"
+    return Claim(ClaimKind.GIVEN, position, lead, words, value, "the initial design", breaks_words(limits))
 
 
 def conflict_claim(

@@ -42,8 +42,8 @@ def figure(result: Result) -> Figure:
     ]
     legend += [entry("main order", color=INK, linewidth=1.4), entry("other order", color=FAINT, linewidth=0.6)]
     legend.append(entry_of_dots("vector sum of an order and mode", color=INK, markersize=6.0))
-    which = "of the design as decided" if is_changed(result) else "as given"
-    lines = f"Natural modes {which}, and where an order meets them: the larger the dot, the more cylinders add up."
+    which = "of the final design" if is_changed(result) else "of the initial design"
+    lines = f"Natural modes {which}, and critical speeds. The area of a dot grows with its vector sum."
     return finish_page(drawn, result, "Torsional vibration of the crankshaft", lines, legend)
 
 
@@ -52,7 +52,7 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
     axes.axhline(0.0, color=FAINT, linewidth=0.7)
     for m in range(min(MOST_MODES, facts.modes.shapes.shape[1])):
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
-    axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest of a mode is 1")
+    axes.set(ylim=(-1.1, 1.1), ylabel="angle, scaled to 1")
     every = -(-len(names) // MOST_NAMES)
     labels = [fit_line(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
     axes.set_xticks(list(places), labels, rotation=60, ha="right", rotation_mode="anchor")

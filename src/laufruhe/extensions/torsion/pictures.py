@@ -4,11 +4,11 @@ from laufruhe.present.pictures import ResultPicture
 
 MODES = ResultPicture(
     "twist_modes",
-    "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
+    "Torsional natural modes of the crankshaft, and the speeds at which orders meet them.",
     "laufruhe.extensions.torsion.modes_picture",
 )
 RESPONSE = ResultPicture(
     "twist_response",
-    "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",
+    "Torque in the crankshaft over crank speed, and speed ranges barred by a limit.",
     "laufruhe.extensions.torsion.response_picture",
 )

@@ -22,7 +22,7 @@ MOST = 40.0
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Half of the peak to peak torque: thick in the section that has most, thin in all others of the last design."""
+    """Draw half of the peak to peak torque: thick for the largest section, thin for each section of the last design."""
     low, high = speed_range(result)
     speeds = speeds_between(result.final, low, high)
     drawn = page(1, 1, (7.6, 3.6))
@@ -39,16 +39,16 @@ def figure(result: Result) -> Figure:
         k = int(np.argmax(np.where(np.isfinite(largest), largest, 0.0)))
         worst = f": at most {number(float(largest[k]), 3)} N m at {number(speeds[k] * RPM, 3)} rpm"
         legend.append(one.entry(f"{worst}, {names[int(np.argmax(torque[k]))]}"))
-    legend.append(entry("each section", color=FAINT, linewidth=0.6))
+    legend.append(entry("each section, last design" if len(series) > 1 else "each section", color=FAINT, linewidth=0.6))
     bars = barred_ranges(result, result.final)
     for curve in bars:
         axes.axvspan(curve.lowest * RPM, curve.highest * RPM, color=LIMIT, alpha=0.13, linewidth=0)
-    legend += [Patch(facecolor=LIMIT, alpha=0.13, label="barred by a limit")] if bars else []
+    legend += [Patch(facecolor=LIMIT, alpha=0.13, label="speeds barred by a limit")] if bars else []
     envelope = np.concatenate([torque.max(axis=1) for torque in torques])
     finite = envelope[np.isfinite(envelope)]
     top = min(float(finite.max(initial=1.0)), MOST * float(np.median(finite)) if len(finite) else 1.0)
     axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
              ylabel="alternating torque [N m]")  # fmt: skip
     mark_points(axes, result)
-    lines = "Half of the peak to peak torque in the section that has most of it, steady at every speed."
-    return finish_page(drawn, result, "Twist of the crankshaft over speed", lines, legend)
+    lines = "Half of the peak to peak torque in the most loaded section, in steady state at every speed."
+    return finish_page(drawn, result, "Torque in the crankshaft over speed", lines, legend)

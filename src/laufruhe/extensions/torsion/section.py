@@ -21,35 +21,35 @@ from laufruhe.extensions.torsion.facts import (
 )
 from laufruhe.extensions.torsion.physics import absorber_heat, chain_of
 from laufruhe.present.measures import is_changed
-from laufruhe.present.numbers import DASH, RPM, number
+from laufruhe.present.numbers import DASH, RPM, fixed, number
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import FINAL, INITIAL, Result
 
 MOST_MODES, MOST_CRITICALS = 4, 8
 
 
 def _tables(result: Result) -> list[Table]:
     reach = speed_range(result)
-    before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
-    criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if is_changed(result) else [])]
-    return [_modes(result, after), *criticals, _barred(result)]
+    initial, final = facts_of(result.initial, *reach), facts_of(result.final, *reach)
+    criticals = [_criticals(initial, INITIAL), *([_criticals(final, FINAL)] if is_changed(result) else [])]
+    return [_modes(result, final), *criticals, _barred(result)]
 
 
 def _modes(result: Result, facts: TorsionFacts) -> Table:
     names = [disc.name for disc in chain_of(result.final.engine).discs]
     modes = range(min(MOST_MODES, len(facts.modes.frequencies)))
-    swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
+    swings = [[fixed(swing, 3, "+") for swing in shape] for shape in facts.modes.shapes.T]
     rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in modes)
     rest = len(facts.modes.frequencies) - len(modes)
     more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
-    note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
+    note = f"Undamped modes. Angle of every disc, scaled to 1 at the largest of each mode.{more}"
     return Table(
         ("mode", "Hz", *names), rows, title="Natural modes of the crankshaft", note=note, file="crankshaft-modes"
     )
 
 
-def _criticals(facts: TorsionFacts, which: str) -> Table:
+def _criticals(facts: TorsionFacts, design: str) -> Table:
     rows = tuple(
         (number(one.speed * RPM), f"{one.order:g}" + (" main" if one.is_main else ""), f"{one.mode}",
          number(one.vector_sum, 3, 1.0), DASH if one.torque is None else number(one.torque))
@@ -57,13 +57,14 @@ def _criticals(facts: TorsionFacts, which: str) -> Table:
     )  # fmt: skip
     main = ", ".join(f"{order:g}" for order in facts.main)
     note = (
-        f"The {len(rows)} that twist it most of {len(facts.criticals)} in the range looked at. Vector sum: swings "
-        f"of the throws, each when its cylinder fires, added up. Main orders ({main}) have the same for every firing "
-        "order. Torque: amplitude of that order in the section that it loads most."
+        f"The {len(rows)} critical speeds with the largest torque, of {len(facts.criticals)} in the speed range. "
+        "Vector sum: sum of the swings of the throws, with the phases of their firings. "
+        f"Main orders ({main}) have the same vector sum for every firing order. "
+        "Torque: amplitude of the order in the section with the largest torque."
     )
     head = ("rpm", "order", "mode", "vector sum", "torque [N m]")
-    sheet = f"strongest-critical-speeds-{which.replace(' ', '-')}"
-    return Table(head, rows, title=f"Critical speeds of the crankshaft {which}", note=note, file=sheet)
+    sheet = f"strongest-critical-speeds-{design}"
+    return Table(head, rows, title=f"Critical speeds of the crankshaft, {design} design", note=note, file=sheet)
 
 
 def _barred(result: Result) -> Table:
@@ -72,12 +73,12 @@ def _barred(result: Result) -> Table:
         for barred in barred_ranges(result, result.final)
     )
     low, high = (number(speed * RPM) for speed in speed_range(result))
-    note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
+    note = f"Speeds between {low} and {high} rpm at which the limit is exceeded, with the load of the operating points."
     return Table(("limit", "rpm"), rows, title="Barred speed ranges", note=note, file="barred-speeds")
 
 
 def _record(result: Result) -> Mapping[str, Any]:
-    """Return the numbers of the crankshaft as decided; speeds of the crank in rad/s."""
+    """Return the torsional data of the final crankshaft; crank speeds in rad/s."""
     design, problem = result.final, result.problem
     chain, reach = chain_of(design.engine), speed_range(result)
     facts = facts_of(design, *reach)
@@ -139,7 +140,7 @@ def _critical_speeds(result: Result) -> Table:
 
 SECTION = Section(
     "torsion", is_twisted, _tables, _record,
-    ("crankshaft-modes", "strongest-critical-speeds-as-given", "strongest-critical-speeds-as-decided", "barred-speeds"),
+    ("crankshaft-modes", "strongest-critical-speeds-initial", "strongest-critical-speeds-as-decided", "barred-speeds"),
     {
         "twist-response": (is_twisted, _twist_response),
         "twist-modes": (is_twisted, _twist_modes),

@@ -77,11 +77,11 @@ class Page {
 
   buttons() {
     const { given, model } = this, old = { isOld: true };
-    this.best = button("optimum", this.back(), "The design that was decided", () => this.set(this.optimum));
+    this.best = button("optimum", this.back(), "The final design", () => this.set(this.optimum));
     this.best.hidden = !this.optimum;
     this.undo = button("undo", "Undo", "Ctrl+Z", () => this.set(this.history.undo(), old));
     this.redo = button("redo", "Redo", "Ctrl+Shift+Z", () => this.set(this.history.redo(), old));
-    const start = button("given", "As given", "Where the file starts", () => this.set(this.given));
+    const start = button("given", "Initial design", "The values in the file", () => this.set(this.given));
     start.hidden = !given;
     const link = button("link", "Copy link", "The address holds the design", () => this.copyLink());
     const save = button("save", "Save as TOML", "A problem file of this design, for laufruhe evaluate", () => this.save());
@@ -90,7 +90,7 @@ class Page {
     return element("div", { class: "live-buttons", role: "toolbar", "aria-label": "Designs" }, ...made);
   }
 
-  /** The button back to the decided design. */
+  /** Words of the button back to the final design. */
   back() {
     return this.reference?.isProven ? "Back to the optimum" : "Back to the best design";
   }
@@ -143,8 +143,8 @@ class Page {
   notes() {
     const { model } = this, hasSliders = model.sliders.length > 0;
     const kept = this.optimum
-      ? "the design that was decided, as rings on the sliders do; bars on them show the one given"
-      : "the design as given, as bars on the sliders do";
+      ? "the final design, as do rings on the sliders; bars on the sliders show the initial design"
+      : "the initial design, as do bars on the sliders";
     const notes = [
       model.whyNot,
       this.given && hasSliders && `Thin grey lines and black marks show ${kept}.`,
@@ -160,10 +160,9 @@ class Page {
     this.error = difference(this.model);
     const size = this.error < 1e-15 ? "less than 1e-15" : exponential(this.error, 2);
     const words = [
-      "This page computes its forces itself:",
-      `checked against the exact model at ${designsOf(this.model).length} designs as it opened,`,
-      `they differ by ${size} of their size at most.`,
-      this.error > 1e-6 ? "That is more than the figures shown can bear: take the numbers of laufruhe evaluate." : "",
+      "This page computes its forces in the browser.",
+      `At ${designsOf(this.model).length} designs they differ from the exact model by at most ${size} of their size.`,
+      this.error > 1e-6 ? "This error is too large for the digits shown; use the numbers of laufruhe evaluate." : "",
     ];
     this.accuracy.textContent = words.join(" ").trim();
     return this.error;
@@ -247,7 +246,7 @@ class Page {
 
   sentence() {
     const broken = this.standingSo(false), isKnown = !this.standingSo(null).length;
-    const kept = this.found.limits.length ? `All limits${isKnown ? "" : " that follow"} are kept.` : "";
+    const kept = this.found.limits.length ? `All limits${isKnown ? "" : " that can be followed"} are met.` : "";
     const limits = broken.length ? `Broken: ${broken.join(", ")}.` : kept;
     return `${this.model.objective.name} ${this.value.textContent}. ${limits}`;
   }
@@ -324,7 +323,7 @@ class Page {
   /**
    * Set limits, reference and design for other settings of the same loads, in one frame.
    * @param {{limits: object[], reference: {value: number, name: string, isProven: boolean} | null,
-   *   decided: object | null, follows: boolean}} told limits, what designs are compared with, the design that was decided,
+   *   decided: object | null, follows: boolean}} told limits, what designs are compared with, the final design,
    *   and whether it is shown
    */
   update({ limits, reference, decided, follows }) {

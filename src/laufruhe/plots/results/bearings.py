@@ -69,7 +69,7 @@ def figure(result: Result) -> Figure:
     some = f"The {len(chosen)} most loaded of {len(names)} bearings. " if len(chosen) < len(names) else ""
     lines = f"Force of the crankshaft at {point_name(result, k)}, seen from the front; its axes stand upright at 0°."
     dot = entry_of_dots("at 0°", color=INK, markersize=4.0)
-    wear: Artist = Patch(color=ORANGE, alpha=0.6, label="where it wears" + (", as decided" if len(series) > 1 else ""))
+    wear: Artist = Patch(color=ORANGE, alpha=0.6, label="wear" + (", final design" if len(series) > 1 else ""))
     legend = [*(one.entry() for one in series), dot, wear]
     return finish_page(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
 

@@ -41,7 +41,7 @@ def figure(result: Result) -> Figure:
     _modes(axes, facts)
     mark_points(axes, result)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
-    which = "of the design as decided" if is_changed(result) else "as given"
+    which = "of the final design" if is_changed(result) else "of the initial design"
     lines = f"Natural frequencies {which}, and the orders that excite each most.{stiffness_sentence(facts)}"
     legend = [*order_entries(facts, AFTER), critical, *legend, *_with_fluid(axes, facts)]
     return finish_page(drawn, result, "Critical speeds", lines, legend)
@@ -72,5 +72,5 @@ def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) ->
     for edge in edges:
         axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
     ends = [entry("limit", color=LIMIT, alpha=0.5, linewidth=2.4)]
-    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="to be free of natural frequencies")]
+    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="band that must have no natural frequency")]
     return [*(ends if edges else []), *(forbidden if bands else [])]

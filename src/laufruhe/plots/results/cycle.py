@@ -1,4 +1,4 @@
-"""Forces and moments over the crank angle of a cycle, as given and as decided."""
+"""Forces and moments over the crank angle of a cycle, initial and final."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ _LEGEND: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
 class Row:
     """Content of one panel: curves by name, shape (designs, angles), and the ends of its axis.
 
-    What is too small to be drawn is told.
+    `left_out` states the size of a load that is too small to draw.
     """
 
     label: str

@@ -1,4 +1,4 @@
-"""The engine to scale, what was decided of it marked."""
+"""The engine to scale, with optimised parts marked."""
 
 from __future__ import annotations
 

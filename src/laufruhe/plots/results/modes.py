@@ -26,7 +26,7 @@ def figure(result: Result) -> Figure:
     for axes, one in zip(drawn.panels, series, strict=True):
         _shares(axes, facts_of(one.design))
         axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
-    lines = "Percent of each mode's kinetic energy; a motion apart from all others has 100. Bold: excited."
+    lines = "Share of each motion in the kinetic energy of a mode [%]; a decoupled motion has 100. Bold: excited modes."
     lines += stiffness_sentence(facts_of(result.final))
     return finish_page(drawn, result, "Natural modes", lines, [])
 

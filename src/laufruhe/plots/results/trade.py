@@ -48,6 +48,6 @@ def figure(result: Result) -> Figure:
         xlabel="largest deviation of a firing interval from even [°]",
         ylabel=label_of(name, unit, HIGH),
     )  # fmt: skip
-    legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]
-    lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."
+    legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("lower bound", **_BOUND)]
+    lines = "Each point is the best design found for its deviation, evaluated by the exact model."
     return finish_page(drawn, result, "Balance against even firing", lines, legend)

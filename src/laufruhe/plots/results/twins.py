@@ -45,10 +45,10 @@ def figure(result: Result) -> Figure:
     legend = [
         entry("turns with the crank", color=FORWARD, linewidth=1.4),
         entry("turns against it", color=BACKWARD, linewidth=1.4, linestyle=(0, (4, 1.6))),
-        entry("both together", color=INK, linewidth=2.0),
+        entry("sum", color=INK, linewidth=2.0),
     ]
     lines = f"At {point_name(result, k)}, seen from the front{_crank(engine)}."
-    title = f"{firing_words(result)[0].capitalize()}, and what turns forward and backward"
+    title = f"{firing_words(result)[0].capitalize()}, and forward and backward loads"
     return finish_page(drawn, result, title, lines, legend)
 
 

@@ -11,7 +11,7 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue
 from laufruhe.units import readable
 
-HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")
+HEAD = ("decision", "initial", "final", "bounds", "at bound", "shadow price")
 
 
 def tables(result: Result) -> list[Table]:

@@ -12,8 +12,8 @@ from laufruhe.units import readable
 PRICES = "Shadow price: decrease of the objective per unit by which the limit is relaxed."
 BOTH = "Second price: increase of the objective per unit by which the limit is tightened."
 
-TOLD = 1e-5
-"""Relative error of a value from which a reader is told."""
+STATED_ERROR = 1e-5
+"""Relative error of a value from which the note states it."""
 
 
 def tables(result: Result) -> list[Table]:
@@ -23,13 +23,13 @@ def tables(result: Result) -> list[Table]:
     rows = tuple(_row(limit, objective_unit(result), decided) for limit in limits)
     sides = {limit.side for limit in limits}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
-    title = "Limits" if is_changed(result) else "Limits, and the design as given"
+    title = "Limits" if is_changed(result) else "Limits, for the initial design"
     notes = [PRICES] if decided and any(limit.shadow_price or limit.tightening_price for limit in limits) else []
     notes += [BOTH] if any(limit.tightening_price is not None for limit in limits) else []
     notes += [
-        f"Samples may have missed {100.0 * limit.error_estimate:.1g} % of '{limit.name}'."
+        f"Error of '{limit.name}' from sampling the cycle: at most {100.0 * limit.error_estimate:.1g} %."
         for limit in limits
-        if limit.error_estimate > TOLD
+        if limit.error_estimate > STATED_ERROR
     ]
     return [Table(head, rows, title=title, note=" ".join(notes))]
 

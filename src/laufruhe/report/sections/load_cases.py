@@ -25,5 +25,5 @@ def tables(result: Result) -> list[Table]:
             moved = (number(1e3 * along) for along in travel)
             met = "yes" if mount.name in state.on_stops else DASH
             rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
-    note = "From where the engine stands without these loads."
+    note = "Travel is measured from the position without these loads."
     return [Table(HEAD, tuple(rows), title="Load cases", left=2, note=note, file="load-cases")]

@@ -11,7 +11,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
-ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max before", "max after")
+ONE, TWO = ("mean", "max", "rms"), ("initial mean", "final mean", "change", "initial max", "final max")
 
 
 def tables(result: Result) -> list[Table]:
@@ -31,10 +31,10 @@ def _table(result: Result, places: Places) -> Table:
     scale = factor * max((each[0].max for _, each in measures), default=0.0)
     rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in measures)
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
-    note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
+    note = f"The initial design has no finite loads: {result.initial.resonance}." if result.initial.resonance else ""
     if places.channel.sums_places:
         sums = [number(design.value(Measure(places.channel))) for design in designs]
-        note = f"In sum {' before and '.join(sums)}{' after' if len(sums) > 1 else ''}, on average over the cycle."
+        note = f"Sum, mean over the cycle: {' initial, '.join(sums)}{' final' if len(sums) > 1 else ''}."
     head = (*first, *(TWO if len(designs) > 1 else ONE))
     return Table(head, rows, title=f"{places.title}{at} [{unit}]", note=note, left=len(first))
 

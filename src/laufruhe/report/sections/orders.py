@@ -42,9 +42,10 @@ def tables(result: Result) -> list[Table]:
     cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
     rows = tuple((f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True))
     names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
-    head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
-    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "orders"
-    note = f"Amplitudes; {many} of at least {100.0 * SHARE:g} % of the largest. result.json has every order."
+    sides = ("",) if len(designs) == 1 else (", initial", ", final")
+    head = ("order", *(f"{name}{side}" for name in names for side in sides))
+    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "all orders"
+    note = f"Amplitudes: {many} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
     return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
 
 

@@ -8,14 +8,13 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import RankValue
 from laufruhe.units import readable
 
-HEAD = ("objective", "as given", "least", "proven not under", "proof", "in the design", "price")
+HEAD = ("objective", "initial", "minimum", "lower bound", "proof", "final", "price")
 ORDER = (
-    "Each is minimised over the designs that are optimal, within their tolerance, by the objectives before it. "
+    "Each objective is minimised over the designs that the objectives above it leave optimal, within their tolerance. "
     "Price: decrease of the last objective per unit by which this one may be exceeded."
 )
 EQUAL = (
-    "A decision with two ends may take either: these designs are equal by the objectives so far, "
-    "and the next objective selects one."
+    "A range means that both ends give the same values of the objectives so far. The next objective selects one design."
 )
 
 
@@ -27,7 +26,7 @@ def tables(result: Result) -> list[Table]:
     rows = tuple(_row(k, rank, ranks[-1]) for k, rank in enumerate(ranks, 1))
     names = [entry.name for entry in ranks[0].designs] if any(rank.equal for rank in ranks) else []
     ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
-    head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
+    head = ("decision", *(f"after objective {k}" if k == 1 else f"after 1 to {k}" for k in range(1, len(ranks) + 1)))
     return [
         Table(HEAD, rows, title="Objectives in order", note=ORDER, file="objectives-in-order"),
         Table(head, ends, title="Equal optima", note=EQUAL, file="equal-optima"),

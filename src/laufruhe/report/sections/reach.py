@@ -24,7 +24,9 @@ def tables(result: Result) -> list[Table]:
     first = ("value reached", *(figure(design.value, design.unit) for _, design in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
     head = ("", *(title for title, _ in designs))
-    return [Table(head, (first, *rows) if names else (), title="What the limits can reach", note=NOTE, file="reach")]
+    return [
+        Table(head, (first, *rows) if names else (), title="Attainable values of the limits", note=NOTE, file="reach")
+    ]
 
 
 def _value(decision: DecisionValue | None) -> str:
@@ -35,7 +37,7 @@ def _value(decision: DecisionValue | None) -> str:
 
 def sentences(result: Result) -> list[str]:
     """Return a sentence per limit, and one about the nearest design."""
-    lead = "With the other limits held, " if len(result.problem.limits) > 1 else ""
+    lead = "With the other limits met, " if len(result.problem.limits) > 1 else ""
     texts = [_sentence(limit, lead) for limit in result.reached]
     return texts if result.nearest is None else [*texts, _nearest(result.nearest)]
 
@@ -43,26 +45,24 @@ def sentences(result: Result) -> list[str]:
 def _sentence(limit: AttainableLimit, lead: str) -> str:
     if limit.why and math.isfinite(limit.value):
         stands, required = figure(limit.value, limit.unit), f"{limit.side} {with_unit(limit.limit, limit.unit)}"
-        return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is asked."
+        return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is required."
     if limit.why:
-        return f"What '{limit.name}' can reach is not told: {limit.why}."
-    minimum, beyond = ("least", "lower") if limit.side == "at most" else ("largest", "higher")
+        return f"The range of '{limit.name}' is not known: {limit.why}."
+    minimum, beyond = ("smallest", "lower") if limit.side == "at most" else ("largest", "higher")
     value, bound = figure(limit.value, limit.unit), figure(limit.bound, limit.unit)
     proof = Proof.GLOBAL if value == bound else limit.proof
     words = {
-        Proof.GLOBAL: f"the {minimum} that '{limit.name}' can reach is {value}, which is proven",
-        Proof.WITHIN_GAP: f"the {minimum} found of '{limit.name}' is {value}, and none {beyond} than {bound} is proven",
+        Proof.GLOBAL: f"the {minimum} value of '{limit.name}' is {value}, which is proven",
+        Proof.WITHIN_GAP: f"the {minimum} value found of '{limit.name}' is {value}; none is {beyond} than {bound}",
     }
-    known = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else ", and nothing is proven of it"
-    said = words.get(proof, f"the {minimum} found of '{limit.name}' is {value}, a local optimum{known}")
-    ended = " Its search ended for want of time; give more by a time limit." if limit.ended else ""
-    text = f"{lead}{said}; {limit.side} {with_unit(limit.limit, limit.unit)} is asked.{ended}"
+    known = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else " without a proof"
+    said = words.get(proof, f"the {minimum} value found of '{limit.name}' is {value}, a local optimum{known}")
+    ended = " Its search ended at the time limit; raise it." if limit.ended else ""
+    text = f"{lead}{said}; {limit.side} {with_unit(limit.limit, limit.unit)} is required.{ended}"
     return text[:1].upper() + text[1:]
 
 
 def _nearest(design: NearestDesign) -> str:
     value, required = figure(design.value, design.unit), with_unit(design.limit, design.unit)
     beyond = f", {share(design.violation, 3)} beyond" if design.limit else ""
-    return (
-        f"The nearest design found breaks '{design.name}' most: {value}, but {design.side} {required} is asked{beyond}."
-    )
+    return f"The nearest design found breaks '{design.name}' most: {value}; required: {design.side} {required}{beyond}."

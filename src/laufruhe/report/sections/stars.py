@@ -74,9 +74,9 @@ def _orders(phasing: PhasingResult) -> Table:
     )  # fmt: skip
     head = ("star", "firing order", "neighbours", "longest gap [deg]", "roll content", "orders")
     note = (
-        "Neighbours: firings in succession on one throw or on throws side by side. Longest gap: in which one bank does "
-        "not fire. Roll content: largest torque order below the firing order. Orders: how many "
-        "belong to the star."
+        "Neighbours: firings in succession on one throw or on throws side by side. Longest gap: crank angle in which "
+        "one bank does not fire. Roll content: largest torque order below the firing order. Orders: number of firing "
+        "orders of the star."
     )
     return Table(head, rows, title="Firing orders", left=2, note=note)
 
@@ -90,6 +90,6 @@ def _trade(result: Result, phasing: PhasingResult) -> Table:
         for p in phasing.trade
     )  # fmt: skip
     objective = f"objective [{objective_unit(result)}]"
-    head = ("deviation allowed", "used [deg]", objective, "not under", "change", "KKT residual")
-    note = "Local optima, the best found of every freedom; no design with that freedom goes under the bound."
+    head = ("deviation allowed", "used [deg]", objective, "lower bound", "change", "KKT residual")
+    note = "The best local optimum found for each deviation; no design with that deviation is below its bound."
     return Table(head, rows, title="Objective against even firing", note=note)

@@ -9,7 +9,7 @@ from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
 NOTE = (
-    "Of gas, pistons and rods, friction left out. Stored: energy that the flywheel must store. "
+    "Torque of gas, pistons and rods, without friction. Stored: energy that the flywheel must store. "
     "Irregularity: largest less smallest speed over the mean."
 )
 HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")

@@ -8,7 +8,7 @@ import math
 from laufruhe.machine import Role, Rotor
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.present.measures import is_changed
-from laufruhe.present.numbers import DASH, number, trimmed
+from laufruhe.present.numbers import DASH, fixed, number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
@@ -43,10 +43,12 @@ def _weights(result: Result) -> Table:
         lead = _in_grams(initial, scale) if two else ()
         rows.append((rotor.name, trimmed(1e3 * rotor.x), *lead, *_in_grams(rotor, scale),
                      number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
-    sides = (" before", " after") if two else ("",)
-    sizes = [f"{what}{side} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
-    head = ("weight", "x [mm]", *sizes, "in kg m", "mass [g]", "at radius [mm]")
-    return Table(head, tuple(rows), title="Weights" + (" as decided" if two else ""), note=_ANGLES, file="weights")
+    sides = ("initial ", "final ") if two else ("",)
+    sizes = [f"{side}{what} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
+    head = ("weight", "x [mm]", *sizes, f"{sides[-1]}unbalance [kg m]", "mass [g]", "at radius [mm]")
+    return Table(
+        head, tuple(rows), title="Weights" + (" of the final design" if two else ""), note=_ANGLES, file="weights"
+    )
 
 
 def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
@@ -57,14 +59,15 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
     return number(GRAM_MILLIMETRES * size), trimmed(turned, 5)
 
 
+def _percent(factor: float | None) -> str:
+    return DASH if factor is None else f"{fixed(100.0 * factor, 1)} %"
+
+
 def _factors(result: Result) -> Table:
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
     names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
     # a weight that a design lacks counts as zero there
     factors = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
-    rows = [
-        (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in factors))
-        for cylinders in names
-    ]
-    head = ("throw of", *(("as given", "as decided") if len(factors) > 1 else ("balance factor",)))
+    rows = [(", ".join(cylinders), *(_percent(column.get(cylinders)) for column in factors)) for cylinders in names]
+    head = ("throw of", *(("initial", "final") if len(factors) > 1 else ("balance factor",)))
     return Table(head, tuple(rows), title="Balance factors", note=_FACTOR, file="balance-factors")

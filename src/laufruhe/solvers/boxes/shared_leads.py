@@ -55,7 +55,7 @@ def solve_shared_leads(problem: Problem) -> Result:
 
 
 def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
-    """Return the best of the baseline design and the ends of simplex searches from a grid of leads."""
+    """Return the best of the initial design and the ends of simplex searches from a grid of leads."""
 
     def design(leads: Array) -> Design | None:
         try:

@@ -82,7 +82,7 @@ class MountSearch:
     problem
         Problem with one crank star and one firing order.
     initial
-        Evaluation of the baseline design, which competes with the results.
+        Evaluation of the initial design, which competes with the results.
     workers
         Number of processes; by default the number of processors.
     moves

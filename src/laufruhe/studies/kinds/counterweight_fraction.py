@@ -40,7 +40,7 @@ class CounterweightFraction(SweptPart):
         if fraction is None:
             for case, problem in zip(self.cases, problems, strict=True):
                 if not any(decision.name.endswith(FACTORS) for decision in problem.decisions):
-                    rule = "leaves no balance factor open and the part sweeps none"
+                    rule = "has no open balance factor, and the part sweeps none"
                     raise scenes.refused(case, "counterweights", rule, "sweep counterweights.NAME.balance_factor")
             return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
         points = []
@@ -69,7 +69,7 @@ class CounterweightFraction(SweptPart):
         extra = {
             **coordinates(others, points),
             path: ("point", values, {"units": "1", "long_name": "balance factor", "swept": 1}),
-            "optimum": ("point", optimum, {"long_name": "whether the fraction was left open, and decided"}),
+            "optimum": ("point", optimum, {"long_name": "true if the balance factor was open"}),
         }
         return dataset(points, records, extra, self.about())
 
@@ -92,7 +92,7 @@ class CounterweightFraction(SweptPart):
             ]
             legend.append(p.Line(colour=colour, marker="o", label=label))
         panel = p.Panel(marks, p.Axis("balance factor"), metric_axis(data))
-        words = f"Dot: {claim_of(data)}, the balance factor left open."
+        words = f"Dot: {claim_of(data)} with open balance factor."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
 
@@ -111,7 +111,7 @@ def _decided_fraction(record: Mapping[str, Any], quantity: str) -> float:
 def _best_fraction(data: xr.Dataset) -> p.Picture:
     names = swept_names(data)
     if not names:
-        return bars(data, data["case"].values, "The balance factor is decided.")
+        return bars(data, data["case"].values, "The balance factor is optimised.")
     axis, place = swept_axis(data, names[-1]), spread(data, names[-1])
     fractions = [k for k, name in enumerate(data["decision"].values) if str(name).endswith(FACTORS)]
     lower = [

@@ -26,6 +26,7 @@ from laufruhe.physics.mount_forces import turning_amplitudes
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.present import picture as p
+from laufruhe.present.numbers import fixed
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text, marked_table
@@ -145,7 +146,7 @@ class FreeForces(Part):
         """Return free forces and couples by layout, printed values in brackets."""
         columns = [(what, int(order)) for order in data["order"].values for what in WHAT]
         head = ["layout", "firing intervals [deg]", *(f"{what} {order}" for what, order in columns)]
-        head += ["crank weights leave of force 1", "of couple 1"]
+        head += ["force 1 left by crank weights", "couple 1 left by crank weights"]
         rows = []
         for name in data["case"].values:
             row = data.sel(case=name)
@@ -157,7 +158,7 @@ class FreeForces(Part):
             rows.append([*cells, *(_plain(float(first[f"{what}_against"])) for what in WHAT)])
         agreed, of = count_agreeing(data)
         words = f"{agreed} of {of} printed values agree to half of the last of {data.attrs['digits']} digits."
-        legend = "Forces over one cylinder's of the same order, couples over that times the spacing; printed values "
+        legend = "Unit: force of one cylinder in the same order, for couples times the spacing; printed values "
         return [legend + "in brackets.", marked_table(head, rows), words]
 
     @staticmethod
@@ -168,10 +169,10 @@ class FreeForces(Part):
         panels = [_column(data, what, order, first=k == 0) for k, (what, order) in enumerate(columns)]
         legend: list[p.Mark] = [
             p.Bars(label="free"),
-            p.Bars(colour="pale", label="of it against the crank"),
+            p.Bars(colour="pale", label="part against the crank"),
             p.Line(marker="o", size=3.5, width=0.0, label="literature"),
         ]
-        words = "Pistons alone, over one cylinder's force, couples times the spacing."
+        words = "Free loads of the pistons. Unit: force of one cylinder, for couples times the spacing."
         size = (1.75, 0.2 * count + 0.2)
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
 
@@ -182,7 +183,7 @@ def _print_beside(row: xr.Dataset, what: str) -> str:
 
 
 def _plain(value: float) -> str:
-    return "0" if abs(value) < 1e-9 else f"{value:.4f}"
+    return fixed(value, 4)
 
 
 def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:

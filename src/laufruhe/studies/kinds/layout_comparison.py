@@ -24,7 +24,7 @@ from laufruhe.studies.part import Record
 from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, solve_scene
-from laufruhe.studies.swept_report import MOST_ROWS, bars, by_point, claim_of, over_sweep, swept_names
+from laufruhe.studies.swept_report import MOST_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
 from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
@@ -38,10 +38,10 @@ class LayoutComparison(SweptPart):
 
     kind: Literal["layout comparison"]
     further: list[QuantityName] = Field(
-        default_factory=list, max_length=8, description="By which the designs decided are ranked beside the metric."
+        default_factory=list, max_length=8, description="Further quantities by which the final designs are ranked."
     )
     flywheel_for: f.Positive | None = f.optional(
-        "Degree of irregularity for which the least inertia beside pistons and rods is told, and ranked."
+        "Degree of irregularity; the smallest inertia beside pistons and rods that keeps it is ranked too."
     )
 
     def points(self, scenes: Scenes) -> list[Point]:
@@ -111,12 +111,13 @@ class LayoutComparison(SweptPart):
             return data
         values = np.array([[record["further"][name] for name in names] for record in records], dtype=float)
         why = [[record["why_none"][name] for name in names] for record in records]
-        about = {"long_name": "further quantity of the design decided, in quantity_unit"}
+        about = {"long_name": "further quantity of the final design, in quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
         units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
         both = ("point", "quantity")
         return data.assign(
-            further=(both, values, about), why_none=(both, why, {"long_name": "why a design has no such quantity"})
+            further=(both, values, about),
+            why_none=(both, why, {"long_name": "reason for a missing value"}),
         ).assign_coords(
             quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
@@ -129,11 +130,11 @@ class LayoutComparison(SweptPart):
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """Draw bars of every engine as given and at its optimum; lines where something is swept."""
+        """Draw initial and final bars of every engine; lines where something is swept."""
         at, alike = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
-            decided = (data["proof"].values != "as given").any()
-            words = f"Every point: {claim_of(data)}." if decided else "As given."
+            decided = (data["proof"].values != NOTHING_OPEN).any()
+            words = f"Every point: {claim_of(data)}." if decided else "Initial designs."
             return over_sweep(data, [], words if alike else f"At {at}. {words}")
         words = f"Engines of {at}." if alike else f"At {at}."
         return side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
@@ -168,7 +169,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
             for _, _, factor, values, at, why in scaled
         ])  # fmt: skip
     head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
-    words = "Ranked by the first quantity; in parentheses the place by each. A dash: why that engine has none."
+    words = "Ranked by the first quantity; ranks by each quantity in parentheses. After a dash: why a value is missing."
     return [words, marked_table(head, rows[:MOST_ROWS], len(rows[MOST_ROWS:]))]
 
 

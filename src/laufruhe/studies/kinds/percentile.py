@@ -1,4 +1,4 @@
-"""What a share of the cycle does not exceed."""
+"""Percentile of a load over the working cycle."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from laufruhe.studies.text import Text, marked_table, number
 
 
 class PercentilePart(Part):
-    """A percentile over the cycle of the first load that each case minimises, as given."""
+    """A percentile over the cycle of the first load that each case minimises, of the initial design."""
 
     kind: Literal["percentile"]
     share: float = Field(95.0, gt=0.0, lt=100.0, description="Share of the cycle in percent.")
@@ -40,7 +40,7 @@ class PercentilePart(Part):
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return one number for each case."""
         values = [record["value"] for record in records]
-        words = f"what {self.share:g} % of the cycle does not exceed"
+        words = f"load not exceeded in {self.share:g} % of the cycle"
         found = {"percentile": variable("case", values, words, records[0]["unit"])}
         return xr.Dataset(found, {"case": [point.case.name for point in points]}, self.about())
 

@@ -130,7 +130,7 @@ class RandomDesigns(Sampled):
         marks.append(p.Line(colour="ink", dash=p.DASHES[0], width=1.2, label="optimum"))
         x = p.Axis(f"{data['objective'].attrs['long_name']} [{unit}]")
         panel = p.Panel(marks, x, p.Axis("designs below [%]", (0.0, 100.0)))
-        words = f"{data.sizes['draw']:,} designs a case, drawn even between the bounds; those within all limits."
+        words = f"{data.sizes['draw']:,} designs a case, uniform between the bounds; drawn are those within limits."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
 
 

@@ -21,14 +21,15 @@ from laufruhe.studies.regions import VALUES
 from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import solve_scene
+from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import Text, marked_table, number
 
 STATUSES = ("optimal", "feasible", "infeasible", "failed", "impossible")
-PROOFS = ("global", "global within gap", "local", "none", "as given")
+PROOFS = ("global", "global within gap", "local", "none", NOTHING_OPEN)
 IMPOSSIBLE = {"status": "impossible", "proof": "none"}
 SIZES = ("objective_given", "objective", "lower_bound")
 _CODES = {"status": STATUSES, "proof": PROOFS}
-_WORDS = {"objective_given": "as given", "objective": "as decided", "lower_bound": "that no design falls below"}
+_WORDS = {"objective_given": "initial design", "objective": "final design", "lower_bound": "lower bound"}
 
 
 class RandomScenes(Sampled):
@@ -64,10 +65,10 @@ class RandomScenes(Sampled):
         for case in self.cases:
             problem = scenes.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
             name, unit = problem.objective_name, problem.objective_unit or ""
-            columns |= {key: Column(unit, f"{name} {words}") for key, words in _WORDS.items()}
+            columns |= {key: Column(unit, f"{name}, {words}") for key, words in _WORDS.items()}
             columns |= {key: Column("1", key) for key in _CODES}
             entries = [entry for d in problem.decisions for entry in decision_values(d, d.start)]
-            columns |= {entry.name: Column(entry.unit, f"decided: {entry.name}") for entry in entries}
+            columns |= {entry.name: Column(entry.unit, f"final: {entry.name}") for entry in entries}
         return columns
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
@@ -101,11 +102,11 @@ class RandomScenes(Sampled):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Count the outcomes of every case, and compare its scenes as given and as decided."""
+        """Count the outcomes of every case, and compare its initial and final designs."""
         unit = in_unit(data["objective"])[1]
         head = ["case", "scenes", "proven optimum", "proven within gap or local", "infeasible", "failed", "impossible"]
-        head += [f"as given: 5 % below [{unit}]", "median", "95 % below", f"decided: 5 % below [{unit}]", "median"]
-        head += ["95 % below", "largest gap of the proven"]
+        head += [f"initial: 5 % below [{unit}]", "median", "95 % below", f"final: 5 % below [{unit}]", "median"]
+        head += ["95 % below", "largest gap of proven designs"]
         rows = []
         for name in data["case"].values:
             part = data.sel(case=name)
@@ -123,14 +124,14 @@ class RandomScenes(Sampled):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw the share of scenes below each value, as given and as decided."""
+        """Draw the share of scenes below each value, of initial and final designs."""
         marks: list[p.Mark] = []
         for k, name in enumerate(data["case"].values):
             part, colour = data.sel(case=name), p.colour(k, data.sizes["case"])
-            marks.append(share_below(in_unit(part["objective_given"])[0], colour, f"{name}, as given", p.DASHES[0]))
-            marks.append(share_below(in_unit(part["objective"])[0], colour, f"{name}, as decided"))
-        words = str(data["objective"].attrs["long_name"]).removesuffix(" as decided")
+            marks.append(share_below(in_unit(part["objective_given"])[0], colour, f"{name}, initial", p.DASHES[0]))
+            marks.append(share_below(in_unit(part["objective"])[0], colour, f"{name}, final"))
+        words = str(data["objective"].attrs["long_name"]).removesuffix(", final design")
         x = p.Axis(f"{words} [{in_unit(data['objective'])[1]}]")
         panel = p.Panel(marks, x, p.Axis("scenes below [%]", (0.0, 100.0)))
-        words_above = f"{data.sizes['draw']:,} random scenes a case, each decided by itself."
+        words_above = f"{data.sizes['draw']:,} random scenes a case, each optimised separately."
         return p.Picture(data.attrs["title"], words_above, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))

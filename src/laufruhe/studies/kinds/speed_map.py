@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import measured, nearest
@@ -24,13 +24,17 @@ from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, narrow_signal
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.result import FINAL, INITIAL, present_name
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import AS_GIVEN, FAILED, decide_scene
+from laufruhe.studies.swept import FAILED, decide_scene
+from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
-DesignName = Literal["as given", "as decided"]
+DesignName = Annotated[
+    Literal["initial", "final"], BeforeValidator(lambda name: present_name(name) if isinstance(name, str) else name)
+]
 RPM, PER_RAD = readable("rad/s")
 MOST_SPEEDS, MOST_ORDERS, PRESENT = 20_000, 8, 0.01
 
@@ -62,23 +66,23 @@ class SpeedsTable(f.Table):
 
 
 class MeasureTable(QuantityTable):
-    """One line of the map."""
+    """Line of the map."""
 
     quantity: QuantityName
-    limit: str | None = f.optional("Limit that is drawn beside those of the problem.")
+    limit: str | None = f.optional("Limit to draw in addition to those of the problem.")
 
 
 class SpeedMapStudy(Part):
-    """Measures over crank speed, of designs as given and as decided at the file's own operating points."""
+    """Measures over crank speed, of the initial and the final design of every case."""
 
     kind: Literal["speed map"]
     speeds: SpeedsTable
     measures: list[MeasureTable] = f.optional(
         "Measures of the map; by default all that the problem minimises or limits.", []
     )
-    operating_point: str | None = f.optional("Operating point whose load is kept at every speed; the first by default.")
-    designs: list[DesignName] = Field(default=["as given", "as decided"], min_length=1)
-    by_order: bool = f.optional("Whether the amplitude of every order of the first measure is shown too.", False)
+    operating_point: str | None = f.optional("Operating point whose load applies at every speed; the first by default.")
+    designs: list[DesignName] = Field(default=["initial", "final"], min_length=1)
+    by_order: bool = f.optional("Show the amplitude of every order of the first measure too.", False)
 
     def points(self, scenes: Scenes) -> list[Point]:
         """Return one point per case, because decisions do not depend on the speeds of the map."""
@@ -87,7 +91,7 @@ class SpeedMapStudy(Part):
             self._load(problem, case, scenes)
             measures = list(self._measures(problem, case, scenes))
             if not measures:
-                rule = "asks for nothing that speed changes"
+                rule = "has no measure that depends on speed"
                 raise scenes.refused(case, "objective", rule, "name measures in the part")
             if self.by_order and not measures[0].is_load:
                 rule = f"has no orders of its first measure, {measures[0].name}"
@@ -132,14 +136,14 @@ class SpeedMapStudy(Part):
             "designs": designs,
         }
 
-    def _engines(self, problem: Problem) -> Iterator[tuple[DesignName, Engine | None, str]]:
+    def _engines(self, problem: Problem) -> Iterator[tuple[str, Engine | None, str]]:
         is_open = bool(problem.decisions or problem.phasing)
-        if "as given" in self.designs or not is_open:
-            yield "as given", problem.engine, AS_GIVEN
-        if "as decided" in self.designs and is_open:
+        if INITIAL in self.designs or not is_open:
+            yield INITIAL, problem.engine, NOTHING_OPEN
+        if FINAL in self.designs and is_open:
             result, status, proof = decide_scene(problem)
             has_design = status in ("optimal", "feasible")
-            yield "as decided", result.final.engine if has_design else None, proof if has_design else status
+            yield FINAL, result.final.engine if has_design else None, proof if has_design else status
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return a point for every case, design and speed, in that order; NaN on an undamped resonance."""
@@ -151,7 +155,7 @@ class SpeedMapStudy(Part):
         ]
         data = xr.concat(parts, "point", join="outer").reindex(measure=list(units))
         data = data.drop_dims([name for name in ("order", "mode") if not data.sizes[name]])
-        words = {"value": "of every measure, in measure_unit", "limit": "that it is to keep under, in measure_unit"}
+        words = {"value": "value of every measure, in measure_unit", "limit": "limit of every measure, in measure_unit"}
         for name, text in words.items():
             data[name].attrs["long_name"] = text
         if "amplitude" in data:
@@ -165,7 +169,7 @@ class SpeedMapStudy(Part):
     def table(data: xr.Dataset) -> list[Text]:
         """Return a row per measure: its extremes, and the speeds over its limit."""
         data = _readable(data)
-        head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"over it, from to [{RPM}]"]
+        head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"above it, from to [{RPM}]"]
         rows = []
         for case, design, one in _designs(data):
             for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
@@ -179,13 +183,17 @@ class SpeedMapStudy(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw a panel per measure, designs as given dashed; then a panel per design of its orders."""
+        """Draw a panel per measure, initial designs dashed; then a panel per design of its orders."""
         data = _readable(data)
         designs = list(_designs(data))
         panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
         panels += [_orders(*one) for one in designs if "amplitude" in data and one[2]["amplitude"].notnull().any()]
-        words = "Each design at every speed, its load kept."
-        words += " Strokes on the axis: an order meets a mode." if "amplitude" in data and "frequency" in data else ""
+        words = "Each design over speed, at constant load."
+        words += (
+            " Strokes on the axis: speeds at which an order meets a natural frequency."
+            if "amplitude" in data and "frequency" in data
+            else ""
+        )
         legend = [replace(m, x=(), y=()) for m in panels[0].marks if isinstance(m, p.Line) and m.label]
         legend += [p.Line(dash=p.DASHES[1], width=1.2, label="limit")] if data["limit"].notnull().any() else []
         size = (p.WIDE, p.HIGH if len(panels) == 1 else 2.2)
@@ -283,11 +291,11 @@ def _panel(data: xr.Dataset, designs: Sequence[tuple[str, str, xr.Dataset]], k: 
     borders: list[p.Mark] = []
     for case, design, one in designs:
         speeds, values, limits = one["speed"].values, one["value"].values[:, k], one["limit"].values[:, k]
-        is_given = design == AS_GIVEN
-        single: p.Colour = "before" if is_given else "after"
+        is_initial = design == INITIAL
+        single: p.Colour = "before" if is_initial else "after"
         colour = single if len(cases) == 1 else p.colour(cases.index(case), len(cases))
         label = design if len(cases) == 1 else f"{case}, {design}"
-        lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if is_given else ()))
+        lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if is_initial else ()))
         there = np.isfinite(limits)
         # a limit at a single operating point is a stroke
         look: dict[str, Any] = {"width": 1.2} if there.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}

@@ -49,7 +49,7 @@ export class Crank {
     if (this.about === null) return;
     const isOld = about !== this.about;
     this.box.classList.toggle("outdated", isOld);
-    this.said.textContent = isOld ? "Ranked for earlier settings:" : "Best cranks found, all else decided for each:";
+    this.said.textContent = isOld ? "Ranked for earlier settings:" : "Best cranks found, each with its best values of all other open numbers:";
   }
 
   choose(chosen) {

@@ -9,5 +9,5 @@ export function offerObjectives(root, names, first, moved) {
   select.value = String(first);
   select.addEventListener("change", () => moved(Number(select.value) ? ["first", "objective", Number(select.value)] : null));
   root.prepend(element("fieldset", { id: "objectives" }, element("legend", {}, "Objective"),
-    element("label", {}, "First of them ", select)));
+    element("label", {}, "First objective ", select)));
 }
