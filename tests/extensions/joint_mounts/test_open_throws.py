@@ -72,7 +72,7 @@ def test_no_design_of_a_box_is_under_its_bound_and_small_boxes_come_near(number:
             stiffness, real, imaginary, *angles = lower + share * (upper - lower)
             if np.hypot(real, imaginary) > 0.05:
                 continue
-            at = throws.given.copy()
+            at = throws.angles.copy()
             at[throws.open] = angles
             own = own_at(table, at)
             x = [np.hypot(real, imaginary), np.degrees(np.arctan2(imaginary, real)) % 360.0, stiffness]

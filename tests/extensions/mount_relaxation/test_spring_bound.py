@@ -131,7 +131,7 @@ def truth(
     forces = elastic + 1j * (np.einsum("mij,mj->mi", mounting.losses, travel) + order.omega * viscous)
     numbers, products = numbers_of(whole, mounting), []
     for spring in mounts.springs:
-        m, times = mounts.members[spring.mount][0], mounts.times[spring.mount]
+        m, times = mounts.members[spring.mount][0], mounts.symmetry_factors[spring.mount]
         given, middles = matrices_of(mounts, mounting, spring)
         added = spring.axes.T @ (given[m] - middles[spring.mount]) @ spring.axes
         products.append(times * added @ spring.axes.T @ travel[m])
@@ -139,7 +139,7 @@ def truth(
         s = numbers[place.number]
         products += [s * place.turn_axes @ mounts.turns @ motion]
         for felt in (elastic, viscous)[: 1 + place.is_damped]:
-            times = [(mounts.times[k] * h, felt[mounts.members[k][0]]) for k, h in place.mounts]
+            times = [(mounts.symmetry_factors[k] * h, felt[mounts.members[k][0]]) for k, h in place.mounts]
             products += [s * sum(h * place.arms @ force for h, force in times)]
     rows = np.concatenate([added for _, added in line.springs] + [moved for _, moved in line.places])
     first, count = 1 + line.columns, len(rows)

@@ -252,7 +252,10 @@ def test_losses_drive_no_more_than_is_told(seed: int) -> None:
     for box in range(len(SIZES)):
         for x in boxes.designs(box, 20):
             damping = time_model(boxes.model.mounting(x)).damping
-            assert np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] >= -of.drives[box] - 1e-9 * np.abs(damping).max()
+            assert (
+                np.linalg.eigvalsh(0.5 * (damping + damping.T))[0]
+                >= -of.growth_rates[box] - 1e-9 * np.abs(damping).max()
+            )
 
 
 @pytest.mark.parametrize("seed", first_fast((2, 5, 0), 2))
@@ -272,8 +275,8 @@ def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> 
             size = np.abs(exact[1]).max() + 1e-12
             assert -scale * told[n:, :n] == pytest.approx(exact[0], rel=1e-9, abs=1e-9 * np.abs(exact[0]).max())
             off = np.abs(exact[1] + (told + second)[n:, n:])
-            assert np.all(off <= of.maps.rest[box] * (1.0 + 1e-9) + 1e-9 * size)
-            bent = max(bent, float((np.abs(exact[1] + told[n:, n:]) - of.maps.rest[box]).max()) / size)
+            assert np.all(off <= of.maps.remainder[box] * (1.0 + 1e-9) + 1e-9 * size)
+            bent = max(bent, float((np.abs(exact[1] + told[n:, n:]) - of.maps.remainder[box]).max()) / size)
     # the second order is needed
     assert bent > 1e-6 or not of.maps.bends.any()
 

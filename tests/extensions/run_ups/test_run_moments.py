@@ -43,8 +43,8 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
             sizes = np.linalg.norm(load @ polynomial(step, np.linspace(0.0, 1.0, 101)), axis=0)
             maximum, push = max(maximum, float(sizes.max())), push + sweep.step * float(sizes.mean())
         assert found.moments[:, :, long] == pytest.approx(moments, rel=1e-9, abs=1e-12 * np.abs(moments).max())
-        assert maximum <= found.highest[long] < 10.0 * maximum
-        assert push <= found.pushes[long] < 20.0 * push
+        assert maximum <= found.peak_loads[long] < 10.0 * maximum
+        assert push <= found.impulses[long] < 20.0 * push
     short = own.short(np.array([-1, 2, sweep.count]))
     assert not short[[0, 2]].any()
     values = polynomial(2, points)

@@ -77,7 +77,7 @@ class MountedLoads:
         """Orders with loads: wrenches of fixed loads, of each unit column, and of each open throw at angle zero."""
         wrench_map = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
-        angles = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
+        angles = self._throws.angles[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (constant, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
             base, series = stacked_coefficients(
                 [constant, *slopes, *(self._throws.wrenches(p) if self._throws else ())]

@@ -35,12 +35,12 @@ class OpenThrows:
     ----------
     waves
         Loads of the throws.
-    given, lower, upper
+    angles, lower, upper
         Initial angle and bounds of each throw [rad], shape (throws,).
     """
 
     waves: ThrowWaves
-    given: Array
+    angles: Array
     lower: Array
     upper: Array
 

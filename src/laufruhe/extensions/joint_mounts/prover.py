@@ -61,7 +61,7 @@ def throw_answers(question: Question) -> Iterator[BoxResult]:
     if throws is not None:
         witness = _witness(question)
         if witness is not None:
-            witness = replace(witness, place=np.append(witness.place, throws.given[throws.open]))
+            witness = replace(witness, place=np.append(witness.place, throws.angles[throws.open]))
         yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), witness, throws)
 
 

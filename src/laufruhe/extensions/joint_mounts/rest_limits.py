@@ -31,14 +31,14 @@ from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
 
 @dataclass(frozen=True, eq=False)
-class _Rest:
+class _RestingBlock:
     """Block at rest over a box of mounts.
 
     Attributes
     ----------
     count
         Number n of open numbers.
-    at
+    stiffness_matrix
         Stiffness matrix over the box.
     pull, weight
         Weight of the block in coordinates with unit mass, shape (6,), and its size [N].
@@ -47,32 +47,34 @@ class _Rest:
     """
 
     count: int
-    at: OpenStiffness
+    stiffness_matrix: OpenStiffness
     pull: Array
     weight: float
     stiffness: Array
 
     def form(self, y: Array) -> tuple[Array, float]:
         """Return Bernstein coefficients of y' A y, shape (4^n,), and a bound of its remainder."""
-        powers, remainder = self.at.form(y, self.count)
+        powers, remainder = self.stiffness_matrix.form(y, self.count)
         return coefficients(self.count) @ powers, remainder
 
     @cached_property
     def motions(self) -> Array:
         """Modes at the middle by rising frequency, as columns, shape (6, 6)."""
-        return np.asarray(np.linalg.eigh(0.5 * (self.at.middle + self.at.middle.T))[1], dtype=np.float64)
+        return np.asarray(
+            np.linalg.eigh(0.5 * (self.stiffness_matrix.middle + self.stiffness_matrix.middle.T))[1], dtype=np.float64
+        )
 
 
-def _sag(limit: Limit, block: _Rest) -> list[Array]:
+def _sag(limit: Limit, block: _RestingBlock) -> list[Array]:
     maximum = limit.maximum * block.weight * (1.0 + SLACK)
     if not 0.0 < maximum < math.inf:
         return []
-    y = np.asarray(np.linalg.solve(block.at.middle, block.pull), dtype=np.float64)
+    y = np.asarray(np.linalg.solve(block.stiffness_matrix.middle, block.pull), dtype=np.float64)
     form, remainder = block.form(y)
     return [(2.0 * float(block.pull @ y) - form - remainder - maximum) / maximum]
 
 
-def _frequencies(limit: Limit, block: _Rest) -> list[Array]:
+def _frequencies(limit: Limit, block: _RestingBlock) -> list[Array]:
     violations = []
     if limit.minimum > 0.0:
         minimum, (form, remainder) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, block.form(block.motions[:, 0])
@@ -83,12 +85,12 @@ def _frequencies(limit: Limit, block: _Rest) -> list[Array]:
     return violations
 
 
-def _stiffness(limit: Limit, block: _Rest) -> list[Array]:
+def _stiffness(limit: Limit, block: _RestingBlock) -> list[Array]:
     total, edges = coefficients(block.count) @ block.stiffness, ((1.0, limit.maximum), (-1.0, limit.minimum))
     return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
 
 
-OVER: Mapping[Channel, Callable[[Limit, _Rest], list[Array]]] = {
+OVER: Mapping[Channel, Callable[[Limit, _RestingBlock], list[Array]]] = {
     channels.SAG: _sag,
     channels.FREQUENCIES: _frequencies,
     channels.TOTAL_STIFFNESS: _stiffness,
@@ -117,7 +119,7 @@ class RestLimits:
         total = [float(ends[:, STIFFNESS].sum()) for ends in number_ranges(self._problem, lower, upper)]
         stiffness = [[0.5 * sum(total)], 0.5 * (upper - lower) * self._stiffness_slopes, np.zeros(len(lower) ** 2)]
         stiffness_matrix = open_stiffness(self._problem, lower, upper)
-        block = _Rest(len(lower), stiffness_matrix, self._pull, self._weight, np.concatenate(stiffness))
+        block = _RestingBlock(len(lower), stiffness_matrix, self._pull, self._weight, np.concatenate(stiffness))
         return [
             coefficients_of_limit
             for limit in self._limits

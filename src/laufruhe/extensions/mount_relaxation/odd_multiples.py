@@ -107,7 +107,7 @@ class HighOrder:
     @property
     def bound(self) -> LinearUpperBound | None:
         """Upper bound of the sum of force amplitudes over all mounts of the problem [N]; None without one."""
-        counts = (self.mounts.times**2)[self.mounts.spring_mounts]
+        counts = (self.mounts.symmetry_factors**2)[self.mounts.spring_mounts]
         traces = linear_sum(self.mounts, counts[:, None, None] * np.eye(3), self.reference)
         weights = np.array([work_weight(self.mounts, m, self.load) for m in range(len(self.mounts.motions))])
         work = linear_sum(self.mounts, weights, self.reference)
@@ -133,7 +133,7 @@ class HighOrder:
         chords = []
         for m in range(len(self.mounts.motions)):
             deflections = [self.mounts.motions[m] @ load, *_place_deflections(self.mounts, m, load)]
-            factor = float(self.mounts.times[self.mounts.spring_mounts[m]]) * self._turning / self.omega**2
+            factor = float(self.mounts.symmetry_factors[self.mounts.spring_mounts[m]]) * self._turning / self.omega**2
             for deflection in deflections:
                 for part in (deflection.real, deflection.imag):
                     if not np.any(part):

@@ -121,7 +121,7 @@ class OpenMounts:
         return min(float(np.linalg.eigvalsh(matrix)[-1]) for matrix in (self.maximum + self.at_rest, *self.ceilings))
 
     @property
-    def times(self) -> Array:
+    def symmetry_factors(self) -> Array:
         """Ratio of motion and force of each mount to those of one of its members, shape (mounts,)."""
         return np.sqrt([len(numbers) for numbers in self.members])
 

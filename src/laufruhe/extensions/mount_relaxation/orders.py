@@ -99,7 +99,7 @@ class MeasureOrders:
         is_chosen = [numbers[0] in self.mounts for numbers in response.members]
         return np.asarray(response.unit * signals[is_chosen] * self.factors[:, None])
 
-    def times(self, response: Response) -> Array:
+    def member_counts(self, response: Response) -> Array:
         """Return the count of members of each mount, shape (mounts,)."""
         return np.array([float(len(numbers)) for numbers in response.members if numbers[0] in self.mounts])
 
@@ -278,7 +278,7 @@ class EpigraphVariable:
         if norm.is_euclidean:
             rows = []
             for k, order, response, signal in zip(order_numbers, self.orders, responses, signals, strict=True):
-                times = np.sqrt(0.5 * query.shares[order.point] / mounts * query.times(response))
+                times = np.sqrt(0.5 * query.shares[order.point] / mounts * query.member_counts(response))
                 rows.append((k, in_parts(signal * times[:, None, None])[:, None]))
             return [QuadraticBound(number, tuple(rows))]
         if self.is_largest:
@@ -290,7 +290,7 @@ class EpigraphVariable:
         bounds = []
         for k, response, signal in zip(order_numbers, responses, signals, strict=True):
             stacked = np.concatenate(
-                [in_parts(mount * count) for mount, count in zip(signal, query.times(response), strict=True)]
+                [in_parts(mount * count) for mount, count in zip(signal, query.member_counts(response), strict=True)]
             )
             bounds.append(QuadraticBound(number, ((k, stacked[None] / mounts),), (6,) * len(signal)))
         return bounds
@@ -302,7 +302,7 @@ class EpigraphVariable:
         vectors = []
         for k, response in zip(order_numbers, responses, strict=True):
             signal = query.signal(response) * (self.factor / self.unit / len(query.mounts))
-            times = query.times(response)
+            times = query.member_counts(response)
             vectors.append((k, np.array([in_parts(mount * count) for mount, count in zip(signal, times, strict=True)])))
         return tuple(vectors)
 

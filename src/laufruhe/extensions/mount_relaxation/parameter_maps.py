@@ -410,7 +410,7 @@ class PlaneStiffness:
         return min(low1, low2), max(high1, high2)
 
     def _polar(self, box: Array) -> tuple[tuple[float, float], tuple[float, float], float]:
-        """Return ranges of (K11 - K22) / 2 and K12 along and across the middle angle 2b, and their largest ratio."""
+        # ranges of (K11 - K22) / 2 and K12 along and across the middle angle 2b, and their largest ratio
         half_width, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
         differences = 0.5 * (box[0] - box[1][::-1])
         cosine, sine = math.cos(middle), math.sin(middle)

@@ -85,9 +85,9 @@ class ResponseBound:
             if members[0] not in self.mounts:
                 continue
             if self.is_travel:
-                bounds[k] = self.upper * mounts.times[k]
+                bounds[k] = self.upper * mounts.symmetry_factors[k]
             elif softest[k] > 0.0 and not mounts.dynamic:
-                bounds[k] = self.upper * mounts.times[k] / softest[k]
+                bounds[k] = self.upper * mounts.symmetry_factors[k] / softest[k]
         return np.asarray(bounds[mounts.spring_mounts])
 
 
@@ -163,8 +163,8 @@ def response_of(
         np.asarray(carried_motion, dtype=np.complex128),
         mounts.members,
         deflections[[int(np.argmax(mounts.spring_mounts == k)) for k in range(mounts.mounts)]]
-        / mounts.times[:, None, None],
-        _mount_forces(mounts, forces, omega, motion) / mounts.times[:, None, None],
+        / mounts.symmetry_factors[:, None, None],
+        _mount_forces(mounts, forces, omega, motion) / mounts.symmetry_factors[:, None, None],
         tuple(
             (spring.axes.T @ deflections[spring.mount], product)
             for spring, product in zip(mounts.springs, springs, strict=True)
@@ -249,7 +249,7 @@ def response_bound(mounts: OpenMounts, loads: ComplexArray, omega: float, travel
         Numbers of the mounts of the problem in the sum.
     """
     members = [k for k, numbers in enumerate(mounts.members) if numbers[0] in chosen]
-    sizes, is_chosen = mounts.times[mounts.spring_mounts], np.isin(mounts.spring_mounts, members)
+    sizes, is_chosen = mounts.symmetry_factors[mounts.spring_mounts], np.isin(mounts.spring_mounts, members)
     if not travel:
         elastic, viscous = _largest(mounts, "elastic"), _largest(mounts, "viscous")
         sizes = sizes * (elastic * np.abs(mounts.stiffness_factors(omega)) + omega * viscous)

@@ -70,7 +70,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     report_progress("the best assembly, and random ones", value=search.value, bound=bound)
     witness = _walk(problem, lots, search.best, bound, max(walk.SHARE * (time.thread_time() - spent), walk.SECONDS))
     chosen = search.best if witness is None else witness
-    initial, final = _evaluated(problem, lots, search.given), _evaluated(problem, lots, chosen)
+    initial, final = _evaluated(problem, lots, search.initial), _evaluated(problem, lots, chosen)
     value = objective_value(problem, final)
     certificate = unproven_certificate(value, math.inf, "a walk by exact evaluations, which proves nothing")
     if witness is None:
@@ -160,8 +160,8 @@ class _Search(BranchAndBound[Chosen]):
     def __init__(self, terms: Terms, lots: Sequence[Lot], cylinders: int, tolerance: float) -> None:
         self.terms, self.lots, self.cylinders, self.tolerance = terms, lots, cylinders, tolerance
         self.differences = [lot.differences for lot in lots]
-        self.given: Chosen = tuple(tuple(range(cylinders)) for _ in lots)
-        self.best, self.value = self.given, self._value(self.given)
+        self.initial: Chosen = tuple(tuple(range(cylinders)) for _ in lots)
+        self.best, self.value = self.initial, self._value(self.initial)
         sizes = [
             sum(weight * norm.norm.value(norm.grid, norm.slope[..., k]) for weight, norm in terms)
             for k in range(2 * cylinders)

@@ -49,18 +49,18 @@ class BuiltEngines:
         self.problem, self.samples = problem, samples
         applied_tolerances = tolerances_of(problem) if tolerances is None else tolerances
         units = np.concatenate([np.zeros((1, applied_tolerances.count)), np.eye(applied_tolerances.count)])
-        self._built = [
+        self._evaluations = [
             evaluate_built(with_errors(problem, unit, applied_tolerances), values, samples) for unit in units
         ]
 
     def norm(self, measure: Measure) -> AffineNorm:
         """Return the norm of a measure as a function of the errors."""
-        drawing, refinement = self._built[0], measure.norm.refinement
+        drawing, refinement = self._evaluations[0], measure.norm.refinement
         kinks = None
         if measure.is_load:
             signals = with_common_base(drawing.engine.cycle.base_order, drawing.signals(measure.load))
             kinks = kinks_of(measure, signals, drawing.engine)
-        rows = [evaluation.rows(measure, refinement * self.samples, kinks) for evaluation in self._built]
+        rows = [evaluation.rows(measure, refinement * self.samples, kinks) for evaluation in self._evaluations]
         constant = rows[0].vectors
         slope = (
             np.stack([evaluation.vectors - constant for evaluation in rows[1:]], axis=-1)

@@ -94,7 +94,7 @@ def compare_designs(
     """
     from scipy.stats import beta
 
-    population = robust_of(problem).over
+    population = robust_of(problem).population
     sample = _Sample.of(problem, population, adversary.samples)
     values = sample.values(problem, robust)
     share = SHARE if population.share is None else population.share
@@ -108,7 +108,7 @@ def compare_designs(
     # Clopper and Pearson (R10)
     at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, len(values) - exceeding)) if exceeding < len(values) else 1.0
     return RobustResult(
-        over=population, exact=population.share is None and tolerances_of(problem).is_affine, share=share,
+        population=population, exact=population.share is None and tolerances_of(problem).is_affine, share=share,
         nominal=designs[0], robust=designs[1], tolerances=_price_tolerances(problem, robust, active, sample, share),
         scenarios=scenarios, divisions=robust_worst.divisions, engines=len(values), seed=sample.seed,
         worst_engine=worst, exceeding=exceeding, exceeding_at_most=at_most,
@@ -151,7 +151,7 @@ def _design(
     no_errors = with_errors(problem, np.zeros(tolerances_of(problem).count))
     drawing = objective_value(problem, evaluate_built(no_errors, values, problem.fidelity.samples))
     level = float(ordered[min(int(np.ceil(share * len(objectives))) - 1, len(objectives) - 1)])
-    worst = worst_engines.bound if robust_of(problem).over.share is None else float(ordered[-1])
+    worst = worst_engines.bound if robust_of(problem).population.share is None else float(ordered[-1])
     return BuiltDesign(
         name, entries, drawing, worst, level,
         float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(objectives) - 1)]),
@@ -187,7 +187,7 @@ def _scaled_objective(
 ) -> float:
     """Return the objective of the active error sets, or of the share, with one tolerance times `factor` (R11)."""
     scaled_problem = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
-    if robust_of(problem).over.share is not None:
+    if robust_of(problem).population.share is not None:
         return float(np.quantile(sample.values(scaled_problem, values), share))
     total = 0.0
     for errors, weight, prices in zip(active.errors, active.shares, active.prices, strict=True):

@@ -82,7 +82,7 @@ class RobustResult(ResultDetails):
 
     Attributes
     ----------
-    over
+    population
         Engines over which the objective is taken.
     exact
         True if `worst` is a bound over all engines within the tolerances, False for a maximum of random engines.
@@ -104,7 +104,7 @@ class RobustResult(ResultDetails):
         Count of random engines above the objective, and upper bound of their share with CONFIDENCE.
     """
 
-    over: Population
+    population: Population
     exact: bool
     share: float
     nominal: BuiltDesign

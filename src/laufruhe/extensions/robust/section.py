@@ -97,7 +97,7 @@ def _tolerance_record(result: Result) -> dict[str, Any]:
     details = result.details
     assert isinstance(details, RobustResult)
     names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
-    record: dict[str, Any] = {"over": "worst case" if details.over.share is None else details.over.share}
+    record: dict[str, Any] = {"over": "worst case" if details.population.share is None else details.population.share}
     record |= {name: getattr(details, name) for name in names.split()}
     for key, design in (("best_drawing", details.nominal), ("decided", details.robust)):
         decisions = {name: {"value": value, "unit": unit} for name, value, unit in design.decisions}

@@ -128,7 +128,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         if result.objective is None or initial is None:
             return result
         return replace(result, objective=replace(result.objective, initial=initial.value))
-    population = robust_of(problem).over
+    population = robust_of(problem).population
     started = time.perf_counter()
     with search_scope("drawing"):
         drawing = solve(problem.drawing)
@@ -202,12 +202,12 @@ def refuse(problem: Problem) -> None:
             raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
-    if robust_of(problem).over.share is not None and any(limit.measure.is_load for limit in problem.limits):
+    if robust_of(problem).population.share is not None and any(limit.measure.is_load for limit in problem.limits):
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
 def _method(problem: Problem, robust: RobustDesign) -> str:
-    population, sampling = robust_of(problem).over, f"at {robust.angles} angles; " if robust.angles else ""
+    population, sampling = robust_of(problem).population, f"at {robust.angles} angles; " if robust.angles else ""
     cones = f"second-order cones over {robust.scenarios} sets of errors {sampling}" if sampling else ""
     if population.share is not None:
         bound = "bounded by the drawing" if tolerances_of(problem).is_affine else "without a bound"

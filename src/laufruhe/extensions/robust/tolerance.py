@@ -331,17 +331,17 @@ class Robust(Extra):
     ----------
     tolerances
         Tolerances of the engines.
-    over
+    population
         Engines that objective and limits cover.
     """
 
     tolerances: Tolerances
-    over: Population
+    population: Population
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
         """Return the name of the objective, with the engines that it covers."""
-        return self.over.named(name, self.tolerances.is_affine)
+        return self.population.named(name, self.tolerances.is_affine)
 
 
 def robust_of(problem: Problem) -> Robust:

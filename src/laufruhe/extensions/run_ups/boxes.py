@@ -148,10 +148,10 @@ class _RunBounds:
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
         count = min(long_steps.count for long_steps in steps)
         moments = np.stack([long_steps.moments[..., :count].reshape(-1, count) for long_steps in steps])
-        pushes, highest = (
-            np.stack([getattr(long_steps, k)[:count] for long_steps in steps]) for k in ("pushes", "highest")
+        impulses, peak_loads = (
+            np.stack([getattr(long_steps, k)[:count] for long_steps in steps]) for k in ("impulses", "peak_loads")
         )
-        return self._of_motion(motion_of(self._steps, moments, pushes, highest))
+        return self._of_motion(motion_of(self._steps, moments, impulses, peak_loads))
 
     def _peaks(self) -> Indices:
         """Return the short step with the largest signal at the middle of each box, near the largest long step."""
@@ -197,7 +197,7 @@ class _RunBounds:
         rows = self._places(value)
         size = np.linalg.norm(rows, axis=-2)
         directions = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
-        remainder = self._gains(directions) * motion.left[:, None] + self._further(motion, slopes_of_maps)
+        remainder = self._gains(directions) * motion.remainder[:, None] + self._higher_orders(motion, slopes_of_maps)
         slopes, second_terms = (
             np.einsum("bpdt,bspdt->bspt", directions, self._places(order)) for order in (first, second)
         )
@@ -235,7 +235,7 @@ class _RunBounds:
         rate_part = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
         return np.asarray(np.hypot(position, rate_part[..., None]))
 
-    def _further(self, motion: RunMotion, slopes_of_maps: Array) -> Array:
+    def _higher_orders(self, motion: RunMotion, slopes_of_maps: Array) -> Array:
         # largest signal of third and fourth order, shape (boxes, places, times)
         maps, n = self._maps, self._equations.softest.shape[-1]
         if maps.is_constant:
@@ -244,5 +244,5 @@ class _RunBounds:
         total = sum(np.linalg.norm(order, axis=-2).sum(axis=1) for order in signals)
         rates = [np.abs(order[..., n:, :]) for order in (motion.middle, motion.first, motion.second)]
         bends = np.abs(maps.bends).sum(axis=1) @ (rates[1].sum(axis=1) + rates[2].sum(axis=1))
-        remainder = maps.rest @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
+        remainder = maps.remainder @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
         return np.asarray(total + np.linalg.norm(self._places(bends + remainder), axis=-2))

@@ -78,7 +78,7 @@ class Maps:
         P at the middle and its slopes, shapes (boxes, r, n) and (boxes, open numbers, r, n).
     rate, rates, bends
         Q at the middle, its slopes, and its second-order terms by pairs j <= l, shape (boxes, pairs, r, n).
-    rest
+    remainder
         Bound of the remainder of the entries of Q, shape (boxes, r, n).
     """
 
@@ -87,12 +87,12 @@ class Maps:
     rate: Array
     rates: Array
     bends: Array
-    rest: Array
+    remainder: Array
 
     @property
     def bent(self) -> Array:
         """Largest entries of the terms beyond the first order, shape (boxes, r, n)."""
-        return np.asarray(np.abs(self.bends).sum(axis=1) + self.rest)
+        return np.asarray(np.abs(self.bends).sum(axis=1) + self.remainder)
 
     @property
     def is_constant(self) -> bool:

@@ -27,18 +27,18 @@ class LongSteps:
     ----------
     moments
         Moments of the wrench about the origin, shape (moments, 6, steps).
-    pushes, highest
+    impulses, peak_loads
         Bounds of the integral and of the maximum of the load's length in a step, shape (steps,).
     """
 
     moments: Array
-    pushes: Array
-    highest: Array
+    impulses: Array
+    peak_loads: Array
 
     @property
     def count(self) -> int:
         """Count of steps."""
-        return len(self.pushes)
+        return len(self.impulses)
 
 
 class RunMoments:

@@ -52,7 +52,7 @@ class MotionEquations:
         B, shape (boxes, 2 n, 6).
     softest
         K at the lower vertex, shape (boxes, n, n).
-    drives
+    growth_rates
         Largest growth rate of a motion by negative damping [1/s], shape (boxes,).
     known
         Mask of the boxes with valid bounds, shape (boxes,).
@@ -69,7 +69,7 @@ class MotionEquations:
     second: Array
     load: Array
     softest: Array
-    drives: Array
+    growth_rates: Array
     known: Mask
 
     @property
@@ -138,14 +138,14 @@ class RunMotion:
     ----------
     middle, first, second
         z0, z_j and z_jk, shapes (boxes, 2 n, times), (boxes, open numbers, ...) and (boxes, pairs, ...).
-    left
+    remainder
         Bound of the remainder |r|, shape (boxes, times).
     """
 
     middle: Array
     first: Array
     second: Array
-    left: Array
+    remainder: Array
 
 
 class Steps:
@@ -211,25 +211,25 @@ def _followed(moves: Array, driven: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(states, (0, 1, 2, 3), (3, 0, 2, 1)))
 
 
-def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> RunMotion:
+def motion_of(steps: Steps, moments: Array, impulses: Array, peak_loads: Array) -> RunMotion:
     """Return the motion on boxes, each under its own moments.
 
     Parameters
     ----------
     moments
         Shape (boxes, moments x 6, steps).
-    pushes, highest
+    impulses, peak_loads
         Bounds of the loads, as in `LongSteps`, shape (boxes, steps).
     """
     middle = steps.middle(moments)
     first, second = steps.orders(moments, middle)
     box_equations, step = steps.of, steps.step
     at_ends = _force(box_equations, middle, first, second)
-    between_ends = _between(box_equations, step, middle, first, second, pushes, highest)
+    between_ends = _between(box_equations, step, middle, first, second, impulses, peak_loads)
     increments = step * (0.5 * (at_ends[:, 1:] + at_ends[:, :-1]) + between_ends)
     remainder = np.concatenate([np.zeros((box_equations.count, 1)), np.cumsum(increments, axis=1)], axis=1)
     times = step * np.arange(remainder.shape[1])
-    return RunMotion(middle, first, second, remainder * np.exp(box_equations.drives[:, None] * times))
+    return RunMotion(middle, first, second, remainder * np.exp(box_equations.growth_rates[:, None] * times))
 
 
 def _force(box_equations: MotionEquations, middle: Array, first: Array, second: Array) -> Array:
@@ -242,7 +242,7 @@ def _force(box_equations: MotionEquations, middle: Array, first: Array, second: 
     rates = [np.abs(middle[:, n:]), np.abs(first[:, :, n:]).sum(axis=1), np.abs(second[:, :, n:]).sum(axis=1)]
     bends = np.abs(box_equations.maps.bends).sum(axis=1)
     total += np.linalg.norm(bends @ (rates[1] + rates[2]), axis=1)
-    return np.asarray(total + np.linalg.norm(box_equations.maps.rest @ sum(rates), axis=1))
+    return np.asarray(total + np.linalg.norm(box_equations.maps.remainder @ sum(rates), axis=1))
 
 
 def _between(
@@ -251,8 +251,8 @@ def _between(
     middle: Array,
     first: Array,
     second: Array,
-    pushes: Array,
-    highest: Array,
+    impulses: Array,
+    peak_loads: Array,
 ) -> Array:
     """Return a bound of the mean of |f| over a step in excess of the mean of its ends, shape (boxes, steps).
 
@@ -265,7 +265,7 @@ def _between(
     )
     second_norm, rest_norm = (
         np.linalg.norm(matrix, axis=(-2, -1)).reshape(box_equations.count, -1)
-        for matrix in (box_equations.second, box_equations.maps.rest)
+        for matrix in (box_equations.second, box_equations.maps.remainder)
     )
     matrix_norm, first_norm, second_norm, rest_norm = (
         matrix.sum(axis=1)[:, None] for matrix in (matrix_norm, first_norm, second_norm, rest_norm)
@@ -273,10 +273,10 @@ def _between(
     sizes = [np.linalg.norm(matrix[..., :-1], axis=-2) for matrix in (middle, first, second)]
     grown = np.exp(matrix_norm * step)
     # sizes within a step, then those of derivatives
-    middle_size = grown * (sizes[0] + pushes)
+    middle_size = grown * (sizes[0] + impulses)
     first_size = grown * (sizes[1].sum(axis=1) + step * first_norm * middle_size)
     second_size = grown * (sizes[2].sum(axis=1) + step * (first_norm * first_size + second_norm * middle_size))
-    rate = matrix_norm * middle_size + highest
+    rate = matrix_norm * middle_size + peak_loads
     rates = [
         rate,
         matrix_norm * first_size + first_norm * middle_size,

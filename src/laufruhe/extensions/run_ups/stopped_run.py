@@ -30,7 +30,7 @@ class _DesignBatch:
     ----------
     decays
         e^{rate h}, shape (designs, modes).
-    seen
+    travel_map
         Map from modes to travel along the axes of springs with stops, shape (designs, springs, 2 modes).
     first, second
         Change of the modes in a step by a constant load along these axes, and by one that rises linearly to 1, shape
@@ -40,7 +40,7 @@ class _DesignBatch:
     """
 
     decays: ComplexArray
-    seen: Array
+    travel_map: Array
     first: Array
     second: Array
     gaps: Array
@@ -48,7 +48,7 @@ class _DesignBatch:
 
     def pressed(self, z: ComplexArray) -> Array:
         """Return the forces of the stops on the block along their axes, shape (designs, springs, 1)."""
-        travel = np.matmul(self.seen, z.view(float)[..., None])
+        travel = np.matmul(self.travel_map, z.view(float)[..., None])
         stop_force = np.minimum(np.maximum(travel, -self.gaps), self.gaps)
         stop_force -= travel
         stop_force *= self.stops
@@ -144,7 +144,7 @@ def _followed(batch: _DesignBatch, driven: ComplexArray) -> ComplexArray:
 
 def _touches(batch: _DesignBatch, free: ComplexArray) -> bool:
     parts = np.stack([free.real, free.imag], axis=2).reshape(len(free), -1, free.shape[-1])
-    return bool(np.any(np.abs(batch.seen @ parts) > batch.gaps))
+    return bool(np.any(np.abs(batch.travel_map @ parts) > batch.gaps))
 
 
 def _free(driven: ComplexArray, z: ComplexArray, decays: ComplexArray, powers: ComplexArray) -> ComplexArray:

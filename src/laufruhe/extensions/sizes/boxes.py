@@ -81,7 +81,7 @@ class SizeBoxes:
                 if math.isfinite(edge):
                     maximum = sense * edge + SLACK * abs(edge)
                     self.limits.append((maximum, self._number(limit.measure, sense), limit))
-        self._ask, self._combined = ask, self._programs(ask)
+        self._propose, self._combined = ask, self._programs(ask)
         self.add_tangents(model.lower, model.upper)
 
     def _programs(self, ask: ProposeMultipliers | None) -> SizePrograms | None:
@@ -147,7 +147,7 @@ class SizeBoxes:
         """Return the boxes with some of the limits alone, and no objective."""
         boxes = copy.copy(self)
         boxes.terms, boxes.limits = [], [limit for limit in self.limits if limit[2] in limits]
-        boxes._combined = boxes._programs(self._ask)
+        boxes._combined = boxes._programs(self._propose)
         return boxes
 
     def reach(self, lower: Array, upper: Array) -> SizeReach:

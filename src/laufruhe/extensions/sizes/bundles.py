@@ -93,7 +93,7 @@ class Bundle:
 
     def minimum(self, reach: SizeReach) -> float:
         """Return a lower bound of the norm on a box."""
-        values = minimum_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
+        values = minimum_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.remainder, reach)
         return max(float(values.max(initial=0.0)), 0.0)
 
 
@@ -119,10 +119,10 @@ class GroupedRows:
         price = lengths.piece.affine.dual_norm(z)
         rows_of_columns = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
         products = z[:, :, None] * rows_of_columns
-        if not lengths.piece.given:
+        if not lengths.piece.initial_factors:
             return cls(lengths, (products.sum(axis=(1, 2))[:, None, None],), price)
         groups, start = [], 0
-        for (_, _, rows), factors in zip(lengths.piece.at, lengths.piece.given, strict=True):
+        for (_, _, rows), factors in zip(lengths.piece.positions, lengths.piece.initial_factors, strict=True):
             end = start + len(factors) * rows
             part = products[:, start:end]
             groups.append(part.reshape(len(part), len(factors), rows, *part.shape[2:]).sum(axis=2))
@@ -133,7 +133,7 @@ class GroupedRows:
         """Return the function with other factors, shape (n, 1 + columns), and the largest ratio to initial factors."""
         if not factors:
             return np.asarray(self.groups[0][:, 0, 0]), 1.0
-        ratios = [factor / initial for factor, initial in zip(factors, self.lengths.piece.given, strict=True)]
+        ratios = [factor / initial for factor, initial in zip(factors, self.lengths.piece.initial_factors, strict=True)]
         parts = zip(self.groups, ratios, strict=True)
         total = sum(np.einsum("npdj,pd->nj", group, np.broadcast_to(ratio, group.shape[1:3])) for group, ratio in parts)
         return np.asarray(total), max(float(ratio.max(initial=0.0)) for ratio in ratios)

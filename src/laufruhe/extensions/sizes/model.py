@@ -133,7 +133,7 @@ class SizeModel:
 
     def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
         """Return the factors of the rows of a piece for the sizes of an engine."""
-        return _factors(measure, engine, self.problem, piece.at)
+        return _factors(measure, engine, self.problem, piece.positions)
 
     def value(self, measure: Measure, x: Array, unbalances: Array | None = None) -> float:
         """Return the value of a measure [SI] for sizes `x`, with the initial unbalances or columns of unbalances."""
@@ -189,9 +189,9 @@ class SizeModel:
             for k in range(len(self.problem.points))
         ]  # fmt: skip
         # each operating point has the same samples at all its places
-        counts = [len(piece.affine.constant) // len(piece.at) for piece in pieces]
+        counts = [len(piece.affine.constant) // len(piece.positions) for piece in pieces]
         return [
-            np.concatenate([np.resize(masks[k], count) for k, _, _ in piece.at])
+            np.concatenate([np.resize(masks[k], count) for k, _, _ in piece.positions])
             for piece, count in zip(pieces, counts, strict=True)
         ]
 
@@ -274,7 +274,7 @@ class SizeModel:
             )
             position = ((k, place, count),)
             piece = Piece(affine, position, tuple(_factors(measure, evaluations[0].engine, problem, position)))
-            scalar = kinks_at is None and (not piece.given or piece.given[0].size == 1)
+            scalar = kinks_at is None and (not piece.initial_factors or piece.initial_factors[0].size == 1)
             if scalar:
                 ends = zip(self.mass_box, column_bounds(self.domains), strict=True)
                 piece = piece.pruned(*(np.append(masses, columns) for masses, columns in ends))

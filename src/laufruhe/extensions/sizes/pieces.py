@@ -21,21 +21,22 @@ class Piece:
     ----------
     affine
         Norm affine in the columns; rows at the initial sizes.
-    at
+    positions
         For each operating point, its index, its place (None for all places) and the count of rows.
-    given
+    initial_factors
         Initial factors of each operating point, shape (places, 1 or d).
     """
 
     affine: AffineNorm
-    at: tuple[tuple[int, int | None, int], ...]
-    given: tuple[Array, ...]
+    positions: tuple[tuple[int, int | None, int], ...]
+    initial_factors: tuple[Array, ...]
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
         """Return the ratio of all factors to the initial ones, or None if the ratios differ."""
-        arrays = [np.ones(1), *(factor / initial for factor, initial in zip(factors, self.given, strict=True))][
-            bool(factors) :
-        ]
+        arrays = [
+            np.ones(1),
+            *(factor / initial for factor, initial in zip(factors, self.initial_factors, strict=True)),
+        ][bool(factors) :]
         ratios = np.concatenate([array.ravel() for array in arrays])
         return float(ratios[0]) if np.all(ratios == ratios[0]) else None
 
@@ -46,7 +47,7 @@ class Piece:
 
     def ratios(self, factors: Sequence[Array]) -> Array:
         """Return the ratio of other factors to the initial ones for each row, shape (k, 1 or d)."""
-        parts = zip(factors, self.given, self.at, strict=True)
+        parts = zip(factors, self.initial_factors, self.positions, strict=True)
         return np.concatenate([np.repeat(factor / initial, rows, axis=0) for factor, initial, (_, _, rows) in parts])
 
     def value(self, factors: Sequence[Array], columns: Array) -> float:
@@ -66,7 +67,9 @@ class Piece:
             slope=affine_rows.slope[may_be_largest],
             grid=plain(int(may_be_largest.sum())),
         )
-        return replace(self, affine=affine, at=tuple((k, place, affine.grid.steps) for k, place, _ in self.at))
+        return replace(
+            self, affine=affine, positions=tuple((k, place, affine.grid.steps) for k, place, _ in self.positions)
+        )
 
 
 def plain(rows: int) -> Grid:

@@ -70,17 +70,17 @@ class SizePrograms:
         limits: Sequence[tuple[float, SizeNumber]],
         ask: ProposeMultipliers,
     ) -> None:
-        self._model, self._terms, self._limits, self._ask = model, tuple(terms), tuple(limits), ask
+        self._model, self._terms, self._limits, self._propose = model, tuple(terms), tuple(limits), ask
 
     def multipliers_of(
         self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False
     ) -> CombinedMultipliers | None:
         """Return multipliers from a box's program, or None if they bound nothing."""
         program = self.program(lower, upper, reach)
-        x, multipliers = self._ask(program, exactly)
+        x, multipliers = self._propose(program, exactly)
         if x is None and not exactly:
             # coarse samples of a mean may be infeasible although the mean itself is not
-            x, multipliers = self._ask(program, True)
+            x, multipliers = self._propose(program, True)
         if x is not None:
             return self._combined(program, best_bound(program, x, multipliers).multipliers) if program.terms else None
         stripped = replace(program, terms=())
@@ -146,7 +146,7 @@ class SizePrograms:
             for group in groups:
                 function, maximum = group.with_factors(self._model.factors(group.lengths.piece, number.measure, engine))
                 total = total + function
-                remainder = remainder + group.price * maximum * group.lengths.rest
+                remainder = remainder + group.price * maximum * group.lengths.remainder
                 terms = group.lengths.terms(*reach.rod)
         total[:, 0] -= multipliers.constant
         value = float(minimum_of(total[None], terms, remainder, reach)[0])

@@ -37,7 +37,7 @@ class RodSeries:
         Range of lengths [m].
     constant, slope
         Rows at the nodes, shapes (n, k, d) and (n, k, d, columns).
-    rest
+    remainder
         Bound of the norm of the remainder: for the constant, then for one unit of each column, shape (1 + columns,).
     """
 
@@ -46,7 +46,7 @@ class RodSeries:
     high: float
     constant: Array
     slope: Array
-    rest: Array
+    remainder: Array
 
     @classmethod
     def fixed(cls, piece: Piece, length: float) -> RodSeries:
@@ -65,8 +65,8 @@ class RodSeries:
     def scaled(self, factors: Sequence[Array]) -> RodSeries:
         """Return the series with other factors of its rows."""
         ratios = self.piece.ratios(factors)
-        remainder = self.rest * float(np.abs(ratios).max(initial=0.0))
-        return replace(self, constant=self.constant * ratios, slope=self.slope * ratios[..., None], rest=remainder)
+        remainder = self.remainder * float(np.abs(ratios).max(initial=0.0))
+        return replace(self, constant=self.constant * ratios, slope=self.slope * ratios[..., None], remainder=remainder)
 
     def pulled(self, z: Array) -> Array:
         """Return <Z, V> at the nodes: for the constant, then for each column, shape (n, 1 + columns)."""
@@ -122,7 +122,7 @@ def _with_initial_factors(
     start_pieces: Sequence[Piece], pieces: Sequence[Piece], masks: Sequence[Mask]
 ) -> list[AffineNorm]:
     norms = [
-        norm.scaled(piece.given) if piece.given else norm.affine
+        norm.scaled(piece.initial_factors) if piece.initial_factors else norm.affine
         for piece, norm in zip(start_pieces, pieces, strict=True)
     ]
     return [
@@ -151,7 +151,7 @@ def _with_remainder(series_at: RodSeries, lengths: Sequence[float], exact: Seque
         if SAFETY * remainder > CONVERGED * max(map(size, series)):
             raise ValueError("a kink of a load moves with the rod length")
         remainders.append(SAFETY * remainder)
-    return replace(series_at, rest=np.array(remainders))
+    return replace(series_at, remainder=np.array(remainders))
 
 
 def _lengths(low: float, high: float, count: int) -> list[float]:
