@@ -291,7 +291,7 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
     middle, by, bent = (r.normal(size=(boxes, *more, 2 * n, times)) for more in ((), (sides,), (len(pairs),)))
     for shares in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
         own, curved, left = (share * each for share, each in zip(shares, (first, bends, rest), strict=True))
-        of = SimpleNamespace(count=boxes, first=own, maps=SimpleNamespace(bends=curved, rest=left))
+        of = SimpleNamespace(count=boxes, first=own, maps=SimpleNamespace(bends=curved, remainder=left))
         told, maximum = _force(of, middle, by, bent), np.zeros((boxes, times))
         for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (20, sides))]):
             products = np.array([s[j] * s[k] for j, k in pairs])
@@ -305,7 +305,7 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
         assert np.all(told <= 30.0 * maximum)
     # where nothing has a sign of its own the corner has all of what bends tell
     curved, by, bent = (np.abs(each) for each in (bends, by, bent))
-    of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, rest=0.0 * rest))
+    of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, remainder=0.0 * rest))
     force = curved.sum(axis=1) @ (by.sum(axis=1) + bent.sum(axis=1))[:, n:]
     assert _force(of, middle, by, bent) == pytest.approx(np.linalg.norm(force, axis=1), rel=1e-12)
 
