@@ -187,7 +187,7 @@ def test_one_number_on_a_limit_is_proven_by_a_few_boxes(tmp_path: Path) -> None:
     assert result.status == "optimal"
     assert result.objective is not None
     assert result.certificate is not None
-    boxes = re.search(r"looked at in (\d+) box", result.certificate.method)
+    boxes = re.search(r"bounds of mounts from (\d+) box", result.certificate.method)
     assert boxes is not None
     assert int(boxes[1]) < 200
     given, (stiffness,) = evaluate(problem), problem.mount_decisions

@@ -203,7 +203,7 @@ def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path)
     assert result.status == "optimal"
     assert result.certificate.kind == "global"
     assert result.certificate.gap <= problem.tolerance
-    assert "bounds of mounts looked at in" in result.certificate.method
+    assert "bounds of mounts from" in result.certificate.method
     given = evaluate(problem)
 
     axes = [np.geomspace(d.lower, d.upper, 17) for d in problem.mount_decisions]

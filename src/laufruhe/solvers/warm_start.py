@@ -135,7 +135,7 @@ def _moved_throws(phasing: Phasing, star: Candidate, neighbour: Result) -> Engin
         return _engine(solve_moved(_started_at(problem, neighbour), moves, None)[0])
     from laufruhe.solvers.throws.uneven_throws import local_optimum
 
-    optimum = local_optimum(phasing, star, phasing.intervals, nudged=False)
+    optimum = local_optimum(phasing, star, phasing.intervals, with_perturbations=False)
     return None if optimum is None else _engine(optimum.result)
 
 

@@ -23,7 +23,7 @@ from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import TURNED
 from laufruhe.prove.certificate import lower_bound, minorant
-from laufruhe.solvers.mounts.places import started_at
+from laufruhe.solvers.mounts.places import design_at_start
 
 
 @pytest.mark.parametrize("seed", first_fast((780017, 780000, 780004, 780012), 3))
@@ -143,7 +143,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
             near = [columns, *(columns + 0.05 * generator.normal(size=(4, at.size)) * at.scales)]
             for each in near:
                 inside = np.concatenate([domain.project(each[domain.columns]) for domain in at.domains])
-                design = started_at(problem, (mounts.tolist(), inside))
+                design = design_at_start(problem, (mounts.tolist(), inside))
                 if design is not None and design.violation <= 0.0:
                     assert bound <= design.value * (1.0 + 1e-7)
     assert told >= 2
@@ -187,7 +187,7 @@ def test_what_is_asked_may_be_crossed(kind: str) -> None:
         for mounts in rng.uniform(lower, upper, (4, len(lower))):
             at = boxes.loads.at(mounts)
             columns, multipliers = best_at(at)
-            design = started_at(problem, (mounts.tolist(), columns))
+            design = design_at_start(problem, (mounts.tolist(), columns))
             if design is not None and design.violation <= 0.0:
                 told += bound > 0.5 * design.value
                 assert bound <= design.value * (1.0 + 1e-7)

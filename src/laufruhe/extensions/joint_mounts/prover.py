@@ -17,7 +17,7 @@ from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.mounts.places import started_at
+from laufruhe.solvers.mounts.places import design_at_start
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
 EARLY = 0.1
@@ -31,7 +31,7 @@ def corner_answers(question: Question) -> Iterator[BoxResult]:
         return
 
     def exact_value(mounts: Array, columns: Array) -> float:
-        design = started_at(problem, (mounts.tolist(), columns))
+        design = design_at_start(problem, (mounts.tolist(), columns))
         if design is None or design.violation > 0.0:
             return math.inf
         return design.value - sampling_overestimate(problem, design.evaluation)

@@ -20,7 +20,7 @@ from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result, violated_limits
 from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
 from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
-from laufruhe.solvers.mounts.starts import place_of
+from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 
@@ -43,7 +43,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     search_problem = replace(problem, search=replace(problem.search, starts=starts))
     # a rough first search helps only with several starts
     is_single_start = starts == 1
-    first = None if relaxed is None or is_single_start else place_of(problem, relaxed)
+    first = None if relaxed is None or is_single_start else start_of_result(problem, relaxed)
     search = MountSearch(
         search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSE_STEP
     )

@@ -82,6 +82,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     """Boxes of decisions that are not affine, with designs whose unbalances are optimal."""
 
     conflict: tuple[str, ...] = ()
+    """Names of limits that boxes without a feasible design violate."""
     angles = 0
     """Smallest number of samples per cycle of the first cone program."""
 
@@ -97,7 +98,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         pairs = zip(self.problem.decisions, design.design.values, strict=True)
         return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
-    def holds(self, box: S, design: RebalancedDesign) -> bool:
+    def contains(self, box: S, design: RebalancedDesign) -> bool:
         """Return True if a design lies in a box."""
         numbers = self.place(design)
         return bool(np.all(box.lower <= numbers) and np.all(numbers <= box.upper))

@@ -138,7 +138,13 @@ class _Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class _WheelProgram(LocalProgram):
-    """Local program of the flywheel."""
+    """Local program of the flywheel.
+
+    Attributes
+    ----------
+    functions
+        Objective and limits as monotone functions of the decisions.
+    """
 
     functions: MonotoneProblem
 
@@ -161,9 +167,9 @@ def solve_flywheel(problem: Problem) -> Result:
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
 
     def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
-        known = None if math.isinf(value) else witness_of(design, coordinates.place(design.values), violation=0.0)
+        witness = None if math.isinf(value) else witness_of(design, coordinates.place(design.values), violation=0.0)
         result = divided(
-            functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, known=known
+            functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, known=witness
         )
         return replace(result, places=tuple(coordinates.decisions(x) for x in result.places))
 
@@ -175,6 +181,6 @@ def solve_flywheel(problem: Problem) -> Result:
     timing = {"solve": time.perf_counter() - started}
     if outcome.excludes_all:
         return infeasible_result(problem, initial, smallest_conflict(problem.limits, is_infeasible), timing)
-    method = f"monotone quantities, bounded on {outcome.divided.boxes} boxes of the flywheel's numbers"
+    method = f"monotone quantities, bounded on {outcome.divided.boxes} boxes of flywheel sizes"
     proof = proof_data(program, outcome.design, outcome.bound, ProofStrength.EXACT, method)
     return build_result(outcome.design, initial, proof, timing)

@@ -174,8 +174,8 @@ class LeadSearch(RebalancedSearch[_Box]):
             points = [np.where(is_lead, lower + share * (upper - lower), self.model.start) for share in PROBES]
             numbers = [self._numbers(point) for point in points]
             if np.ptp(numbers, axis=0).max() <= SAME * np.abs(numbers).max():
-                why = "is open, but no objective or limit depends on it; fix it, or add a measure of coupled shafts"
-                raise ModelError(f"{decision.name} {why}")
+                reason = "is open, but no objective or limit depends on it; fix it, or add a measure of coupled shafts"
+                raise ModelError(f"{decision.name} {reason}")
 
     def _numbers(self, leads: Array) -> Array:
         program, _ = self.model.at(leads, self.samples)

@@ -155,9 +155,9 @@ class Relaxation:
             for drive in self.places[k].place_drives:
                 if drive.rotor == name:
                     place[drive.axis] = coordinate
-        moved = replace(rotor.placed(*place), name=new_name)
+        placed = replace(rotor.placed(*place), name=new_name)
         # the limit on the sum over all vertices needs a radius, of any size
-        return moved if new_name == name else replace(moved, unbalance=0.0j, radius=rotor.radius or 1.0)
+        return placed if new_name == name else replace(placed, unbalance=0.0j, radius=rotor.radius or 1.0)
 
     def recover_places(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Return the positions of the relaxed solution and the spread of its unbalances [m], shape (places,) each.

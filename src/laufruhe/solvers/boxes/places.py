@@ -171,8 +171,8 @@ class PlaceSearch(RebalancedSearch[_Box]):
         middle, spread = self.relaxation.recover_places(relaxed, result, lower, upper)
         feasible = self._move_into_limits(middle, lower, upper)
         # the relaxation ignores limits on distances
-        moved = upper - lower if feasible is None else np.abs(feasible - middle)
-        spread, middle = np.maximum(spread, moved), middle if feasible is None else feasible
+        shift = upper - lower if feasible is None else np.abs(feasible - middle)
+        spread, middle = np.maximum(spread, shift), middle if feasible is None else feasible
         start = self.relaxation.values(relaxed, result, middle)
         return _Box(lower, upper, max(bound, floor), middle, spread, start)
 

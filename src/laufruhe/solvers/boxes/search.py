@@ -91,7 +91,7 @@ class BoxSearch(Generic[B, D]):
         """Return a design as a witness of bounds, or None."""
         raise NotImplementedError
 
-    def holds(self, _box: B, _design: D) -> bool:
+    def contains(self, _box: B, _design: D) -> bool:
         """Return True if a design lies in a box."""
         return False
 
@@ -121,7 +121,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
 
     def contains_witness(self, box: B) -> bool:
         """Return True if the best design lies in a box."""
-        return self._search.holds(box, self.best)
+        return self._search.contains(box, self.best)
 
     def is_fathomed(self, node: OpenNode[B]) -> bool:
         """Return True if the gap between a box and the incumbent is closed."""

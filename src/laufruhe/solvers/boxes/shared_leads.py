@@ -41,14 +41,14 @@ def solve_shared_leads(problem: Problem) -> Result:
     started, initial = time.perf_counter(), evaluate(problem)
     lower, upper = real_bounds(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
-    value, gap_tolerance, known = math.inf, 0.0, None
+    value, gap_tolerance, witness = math.inf, 0.0, None
     if best is not None and best.violation <= FEASIBILITY_TOL:
         value = best.value
         gap_tolerance = SHARE * problem.tolerance * max(value, numerical_zero(problem))
-        known = witness_of(best, np.array([float(x.real) for x in best.values]))
-    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MOST_BOXES), known)
+        witness = witness_of(best, np.array([float(x.real) for x in best.values]))
+    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MOST_BOXES), witness)
     timing = {"solve": time.perf_counter() - started}
-    if best is None or (known is None and math.isinf(division.bound)):
+    if best is None or (witness is None and math.isinf(division.bound)):
         return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
     method = f"local searches; lower bound on {division.boxes} box{'es' * (division.boxes > 1)} of leads"
     return build_result(best, initial, ProofData(division.bound, ProofStrength.EXACT, math.inf, method), timing)

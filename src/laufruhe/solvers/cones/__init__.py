@@ -1,1 +1,1 @@
-"""Unbalances decided by second-order cone programs."""
+"""Solve for unbalances by second-order cone programs."""

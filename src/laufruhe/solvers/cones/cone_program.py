@@ -67,7 +67,7 @@ class SparseMatrix:
     def from_entries(
         cls, rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array, shape: tuple[int, int]
     ) -> SparseMatrix:
-        """Build the matrix from entries, adding those with the same row and column."""
+        """Build a matrix of `shape` from its entries; entries with the same row and column add up."""
         nonzero = values != 0.0
         keys = (columns * shape[0] + rows)[nonzero]
         order = np.argsort(keys, kind="stable")
@@ -237,9 +237,9 @@ def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
         rows.cones.append(clarabel.NonnegativeConeT(2))
         return
     if len(domain.set.edges):
-        (ax, ay), (bx, by) = domain.set.edges
+        (x1, y1), (x2, y2) = domain.set.edges
         columns = np.array([domain.start, domain.start + 1])
-        rows.add([[0], [1]], columns, [[ay, -ax], [-by, bx]], np.zeros(2))
+        rows.add([[0], [1]], columns, [[y1, -x1], [-y2, x2]], np.zeros(2))
         rows.cones.append(clarabel.NonnegativeConeT(2))
     rows.add([1, 2], [domain.start, domain.start + 1], -1.0, np.array([upper, 0.0, 0.0]))
     rows.cones.append(clarabel.SecondOrderConeT(3))

@@ -119,9 +119,10 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
         violated = [rows_near(maximum, norm, solution.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
         if all(np.isin(indices, rows).all() for indices, rows in zip(violated, row_sets, strict=True)):
             return solution
-        near = [rows_near(maximum, norm, solution.x, NEAR_LIMIT) for maximum, norm in problem.limits]
+        rows_near_limit = [rows_near(maximum, norm, solution.x, NEAR_LIMIT) for maximum, norm in problem.limits]
         row_sets = [
-            np.union1d(rows, more) if peak else rows for peak, rows, more in zip(is_peak, row_sets, near, strict=True)
+            np.union1d(rows, near_rows) if peak else rows
+            for peak, rows, near_rows in zip(is_peak, row_sets, rows_near_limit, strict=True)
         ]
     return _solve(problem, equations)
 
@@ -197,9 +198,9 @@ def solve_quadratic(
     -------
     y, shape (n,), and the dual rows of the limits; None if Clarabel does not confirm a solution.
     """
-    limited = replace(problem, terms=(), groups=())
-    blocks, starts, rows, _ = build_program(limited, None)
-    units, n = limited.units, limited.size
+    without_terms = replace(problem, terms=(), groups=())
+    blocks, starts, rows, _ = build_program(without_terms, None)
+    units, n = without_terms.units, without_terms.size
     size = float(np.abs(gradient * units).max(initial=0.0)) or 1.0
     scaled = curvature * np.outer(units, units) / size
     scaled = scaled + damping * float(np.trace(scaled)) * np.eye(n)
@@ -208,5 +209,5 @@ def solve_quadratic(
     raw = run_clarabel(rows, cost, {}, quadratic)
     if str(raw.status) != "Solved":
         return None
-    solution = read_solution(limited, blocks, starts, raw)
+    solution = read_solution(without_terms, blocks, starts, raw)
     return None if solution.x is None else (solution.x, tuple(size * z for z in solution.multipliers.limits))

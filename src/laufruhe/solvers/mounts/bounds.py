@@ -51,16 +51,16 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
         return division
     for _ in until_time_limit(range(MOST_DIVISIONS)):
         design = search.best_or_baseline.design if search.best_or_baseline is not None else None
-        value, known = math.inf, None
+        value, witness = math.inf, None
         if design is not None and design.violation <= FEASIBILITY_TOL:
             # bounds exclude errors of coarse sampling
             value = design.value - sampling_overestimate(problem, design.evaluation)
-            known = witness_of(design, mount_numbers(design))
+            witness = witness_of(design, mount_numbers(design))
         gap_tolerance = gap_tolerance_of(
             value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None)
         )
         values = design.values if design is not None else ()
-        question, count = Question(problem, value, gap_tolerance, values, known), len(problem.mount_decisions)
+        question, count = Question(problem, value, gap_tolerance, values, witness), len(problem.mount_decisions)
         division = proven(question)
         starts = [(start[:count].tolist(), start[count:] if len(start) > count else None) for start in division.places]
         if not starts or is_time_over() or not search.search_from(starts):
@@ -96,9 +96,7 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
     division = proven(question)
     if division.bound <= certificate.lower_bound:
         return result
-    text = (
-        f"{certificate.method}; bounds of mounts looked at in {division.boxes} box{'es' if division.boxes > 1 else ''}"
-    )
+    text = f"{certificate.method}; bounds of mounts from {division.boxes} box{'es' if division.boxes > 1 else ''}"
     certificate = make_certificate(
         result.objective.value,
         division.bound,
@@ -121,8 +119,8 @@ def are_contradictory(problem: Problem, limits: Sequence[Limit]) -> bool:
     limits
         Limits of the problem.
     """
-    limited = replace(problem, objective=(), limits=tuple(limits))
-    divisions = divided_bounds(limited, math.inf, 0.0, (CONFLICT_SHARE,))
+    without_terms = replace(problem, objective=(), limits=tuple(limits))
+    divisions = divided_bounds(without_terms, math.inf, 0.0, (CONFLICT_SHARE,))
     return bool(limits) and any(division.bound == math.inf for division in divisions)
 
 

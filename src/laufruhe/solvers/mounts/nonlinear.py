@@ -40,9 +40,9 @@ from laufruhe.solvers.conclusion import (
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.places import Place, evaluate_design_at
+from laufruhe.solvers.mounts.places import StartPoint, evaluate_design_at
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
-from laufruhe.solvers.mounts.starts import evaluation_count, place_of
+from laufruhe.solvers.mounts.starts import evaluation_count, start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
@@ -59,7 +59,19 @@ def solve_mounts(
     defer_bounds: bool = False,
     start_mounts: Sequence[float] | None = None,
 ) -> Result:
-    """Solve a problem on elastic mounts: a convex program if possible, else the multistart search of `solve_joint`."""
+    """Solve a problem on elastic mounts: a convex program if possible, else the multistart search of `solve_joint`.
+
+    Parameters
+    ----------
+    problem
+        Problem on elastic mounts.
+    workers
+        Number of processes; by default the number of processors.
+    defer_bounds
+        True to leave bounds to `with_mount_bounds`, for one of several problems.
+    start_mounts
+        Numbers of the mounts of the first start [SI], shape (n,).
+    """
     return (
         solve_convex_mounts(problem)
         if is_convex(problem)
@@ -96,7 +108,7 @@ def solve_joint(
     )[0]
 
 
-def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
+def solve_moved(problem: Problem, moves: ThrowMoves, even_result: Result | None) -> tuple[Result, Candidate]:
     """Solve a problem whose throws may leave their star; return the result and the star with its new throws (E36).
 
     Parameters
@@ -105,10 +117,10 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
         Problem of the star.
     moves
         Moves of the throws.
-    even
+    even_result
         Result of the star without moves, the first start; None if there is none.
     """
-    first = place_of(problem, even) if even is not None and even.decisions else None
+    first = start_of_result(problem, even_result) if even_result is not None and even_result.decisions else None
     # bounds over mounts alone are not valid for moved throws
     result, turns = _search_and_bound(problem, None, moves, first, True)
     return result, moves.candidate(turns)
@@ -118,7 +130,7 @@ def _search_and_bound(
     problem: Problem,
     workers: int | None,
     moves: ThrowMoves | None,
-    first: Place | None,
+    first: StartPoint | None,
     defer_bounds: bool,
 ) -> tuple[Result, Array]:
     """Return the result, and the moves of the throws from their star [rad], shape (moves,)."""
@@ -277,7 +289,7 @@ def _method(
     if rebalanced is not None:
         text += f"; balance on these mounts proven within {rebalanced[1]:.0e}"
     if division.boxes:
-        text += f"; bounds of mounts looked at in {division.boxes} box{'es' if division.boxes > 1 else ''}"
+        text += f"; bounds of mounts from {division.boxes} box{'es' if division.boxes > 1 else ''}"
     return text
 
 
@@ -295,7 +307,7 @@ def _without_design(
     names = _violated_limits(search.joint, nearest)
     message = (
         f"no design found: from {sum(o.starts for o in search.optima)} starts none keeps {names or 'the limits'} "
-        f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
+        f"(the nearest violates one by {nearest.violation:.3g} of the limit); relax it, or open more numbers"
     )
     design = search.best.design if search.best else None
     nearest_design = nearest_record(problem, design.evaluation, priced_decisions(design)) if design else None

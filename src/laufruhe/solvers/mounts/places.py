@@ -12,7 +12,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import Design, evaluate_design
 
-Place: TypeAlias = tuple[list[float], Array | None]
+StartPoint: TypeAlias = tuple[list[float], Array | None]
 """Numbers of the mounts [SI], and columns of the unbalances [kg m], or None for those of the best design."""
 
 
@@ -24,8 +24,8 @@ def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | No
         return None
 
 
-def started_at(problem: Problem, place: tuple[list[float], Array]) -> Design | None:
+def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Design | None:
     """Evaluate the design with these mounts and columns of unbalances; None on an undamped resonance."""
-    mounts, columns = iter(place[0]), place[1]
+    mounts, columns = iter(start[0]), start[1]
     unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
     return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])

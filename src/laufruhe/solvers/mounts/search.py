@@ -20,7 +20,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
-from laufruhe.solvers.mounts.places import Place, evaluate_design_at, started_at
+from laufruhe.solvers.mounts.places import StartPoint, design_at_start, evaluate_design_at
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima, is_explored
 from laufruhe.solvers.smooth.nonlinear import StopWhen, run_all_starts, solve_nonlinear
@@ -104,7 +104,7 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: Place | None = None, keep_baseline: bool = False, coarser: int = COARSE_STEP,
+        first: StartPoint | None = None, keep_baseline: bool = False, coarser: int = COARSE_STEP,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         report_progress("starts of the mounts")
@@ -114,7 +114,7 @@ class MountSearch:
             columns = self._points[0][1] if columns is None else columns
             self._points = [(mounts, columns), *self._points[0 if keep_baseline else 1 :]]
         self._ignored = self._inactive_limits()
-        report_progress("smooth program of all that is open")
+        report_progress("smooth program of all decisions")
         self.joint = self._program()
         self._baseline = initial_design(problem, initial) if moves is None else None
         self.best: SearchResult | None = None
@@ -127,7 +127,7 @@ class MountSearch:
 
         If no time is left and the first start is feasible, it is the result.
         """
-        start = started_at(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
+        start = design_at_start(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
         if start is not None and start.violation <= SLACK:
             self._update_best(SearchResult(start, self.joint))
             return
@@ -154,7 +154,7 @@ class MountSearch:
         self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
         self._tighten()
 
-    def search_from(self, places: Sequence[Place]) -> bool:
+    def search_from(self, places: Sequence[StartPoint]) -> bool:
         """Search from additional starts; return True if the best design improved.
 
         Starts without columns take the unbalances of the best design. Complete starts are candidates themselves.
@@ -165,7 +165,7 @@ class MountSearch:
         for mounts, columns in places:
             starts.append((mounts, default if columns is None else columns))
             if columns is not None or not self.problem.unbalances:
-                start = started_at(self.problem, starts[-1])
+                start = design_at_start(self.problem, starts[-1])
                 # a start that exceeds a limit by rounding is no candidate
                 if start is not None and start.violation <= 0.0:
                     self._update_best(SearchResult(start, self.joint))
@@ -211,8 +211,8 @@ class MountSearch:
                 centre, columns = _split(joint, x)
                 mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
                 starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.throw_deviations(x)))
-            more = self._solve(starts, run_all_starts, len(points))
-            optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
+            additional_optima = self._solve(starts, run_all_starts, len(points))
+            optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in additional_optima))
         self._evaluate_optima(optima)
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
@@ -226,7 +226,7 @@ class MountSearch:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
         for place in self._points[:CHECKED_STARTS] if limits else ():
-            design = started_at(self.problem, place)
+            design = design_at_start(self.problem, place)
             limits = [
                 x for x in limits if design is not None and design.evaluation.check_limit(x).violation < -FAR_FROM_LIMIT
             ]

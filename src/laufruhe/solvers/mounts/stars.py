@@ -33,7 +33,7 @@ from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import conflict_message, evaluate_design, refine_result, values_of, witness_of
 from laufruhe.solvers.mounts.bounds import mount_numbers, with_mount_bounds
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
-from laufruhe.solvers.mounts.starts import place_of
+from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 from laufruhe.solvers.stars.cut_search import search_designs
@@ -107,7 +107,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     by_firing = problem.depends_on_firing_order and not phasing.shares_throws
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MOST_LISTED:
-        raise ModelError(f"more than {MOST_LISTED} stars are open together with mounts; fix the firing order")
+        raise ModelError(f"more than {MOST_LISTED} stars cannot be open together with mounts; fix the firing order")
     on_baseline = replace(phasing, realise=lambda candidate: _on_baseline_mounts(phasing.realise(candidate)))
     lists_all = phasing.method is Method.ENUMERATION
     scored: list[tuple[float, Star]] = []
@@ -159,7 +159,7 @@ def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]
             with search_scope(f"first of {counted(len(stars), 'star')}"):
                 results.append(solve_mounts(first, defer_bounds=True))
         usable = [result for result in results if result.decisions and starts > FEW_STARTS]
-        start_mounts = place_of(usable[0].problem, usable[0])[0] if usable else None
+        start_mounts = start_of_result(usable[0].problem, usable[0])[0] if usable else None
         # one process per star
         work = partial(solve_mounts, workers=1, defer_bounds=True, start_mounts=start_mounts)
         results += ordered_map(work, problems[1:], "stars on their mounts") if not is_time_over() else []
@@ -212,17 +212,17 @@ def _solve_moved_throws(problem: Problem, phasing: Phasing, designs: list[StarDe
         (design.candidate, design.result) for design in designs[:MOST_SEARCHED] if not _rank(design)[0]
     ]
     starts = starts or [(start, None) for start in start_candidates(phasing, None)[:MOST_SEARCHED]]
-    moved: list[StarDesign] = []
-    for k, (candidate, even) in enumerate(() if designs and is_time_over() else starts):
-        best = _minimum_value([*designs, *moved])
+    moved_designs: list[StarDesign] = []
+    for k, (candidate, even_result) in enumerate(() if designs and is_time_over() else starts):
+        best = _minimum_value([*designs, *moved_designs])
         report_progress("throws that leave their star", k, len(starts), value=best)
         star_problem = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
-        result, crank = solve_moved(star_problem, moves, even)
+        result, crank = solve_moved(star_problem, moves, even_result)
         if result.objective is not None and not phasing.intervals.holds(firing_intervals(phasing, crank)):
             continue
-        moved.append(StarDesign(crank, result, moved=True))
-    return moved
+        moved_designs.append(StarDesign(crank, result, has_moved_throws=True))
+    return moved_designs
 
 
 def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], design_count: int) -> Result:
@@ -264,23 +264,23 @@ def _divide_boxes(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxRe
         return BoxResult(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
     design = evaluate_design(realised, values_of(realised, best.result))
-    known = witness_of(design, mount_numbers(design))
+    witness = witness_of(design, mount_numbers(design))
     value = design.value - sampling_overestimate(realised, design.evaluation)
     gap_tolerance = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
-    return proven(Question(realised, value, gap_tolerance, design.values, known, moves=(phasing, best.candidate)))
+    return proven(Question(realised, value, gap_tolerance, design.values, witness, moves=(phasing, best.candidate)))
 
 
 def _method(designs: list[StarDesign], design_count: int) -> str:
-    moved = sum(design.moved for design in designs)
-    even = len(designs) - moved
+    moved_count = sum(design.has_moved_throws for design in designs)
+    even_count = len(designs) - moved_count
     text = (
-        f"mounts and balance decided for each of {counted(even, 'star')}"
-        if even
-        else "mounts, balance and throws decided"
+        f"mounts and balance optimised for each of {counted(even_count, 'star')}"
+        if even_count
+        else "mounts, balance and throws optimised"
     )
-    if even and design_count > even:
-        text += f", the best of {design_count} on the mounts as given"
-    return f"{text}; throws moved from {counted(moved, 'start')}" if moved else text
+    if even_count and design_count > even_count:
+        text += f", the best of {design_count} on the baseline mounts"
+    return f"{text}; throws moved from {counted(moved_count, 'start')}" if moved_count else text
 
 
 def _ranking_entry(phasing: Phasing, design: StarDesign, proven: bool) -> RankedStar:

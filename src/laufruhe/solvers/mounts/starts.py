@@ -51,13 +51,23 @@ def _most_starts(problem: Problem) -> int:
 
 
 def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
-    """Return a Latin hypercube between bounds, shape (n,) each, as points of shape (count, n)."""
+    """Return the points of a Latin hypercube, shape (count, n).
+
+    Parameters
+    ----------
+    lower, upper
+        Bounds, shape (n,) each.
+    count
+        Number of points.
+    seed
+        Seed of the random numbers.
+    """
     generator = np.random.default_rng(seed)
     cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
     return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
 
 
-def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
+def start_of_result(problem: Problem, result: Result) -> tuple[list[float], Array]:
     """Return the mounts of a result [SI] and its columns of unbalances [kg m], shape (columns,)."""
     values = {decision.name: decision.value for decision in result.decisions}
     mounts = [values[decision.name] for decision in problem.mount_decisions]
@@ -106,8 +116,8 @@ def _spread_over(problem: Problem) -> Array:
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = real_bounds(decisions)
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
-    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
-    ends = np.concatenate([low_log, -wide]), np.concatenate([high_log, wide])
+    scales = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    ends = np.concatenate([low_log, -scales]), np.concatenate([high_log, scales])
     points, n = spread_starts(*ends, _candidates(problem), problem.search.seed), len(low)
     points[:, :n] = np.where(ratio, np.exp(np.where(ratio, points[:, :n], 0.0)), points[:, :n])
     points[:, :n] = np.clip(points[:, :n], low, high)
@@ -120,11 +130,11 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     finite = values[np.isfinite(values)]
     middle = float(np.median(finite)) if len(finite) else 0.0
     best = np.argsort(violations + values / (middle or 1.0), kind="stable")
-    chosen = list(best[: count - count // 3])
-    chosen += [k for k in range(len(pool)) if k not in set(chosen)][: count - len(chosen)]
+    indices = list(best[: count - count // 3])
+    indices += [k for k in range(len(pool)) if k not in set(indices)][: count - len(indices)]
     baseline_value = math.inf if initial.resonance else objective_value(problem, initial)
     minimum = min((float(v) for v in (*finite, baseline_value) if 0.0 < v < math.inf), default=1.0)
-    return pool[chosen], minimum
+    return pool[indices], minimum
 
 
 @contextmanager

@@ -81,8 +81,8 @@ def search_designs(
     started = time.perf_counter()
     owners, shafts = shaft_owners(model), model.phasing.shafts
     # if every unbalance may be zero, the largest sets of shafts include all others
-    has_minimum = any(owner >= 0 and d.set.lower > 0.0 for d, owner in zip(model.domains, owners, strict=True))
-    sets = shafts.allowed if has_minimum else shafts.largest
+    needs_weight = any(owner >= 0 and d.set.lower > 0.0 for d, owner in zip(model.domains, owners, strict=True))
+    sets = shafts.allowed if needs_weight else shafts.largest
     bounds = np.zeros((len(stars), len(sets)))
     is_open = np.ones(bounds.shape, dtype=bool)
     solved: list[SolvedStar] = []

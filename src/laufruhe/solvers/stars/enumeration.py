@@ -99,7 +99,7 @@ class BestStars:
 
 
 def enumerate_stars(space: StarSpace, objective: StarObjective, count: int = 1) -> StarSearchResult:
-    """Return the best `count` stars of a space by evaluating all, in blocks."""
+    """Return the best `count` stars of a space, by evaluating all of them in blocks."""
     best, nodes = BestStars(count, space.throws), 0
     for block in space.blocks():
         best.offer(block, objective.values(space, block))

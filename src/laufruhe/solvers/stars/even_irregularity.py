@@ -19,7 +19,7 @@ from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import no_star, solve_fixed, with_star
 from laufruhe.solvers.values import ObjectiveValue
 
-_EQUAL_STARS = "every star that fires evenly turns the crank as evenly"
+_EQUAL_STARS = "all even stars have the same degree of irregularity"
 
 
 def flywheel_measures(problem: Problem) -> list[Measure]:
@@ -50,11 +50,11 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
         return no_star(problem, reason, conflict=violated)
     limits = tuple(limit for limit in problem.limits if limit not in wheel)
     terms = tuple(term for term in problem.objective if not term.measure.channel.is_flywheel)
-    limited = [Term(limit.measure) for limit in limits if not limit.measure.channel.is_number]
-    if not terms and not limited:
+    limit_terms = [Term(limit.measure) for limit in limits if not limit.measure.channel.is_number]
+    if not terms and not limit_terms:
         return _any_star(problem, phasing)
     # without other terms, any design within the limits is optimal
-    load_terms = terms or tuple(limited[:1])
+    load_terms = terms or tuple(limit_terms[:1])
 
     def without_wheel(star_problem: Problem) -> Problem:
         load_limits = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)

@@ -160,11 +160,13 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     if _differ_by_squares(problem, families):
         (family,) = families
         if phasing.cylinders > MOST_SLOTS:
-            raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
+            raise ModelError(
+                f"firing orders of more than {MOST_SLOTS} cylinders are too many to evaluate; fix the throws"
+            )
         model = family.model(phasing)
         pairs = PairObjective.from_problem(model.at(model.samples))
         search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
-        result = enumeration_result(phasing, family, search, "every firing order looked at, pair by pair of throws")
+        result = enumeration_result(phasing, family, search, "all firing orders evaluated by pairs of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)
     family_objectives = [
         (family, objective) for family in families if (objective := amplitudes(phasing, family)) is not None
@@ -174,7 +176,7 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     results = []
     for family, objective in family_objectives:
         search = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
-        results.append(enumeration_result(phasing, family, search, "every star looked at"))
+        results.append(enumeration_result(phasing, family, search, "all stars evaluated"))
     return merge_results(results, phasing.best)
 
 
@@ -239,7 +241,7 @@ def merge_results(results: Sequence[EvenStarResult], count: int) -> EvenStarResu
     """Merge results of several geometries into the best `count` designs, without duplicates."""
     best: list[EvenDesign] = []
     for design in sorted((d for result in results for d in result.designs), key=lambda d: d.value):
-        if not any(design.equals(other) for other in best):
+        if not any(design.equals(best_design) for best_design in best):
             best.append(design)
         if len(best) == count:
             break

@@ -91,7 +91,7 @@ def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family
     by_firing
         True if loads depend on the firing order, so that every firing order is a design.
     """
-    families, reason = [], "no bank angle and split pin within the bounds let the firing be even"
+    families, reason = [], "no bank angle and split pin within the bounds allow even firing"
     lattice = firing_lattice(phasing.cycle, phasing.cylinders)
     order = phasing.firing_order
     for geometry in phasing.geometries:
@@ -107,11 +107,11 @@ def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family
             continue
         if phasing.steps is not None and phasing.steps != lattice.steps:
             count = len(layout.throw_positions)
-            too_many = f"{phasing.steps} phases are more than {count} throws can take, and "
+            too_many = f"{phasing.steps} phases are more than {count} throws can use, and "
             reason = (
                 f"phasing.phases = {phasing.steps} conflicts with {count} throws: "
                 + too_many * (phasing.steps > count)
-                + f"even firing stands on {lattice.steps}; leave phases out, or allow uneven intervals"
+                + f"even firing needs {lattice.steps}; remove phases, or allow uneven intervals"
             )
             continue
         space = StarSpace(lattice.steps, patterns, layout.throw_positions)

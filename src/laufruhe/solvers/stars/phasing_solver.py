@@ -229,15 +229,17 @@ def solve_every_order(
         (star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)
     ]
     if maximum is None and len(star_orders) * len(sets) >= MOST_ORDERS:
-        many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
-        raise ModelError(f"{many}; give a firing order, or throws")
+        rule = (
+            f"{MOST_ORDERS} or more combinations of firing orders and sets of shafts are too many to solve one by one"
+        )
+        raise ModelError(f"{rule}; fix the firing order, or the throws")
     designs = [
         replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in star_orders
     ]
     total = len(designs)
     if maximum is not None and total > maximum:
-        drawn = np.random.default_rng(problem.search.seed).choice(total, maximum, replace=False)
-        designs = [designs[k] for k in sorted({0, *drawn.tolist()})]
+        indices = np.random.default_rng(problem.search.seed).choice(total, maximum, replace=False)
+        designs = [designs[k] for k in sorted({0, *indices.tolist()})]
     started, results = time.perf_counter(), list[StarDesign]()
     for k, candidate in enumerate(designs):
         minimum = min((design.value for design in results), default=math.inf)
@@ -263,9 +265,9 @@ def solve_every_order(
     count = sum(map(len, orders.values()))
     stars_text = f" of {len(stars)} stars" if len(stars) > 1 else ""
     method = f"{len(star_orders)} of {counted(count, 'firing order')}{stars_text}"
-    method += f" seen at {counted(len(sets), 'set')} of shafts"
+    method += f" evaluated with {counted(len(sets), 'set')} of shafts"
     if not complete:
-        method += f", {len(results)} of all {total} drawn and decided"
+        method += f", {len(results)} of all {total} chosen at random and solved"
     proof = best.result.certificate
     method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
@@ -290,8 +292,8 @@ def solve_every_order(
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
-def _solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
+def _solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None) -> Result:
     from laufruhe.solvers.throws.uneven_throws import solve_uneven
 
     with limit_time(phasing.time_limit):
-        return solve_uneven(problem, phasing, even)
+        return solve_uneven(problem, phasing, even_result)

@@ -100,15 +100,15 @@ def solve_design(
         if solution.x is None:
             # at few samples, a mean may exceed its value over the cycle; sample averages never do (P7)
             averages = model.at(samples, averaged=True)
-            wide = replace(
+            loose_problem = replace(
                 averages, limits=tuple((maximum * (1.0 + FEASIBILITY_TOL), norm) for maximum, norm in averages.limits)
             )
-            cut = _limit_cut(wide, solution.multipliers, fixed)
+            cut = _limit_cut(loose_problem, solution.multipliers, fixed)
             if cut.excludes(np.array([star]), [built], owners).all():
                 return None, cut
-            solution = solve_cones(_without_fixed_limits(_with_shafts(wide.at(star), owners, built), fixed))
+            solution = solve_cones(_without_fixed_limits(_with_shafts(loose_problem.at(star), owners, built), fixed))
             if solution.x is None:
-                return None, _limit_cut(wide, solution.multipliers, fixed)
+                return None, _limit_cut(loose_problem, solution.multipliers, fixed)
             if samples < full:
                 continue
         bound = best_bound(_without_fixed_limits(averaged, fixed), solution.x, solution.multipliers)
@@ -164,10 +164,10 @@ def _violates_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineP
                (finer[k] for k in violated))  # fmt: skip
 
 
-def _limit_cut(wide: StarProblem, multipliers: Multipliers, fixed: Sequence[bool]) -> Cut:
+def _limit_cut(problem: StarProblem, multipliers: Multipliers, fixed: Sequence[bool]) -> Cut:
     # multipliers of the limits may prove that stars violate them (S45)
-    zero = tuple(np.zeros_like(norm.constant) for _, norm in wide.terms)
-    return cut_of(wide, Multipliers(zero, _with_fixed_multipliers(multipliers, wide, fixed).limits))
+    zero = tuple(np.zeros_like(norm.constant) for _, norm in problem.terms)
+    return cut_of(problem, Multipliers(zero, _with_fixed_multipliers(multipliers, problem, fixed).limits))
 
 
 def _without_fixed_limits(affine: AffineProblem, fixed: Sequence[bool]) -> AffineProblem:

@@ -32,7 +32,7 @@ class StarDesign:
         Steps of the throws if it fires evenly, else None.
     kkt_residual
         KKT residual of the program that moved its throws.
-    moved
+    has_moved_throws
         True if the throws moved from those of the start.
     """
 
@@ -40,7 +40,7 @@ class StarDesign:
     result: Result
     steps: tuple[int, ...] | None = None
     kkt_residual: float = 0.0
-    moved: bool = False
+    has_moved_throws: bool = False
 
     @cached_property
     def is_feasible(self) -> bool:

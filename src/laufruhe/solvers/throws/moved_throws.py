@@ -56,7 +56,7 @@ class _MovedCrank:
         """Return the drawing with changed values; raise `ModelError` if the crank violates the firing intervals."""
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
-            raise ModelError(f"these throws do not fire {self.phasing.intervals.text} apart")
+            raise ModelError(f"these throws violate the firing intervals allowed, {self.phasing.intervals.text}")
         realised = self.phasing.realise(candidate)
         other_changes = {path: value for path, value in changes.items() if path[0] != CRANK}
         if other_changes:
@@ -83,9 +83,9 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
         angles = tuple(_angle_decisions(phasing, start))
         options = replace(realised.search, starts=min(realised.search.starts, MOST_SEARCHES))
         decisions = (*realised.decisions, *angles)
-        moved = replace(realised, phasing=None, rebuild=crank, decisions=decisions, search=options)
+        open_problem = replace(realised, phasing=None, rebuild=crank, decisions=decisions, search=options)
         with search_scope("a crank that throws leave"):
-            result = search(moved)
+            result = search(open_problem)
         values = {entry.name: entry.value for entry in result.decisions}
         changes = {drive.path: values[d.name] for d in angles for drive in d.address_drives if d.name in values}
         names = {decision.name for decision in angles}

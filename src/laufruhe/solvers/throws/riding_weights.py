@@ -94,7 +94,7 @@ class Riders:
     ----------
     problem
         Problem with the throws of its engine.
-    rides
+    throw_of_rotor
         Index of the throw of every rotor that turns with one.
     throws
         Angles of these throws [rad].
@@ -107,18 +107,18 @@ class Riders:
         Number of columns of the model.
     """
 
-    def __init__(self, problem: Problem, rides: dict[str, int], throws: Sequence[float]) -> None:
+    def __init__(self, problem: Problem, throw_of_rotor: dict[str, int], throws: Sequence[float]) -> None:
         self._throws = throws
         on_throws = {
             d.name: drives for d in problem.unbalances
-            if (drives := [drive for drive in d.rotor_drives if drive.rotor in rides and drive.acts])
+            if (drives := [drive for drive in d.rotor_drives if drive.rotor in throw_of_rotor and drive.acts])
         }  # fmt: skip
         free_decisions: list[Decision] = []
         for decision in problem.unbalances:
             if decision.name not in on_throws:
                 free_decisions.append(decision)
                 continue
-            fixed_drives = tuple(drive for drive in decision.rotor_drives if drive.rotor not in rides)
+            fixed_drives = tuple(drive for drive in decision.rotor_drives if drive.rotor not in throw_of_rotor)
             if fixed_drives:
                 free_decisions.append(
                     replace(decision, set=_shift_to_zero(decision.set), start=0.0, drives=fixed_drives)
@@ -142,7 +142,10 @@ class Riders:
         self._groups = [
             _RiderGroup(
                 d,
-                tuple(_Rider(by_name[f"{d.name} | {v.rotor}"].start, v, rides[v.rotor]) for v in on_throws[d.name]),
+                tuple(
+                    _Rider(by_name[f"{d.name} | {v.rotor}"].start, v, throw_of_rotor[v.rotor])
+                    for v in on_throws[d.name]
+                ),
                 by_name.get(d.name),
             )
             for d in with_riders
@@ -158,7 +161,7 @@ class Riders:
         """
         sets: list[Set] = []
         entries: dict[tuple[int, int], float] = {}
-        ties: list[tuple[float, list[tuple[int, float]]]] = []
+        couplings: list[tuple[float, list[tuple[int, float]]]] = []
         shared = []
 
         def add_columns(values: Set) -> int:
@@ -186,13 +189,13 @@ class Riders:
                 if isinstance(values, Interval):
                     corners = complex(rider.drive.of(values.directions[0])) * _polygon_around(low, high)
                     add_entry(first, rider, complex(corners[0]))
-                    tie = [(first, 1.0)]
+                    coupling = [(first, 1.0)]
                     for corner in corners[1:]:
                         column = add_columns(Interval(0.0, values.upper))
                         add_entry(column, rider, complex(corner - corners[0]))
-                        tie.append((column, -1.0))
-                    if len(tie) > 1 and values.upper > 0.0:
-                        ties.append((values.upper, tie))
+                        coupling.append((column, -1.0))
+                    if len(coupling) > 1 and values.upper > 0.0:
+                        couplings.append((values.upper, coupling))
                     continue
                 middle = 0.0 if is_free else 0.5 * (low + high)
                 for k, direction in enumerate((1.0, 1.0j)):
@@ -207,11 +210,11 @@ class Riders:
         for key, value in entries.items():
             matrix[key] = value
         limits: tuple[tuple[float, AffineNorm], ...] = ()
-        if ties:
+        if couplings:
             # 0 <= r - sum q <= maximum, relative to the middle of this range
-            slope = np.zeros((len(ties), 1, matrix.shape[1]))
-            for k, (maximum, tie) in enumerate(ties):
-                for column, sign in tie:
+            slope = np.zeros((len(couplings), 1, matrix.shape[1]))
+            for k, (maximum, coupling) in enumerate(couplings):
+                for column, sign in coupling:
                     slope[k, 0, column] = sign / maximum
             grid = Grid(np.ones(len(slope)), len(slope))
             limits = ((0.5, AffineNorm(NORMS["maximum"], np.full((len(slope), 1), -0.5), slope, grid)),)

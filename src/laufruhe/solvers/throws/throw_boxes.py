@@ -136,7 +136,7 @@ class ThrowPrograms:
         norms = [norm for _, norm in (*self._terms, *self._limits)]
         count = 2 * sum(norm.waves[0].size * waves.throws for norm in norms)
         if count > MOST_NUMBERS:
-            raise ModelError(f"{1e-6 * count:.0f} million numbers at once")
+            raise ModelError(f"the program has {1e-6 * count:.0f} million numbers, too many for memory")
         if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in norms):
             raise ModelError("a load on an undamped resonance has no finite response")
         # orders with a function of the angle; for higher orders, which are negligible, only their size counts
@@ -230,9 +230,9 @@ class ThrowPrograms:
         )  # fmt: skip
 
     def box(
-        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, is_new: bool = False
     ) -> ThrowBox | FathomedPart:
-        """Shrink a box to the angles where a design may be better than `cut`, and bound it.
+        """Shrink a box to the angles where a design may be better than `cutoff`, and bound it.
 
         Parameters
         ----------
@@ -242,7 +242,7 @@ class ThrowPrograms:
             Bounds of throws and shared angles [rad].
         floor
             Known lower bound of the objective in the box [SI].
-        cut
+        cutoff
             Objective that a design must be below [SI].
         is_new
             True to try multipliers of other boxes first.
@@ -257,7 +257,7 @@ class ThrowPrograms:
             if window_bounds is None:
                 return INFEASIBLE_PART
             lower, upper = window_bounds
-            result = self._bound_box(program, lower, upper, floor, cut, is_new)
+            result = self._bound_box(program, lower, upper, floor, cutoff, is_new)
             if isinstance(result, FathomedPart):
                 return result
             if float(np.sum(result.upper - result.lower)) > _SHRINKAGE * float(np.sum(upper - lower)):
@@ -265,25 +265,25 @@ class ThrowPrograms:
             lower, upper, floor = result.lower, result.upper, result.bound
         return result
 
-    def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | FathomedPart]:
+    def parts(self, box: ThrowBox, cutoff: float) -> Iterator[ThrowBox | FathomedPart]:
         """Yield the parts of a box, divided at the mean angle of the mixture with the largest spread."""
         width = box.upper - box.lower
         spread = np.where(width > NARROWEST, box.spread, 0.0)
         side = int(np.argmax(spread if spread.any() else width))
         for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
-            yield self.box(box.program, *half, box.bound, cut)
+            yield self.box(box.program, *half, box.bound, cutoff)
 
     def _bound_box(
-        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, is_new: bool
     ) -> ThrowBox | FathomedPart:
         """Bound a box by multipliers of other boxes or by its cone program."""
         columns = self._riders.columns(*self.waves.throw_bounds(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._followed], lower, upper)
         for proof in self._proofs if is_new else ():
             value, _ = self._bound(program.rows, columns, proof, arc_box)
-            if value - self.truncation >= cut or self._prove_infeasible(program, columns, proof, arc_box):
+            if value - self.truncation >= cutoff or self._prove_infeasible(program, columns, proof, arc_box):
                 self._store_proof(proof)
-                return FathomedPart(cut)
+                return FathomedPart(cutoff)
         mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._followed])
         solution = solve_cones(mixture.problem)
         multipliers = solution.multipliers
@@ -294,12 +294,12 @@ class ThrowPrograms:
             return ThrowBox(program, lower, upper, floor, 0.5 * (lower + upper), upper - lower)
         value, arcs = self._bound(program.rows, columns, multipliers, arc_box)
         value -= self.truncation
-        if value >= cut:
+        if value >= cutoff:
             self._store_proof(multipliers)
             return FathomedPart(value)
-        ends = arcs.cut(cut - value)
+        ends = arcs.cut(cutoff - value)
         if ends is None:
-            return FathomedPart(cut)
+            return FathomedPart(cutoff)
         middle, spread = mixture.middle(solution.x)
         middle = np.clip(middle, *ends)
         arcs_at_middle, _ = self.waves.throw_bounds(middle, middle)

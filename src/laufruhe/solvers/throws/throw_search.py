@@ -229,8 +229,10 @@ def search_throws(
     zero_level = numerical_zero(problem)
     is_proven = best is not None and best.value - floor <= gap_tolerance_of(best.value, problem.tolerance, zero_level)
     # with gas and a shaft of non-integer ratio, loads do not repeat after a working cycle
-    repeats = not problem.depends_on_gas or all(r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors)
-    if is_proven or not repeats or not problem.objective:
+    is_periodic = not problem.depends_on_gas or all(
+        r.shaft.ratio == round(r.shaft.ratio) for r in problem.engine.rotors
+    )
+    if is_proven or not is_periodic or not problem.objective:
         return None
     windows = windows_of(problem, phasing)
     if windows is None:
@@ -313,9 +315,9 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
         phasing = self._phasing
         candidate, realised = self._first_crank(windows, left_out)
-        rides = rotor_throws_of(phasing, candidate)
-        riders = Riders(realised, rides, candidate.throws)
-        waves = self._waves(riders.problem, candidate, rides)
+        throw_of_rotor = rotor_throws_of(phasing, candidate)
+        riders = Riders(realised, throw_of_rotor, candidate.throws)
+        waves = self._waves(riders.problem, candidate, throw_of_rotor)
 
         def truncation(samples: int) -> float:
             return sum(term.weight * waves.left_out(term.measure, samples) for term in realised.objective)
@@ -332,18 +334,20 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
             except ModelError:
                 if k + 1 == len(first_windows):
                     raise
-        raise ModelError("no crank fires")
+        raise ModelError("the problem has no firing window")
 
-    def _waves(self, problem: Problem, candidate: Candidate, rides: dict[str, int]) -> ThrowWaves:
+    def _waves(self, problem: Problem, candidate: Candidate, throw_of_rotor: dict[str, int]) -> ThrowWaves:
         phasing = self._phasing
         layout = phasing.layout_of(candidate)
         if not any(phasing.is_geometry_open):
-            return ThrowWaves(problem, layout, rides)
+            return ThrowWaves(problem, layout, throw_of_rotor)
         if not has_same_unbalances(phasing, candidate):
             raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
         # if the phase of the crank has no effect, its first throw keeps its angle
-        is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, rides)
-        return ThrowWaves(problem, layout, rides, phasing.is_geometry_open, 0.0 if is_fixed else layout.side(0))
+        is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, throw_of_rotor)
+        return ThrowWaves(
+            problem, layout, throw_of_rotor, phasing.is_geometry_open, 0.0 if is_fixed else layout.side(0)
+        )
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """Return the candidate with these throws [rad] and the firing order of the window, or else their best order."""
@@ -370,8 +374,8 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
     def _highest_objective(self, best: StarDesign) -> float:
         zero_level, result = numerical_zero(self._problem), best.result
-        read = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
-        return read.value + read.doubt + zero_level
+        reading = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
+        return reading.value + reading.doubt + zero_level
 
     def around(self, incumbent: _Best) -> _Part | FathomedPart | None:
         """Return a thin box of throws around a design, with its bound; None if no window contains the design."""
@@ -396,20 +400,20 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         value
             Objective of the incumbent [SI].
         """
-        box, stage, cut = part.box, part.stage, self.cut(value)
+        box, stage, cutoff = part.box, part.stage, self.cut(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
-                cut = self.cut(min(value, self._best.value))
+                cutoff = self.cut(min(value, self._best.value))
                 programs = first.programs
-                root = programs.box(programs.program(window), *window.box, part.bound, cut, is_new=True)
+                root = programs.box(programs.program(window), *window.box, part.bound, cutoff, is_new=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
             # more samples improve the bound more than smaller boxes
             programs = stage.finer.programs
-            finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cut)
+            finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cutoff)
             yield self._examine(stage.finer, finer, part.left_out)
         else:
-            for half in stage.programs.parts(box, cut):
+            for half in stage.programs.parts(box, cutoff):
                 yield self._examine(stage, half, part.left_out)
 
     def _examine(

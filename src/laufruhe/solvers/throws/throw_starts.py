@@ -44,20 +44,20 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
     return intervals_of(phasing.cycle, turns)
 
 
-def start_candidates(phasing: Phasing, even: Result | None, with_gas: bool = False) -> list[Candidate]:
+def start_candidates(phasing: Phasing, even_result: Result | None, with_gas: bool = False) -> list[Candidate]:
     """Return start candidates for the search of uneven throws, best first.
 
     Parameters
     ----------
     phasing
         Open phasing.
-    even
+    even_result
         Result of the even stars, with its ranking; None if there are none or throws have bounds.
     with_gas
         True if gas acts. Firing orders of one star, and both directions of rotation, then have different loads.
     """
-    if even is not None and even.phasing is not None:
-        candidates = candidates_of(phasing, even.phasing.ranking, ORDERS_WITH_GAS if with_gas else 1)
+    if even_result is not None and even_result.phasing is not None:
+        candidates = candidates_of(phasing, even_result.phasing.ranking, ORDERS_WITH_GAS if with_gas else 1)
     else:
         if phasing.throw_bounds is not None:
             ends: list[list[float | None]] = [
@@ -80,7 +80,7 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
     if not phasing.intervals.holds([phasing.even_interval]):
         interval = f"{math.degrees(phasing.even_interval):g}"
         return (
-            f"no star can meet the intervals: {phasing.cylinders} cylinders fire {interval} deg apart on average, "
+            f"no star can keep the intervals: {phasing.cylinders} cylinders fire {interval} deg apart on average, "
             f"phasing.intervals allows {allowed_text}"
         ), True
     if phasing.throws is not None:
@@ -222,5 +222,5 @@ def reverse_rotation(phasing: Phasing, candidate: Candidate) -> Candidate:
     throws = [-angle for angle in candidate.throws]
     # cylinder 1 is at its dead centre at phi = 0 (C5)
     shift = angle_of(layout.dead_centre_turn(0)) - throws[layout.pins[0]]
-    turned = tuple((angle + shift) % math.tau for angle in throws)
-    return replace(candidate, throws=turned, firing_order=from_one(order) if order else None)
+    reversed_throws = tuple((angle + shift) % math.tau for angle in throws)
+    return replace(candidate, throws=reversed_throws, firing_order=from_one(order) if order else None)

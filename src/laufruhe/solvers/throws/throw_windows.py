@@ -144,18 +144,18 @@ def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
     return all(state == states[0] for state in states)
 
 
-def turns_freely(phasing: Phasing, candidate: Candidate, rides: dict[str, int]) -> bool:
+def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[str, int]) -> bool:
     """Return True if all unbalances off the throws have free angles, so that the crank's phase has no effect.
 
     Parameters
     ----------
     phasing, candidate
         Open phasing, and a design.
-    rides
+    throw_of_rotor
         Index of the throw of every rotor that turns with one.
     """
     problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
-    free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in rides}
+    free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in throw_of_rotor}
     if any(rotor.unbalance for rotor in problem.engine.rotors if rotor.name in free):
         return False
     return all(

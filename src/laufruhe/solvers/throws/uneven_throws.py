@@ -61,22 +61,24 @@ TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
 
-def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
+def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None) -> Result:
     """Return the best local optimum from the even stars, with a lower bound over all throws.
 
     Parameters
     ----------
     problem, phasing
         The problem and its open phasing.
-    even
+    even_result
         Result of the even stars, with its ranking; None if there are none or throws have bounds.
     """
-    starts = start_candidates(phasing, even, problem.depends_on_gas)
+    starts = start_candidates(phasing, even_result, problem.depends_on_gas)
     if not starts:
         reason, is_proven = why_none_fires(phasing)
         if is_proven:
             return no_star(problem, reason)
-    shares = TRADE_STEPS if phasing.thorough and even is not None and phasing.intervals.maximum < math.inf else (1.0,)
+    shares = (
+        TRADE_STEPS if phasing.thorough and even_result is not None and phasing.intervals.maximum < math.inf else (1.0,)
+    )
     designs: list[StarDesign] = []
     trade: list[TradePoint] = []
     for k, share in enumerate(until_time_limit(shares)):
@@ -116,9 +118,9 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
         for d in _distinct(designs)
     ]
-    count = even.phasing.designs if even is not None and even.phasing is not None else len(designs)
+    count = even_result.phasing.designs if even_result is not None and even_result.phasing is not None else len(designs)
     details = ranking_result(phasing, best.candidate, ranking, count, len(designs), method)
-    even_value = even.objective.value if even is not None and even.objective is not None else None
+    even_value = even_result.objective.value if even_result is not None and even_result.objective is not None else None
     details = replace(details, trade=tuple(trade), even_value=even_value)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
@@ -126,8 +128,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
 def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> ThrowBound | None:
     # None without a proof
 
-    def improve(candidate: Candidate, moving: bool) -> StarDesign | None:
-        if moving:
+    def improve(candidate: Candidate, uses_search: bool) -> StarDesign | None:
+        if uses_search:
             return local_optimum(phasing, candidate, phasing.intervals)
         return evaluate_crank(phasing, candidate)
 
@@ -137,7 +139,7 @@ def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, 
 
 def evaluate_crank(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
     """Return the design with these throws; None if it violates limits or firing intervals."""
-    return _if_allowed(phasing, phasing.intervals, _evaluate(phasing, candidate, 0.0, moved=True))
+    return _if_allowed(phasing, phasing.intervals, _evaluate(phasing, candidate, 0.0, has_moved_throws=True))
 
 
 def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: StarDesign) -> TradePoint:
@@ -174,8 +176,8 @@ def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | 
     for limit in problem.load_limits:
         single_term = replace(problem, objective=(Term(limit.measure),))
         if _bound(single_term, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + FEASIBILITY_TOL):
-            why = f"no crank keeps '{limit.name}', whatever else is decided"
-            return no_star(problem, why, conflict=(limit.name,))
+            reason = f"no crank keeps '{limit.name}', whatever else is decided"
+            return no_star(problem, reason, conflict=(limit.name,))
     names = quote_names(limit.name for limit in problem.limits) or "the bounds"
     remedy = (
         "" if box_bound is None else f", and {box_bound.boxes} boxes of throws do not exclude one; raise search.boxes"
@@ -184,7 +186,7 @@ def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | 
 
 
 def local_optimum(
-    phasing: Phasing, start: Candidate, intervals: Intervals, nudged: bool = True
+    phasing: Phasing, start: Candidate, intervals: Intervals, with_perturbations: bool = True
 ) -> StarDesign | None:  # fmt: skip
     """Return the local optimum from a start star, or the star itself if nothing is better; None if neither is feasible.
 
@@ -196,10 +198,10 @@ def local_optimum(
         Start star.
     intervals
         Limits of firing intervals.
-    nudged
+    with_perturbations
         True to start from perturbed stars too, because a star may be a saddle point (S20).
     """
-    best = _if_allowed(phasing, intervals, _evaluate(phasing, start, 0.0, moved=False))
+    best = _if_allowed(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
     problem = with_work_for_search(replace(phasing.realise(start), phasing=None))
@@ -221,12 +223,12 @@ def local_optimum(
             unit = max(best.value, SMALLEST_UNIT * best.result.objective.initial) or 1.0
         smooth = SmoothProgram(problem, unit, margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
         minimum_violation = math.inf
-        starts = _start_points(smooth, best)[: None if nudged else 1]
+        starts = _start_points(smooth, best)[: None if with_perturbations else 1]
         for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, stop_when=run_all_starts):
             if not optimum.usable:
                 continue
             candidate = moves.candidate(smooth.throw_deviations(optimum.x))
-            design = _evaluate(phasing, candidate, optimum.kkt_residual, moved=True)
+            design = _evaluate(phasing, candidate, optimum.kkt_residual, has_moved_throws=True)
             if design is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
                 continue
             minimum_violation = min(minimum_violation, design.result.final.violation(design.result.problem.limits))
@@ -259,13 +261,13 @@ def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]
     return [smooth.start([], columns + n[len(turns) :], turns + n[: len(turns)]) for n in (0.0 * nudges[0], *nudges)]
 
 
-def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, moved: bool) -> StarDesign | None:
+def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, has_moved_throws: bool) -> StarDesign | None:
     try:
         result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
     except ModelError:
         return None
     is_finite = result.objective is None or math.isfinite(result.objective.value)
-    return StarDesign(candidate, result, None, residual, moved) if is_finite else None
+    return StarDesign(candidate, result, None, residual, has_moved_throws) if is_finite else None
 
 
 def _if_allowed(phasing: Phasing, intervals: Intervals, design: StarDesign | None) -> StarDesign | None:
@@ -279,7 +281,7 @@ def _if_allowed(phasing: Phasing, intervals: Intervals, design: StarDesign | Non
 def _distinct(designs: Sequence[StarDesign]) -> list[StarDesign]:
     distinct: list[StarDesign] = []
     for design in designs:
-        if not any(_is_same_crank(design.candidate, x.candidate) for x in distinct):
+        if not any(_is_same_crank(design.candidate, known_design.candidate) for known_design in distinct):
             distinct.append(design)
     return distinct
 
