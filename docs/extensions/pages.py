@@ -205,8 +205,11 @@ def proven() -> str:
 
     rows = [PROVEN.format(of_mounts=", ".join(sorted(channel.name for channel in OF_MOUNTS)))]
     for method in METHODS:
-        every, missing = len(method.needs) >= len(KINDS) - 1, [k for k in KINDS.values() if k not in method.needs]
-        kinds = ", ".join(kind.words for kind in method.needs) or "nothing"
+        every, missing = (
+            len(method.dependences) >= len(KINDS) - 1,
+            [k for k in KINDS.values() if k not in method.dependences],
+        )
+        kinds = ", ".join(kind.words for kind in method.dependences) or "nothing"
         kinds = "anything" + "".join(f" but {kind.words}" for kind in missing) if every else kinds
         rows.append(f"| {method.name} | {kinds} | {_asked(method, every)} | {method.proves} |\n")
     kinds = list(next(iter(TABLE.values())))
@@ -231,11 +234,11 @@ def _asked(method: Any, every: bool) -> str:
     """Return the quantities that a method accepts, in words."""
     from laufruhe.solvers.method import OF_MOUNTS
 
-    if every or not method.needs:
+    if every or not method.dependences:
         return "anything"
-    found = dict.fromkeys(SHORT[each.name] for needs in method.needs.values() for each in needs)
-    of_mounts = method.knows >= OF_MOUNTS
-    names = sorted(channel.name for channel in method.knows - (OF_MOUNTS if of_mounts else frozenset()))
+    found = dict.fromkeys(SHORT[each.name] for allowed in method.dependences.values() for each in allowed)
+    of_mounts = method.known_channels >= OF_MOUNTS
+    names = sorted(channel.name for channel in method.known_channels - (OF_MOUNTS if of_mounts else frozenset()))
     names += ["quantities of elastic mounts"] if of_mounts else []
     return "; ".join(part for part in (", ".join(found), ", ".join(names)) if part)
 

@@ -46,22 +46,22 @@ class Method:
     ----------
     name
         Name for messages and reports.
-    needs
+    dependences
         Kinds of numbers that may be open together, each with the permitted dependences of measures on it.
         `Dependence.NONE` is always permitted.
     strength
         Kind of proof that its lower bounds can give.
     solver
         Return the best design with its certificate. The function imports its module when it is called.
-    judges_fidelity
+    refines_fidelity
         True if a better fidelity is chosen when the design needs it (F11).
-    knows
+    known_channels
         Channels with formulas of its own, for any dependence but UNKNOWN.
-    norms
+    accepts_norm
         Return True if a norm of a load is permitted.
-    still
+    accepts_constant
         Return True if another channel that no decision changes is permitted.
-    also
+    accepts_problem
         Return True if all else about a problem is permitted.
     proves
         Text of what it proves.
@@ -70,44 +70,44 @@ class Method:
     """
 
     name: str
-    needs: Mapping[Kind, Collection[Dependence]]
+    dependences: Mapping[Kind, Collection[Dependence]]
     strength: ProofStrength
     solver: Callable[[Problem], Result]
-    judges_fidelity: bool = False
-    knows: frozenset[Channel] = frozenset()
-    norms: Callable[[Norm], bool] = is_convex
-    still: Callable[[Channel], bool] = lambda _: True
-    also: Callable[[Problem], bool] = lambda _: True
+    refines_fidelity: bool = False
+    known_channels: frozenset[Channel] = frozenset()
+    accepts_norm: Callable[[Norm], bool] = is_convex
+    accepts_constant: Callable[[Channel], bool] = lambda _: True
+    accepts_problem: Callable[[Problem], bool] = lambda _: True
     proves: str = ""
     before: str = ""
 
     @property
-    def decides(self) -> frozenset[Kind]:
+    def kinds(self) -> frozenset[Kind]:
         """Kinds of numbers that may be open together."""
-        return frozenset(self.needs)
+        return frozenset(self.dependences)
 
     def suits(self, problem: Problem) -> bool:
         """Return True if the method solves a problem, by its open numbers and its measures."""
         kinds = open_kinds(problem)
         return (
-            kinds <= self.decides
-            and all(self._names(m, kinds, problem) for m in problem.measures)
-            and self.also(problem)
+            kinds <= self.kinds
+            and all(self._accepts(m, kinds, problem) for m in problem.measures)
+            and self.accepts_problem(problem)
         )
 
-    def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
+    def _accepts(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
         # the method permits the dependence of the measure on these kinds
         if measure in problem.known_rows:
-            return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
-        if measure.is_load and not self.norms(measure.norm):
+            return all(Dependence.AFFINE in self.dependences[kind] for kind in kinds)
+        if measure.is_load and not self.accepts_norm(measure.norm):
             return False
-        dependences = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
-        if measure.channel in self.knows:
-            return Dependence.UNKNOWN not in dependences.values()
-        if all(value is Dependence.NONE for value in dependences.values()):
-            return self.still(measure.channel)
-        return all(value is Dependence.NONE or value in self.needs[kind] for kind, value in dependences.items())
+        by_kind = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
+        if measure.channel in self.known_channels:
+            return Dependence.UNKNOWN not in by_kind.values()
+        if all(value is Dependence.NONE for value in by_kind.values()):
+            return self.accepts_constant(measure.channel)
+        return all(value is Dependence.NONE or value in self.dependences[kind] for kind, value in by_kind.items())
 
     def solve(self, problem: Problem) -> Result:
-        """Return the best design, at a better fidelity if the method judges that and the design needs it."""
-        return solve_accurately(problem, self.solver) if self.judges_fidelity else self.solver(problem)
+        """Return the best design, with a better fidelity if the design needs it (F11)."""
+        return solve_accurately(problem, self.solver) if self.refines_fidelity else self.solver(problem)

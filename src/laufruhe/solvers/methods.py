@@ -12,6 +12,7 @@ from functools import cache, partial
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import is_time_over, limit_time
+from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
@@ -145,58 +146,116 @@ def _distinguishes_stars(problem: Problem) -> bool:
     return problem.engine.block is not None and not (moves and any(numbers))
 
 
-_U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
-_Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
+_ANY = tuple(Dependence)
+_UNBALANCES = {Kind.UNBALANCE: _AFFINE}
+_MOUNTS = {**_UNBALANCES, Kind.STIFFNESS: (), Kind.MOUNT: ()}
+
+
+def _any_norm(_: Norm) -> bool:
+    return True
+
+
 _CORE: tuple[Method, ...] = (
-    Method("evaluation", {}, ProofStrength.EXACT, evaluate_only, norms=lambda _: True,
-           proves="the value itself"),
-    Method("boxes of the flywheel", {_F: ()}, ProofStrength.EXACT, _solve_flywheel,
-           knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
-           proves="the optimum"),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, solve_polished, True,
-           proves="the optimum"),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.EXACT, solve_polished, True,
-           proves="the optimum"),
-    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, _solve_leads, True,
-           frozenset({IRREGULARITY}), is_pointwise, is_no_number,
-           proves="the optimum, as far as the boxes go (P13)"),
-    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT,
-           _solve_shared_leads, True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
-           is_no_number, _is_rigid,
-           proves="the optimum, as far as the boxes go (P15)"),
-    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, ProofStrength.EXACT,
-           _solve_places, True, OF_SHAFT_PLACES, is_pointwise,
-           proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.EXACT, _solve_phasing, True,
-           norms=is_pointwise,
-           proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
-           "pins go (S29, S30)"),
-    Method("linear matrix inequalities", {_K: ()}, ProofStrength.EXACT, solve_convex_mounts,
-           knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
-           proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.PARTIAL, _solve_joint, False, OF_MOUNTS,
-           is_pointwise,
-           proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.RELAXED, _solve_joint, False, OF_MOUNTS,
-           is_pointwise,
-           proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
-    Method("flywheel, crankshaft and the rest apart",
-           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.RELAXED,
-           solve_separable, norms=lambda _: True, also=is_separable,
-           proves="what each of them proves"),
-    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.RELAXED,
-           _solve_star_mounts, False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,
-           proves="a local optimum, with a bound"),
-    Method("local programs, places at their corners",
-           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT,
-           solve_with_places, True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
-           also=_closes_without_places,
-           proves="what is proven of the rest with places at the corners of their bounds (P20)"),
-    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), ProofStrength.RELAXED,
-           solve_all_numbers, norms=lambda _: True,
-           proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
+    Method(
+        "evaluation", {}, ProofStrength.EXACT, evaluate_only,
+        accepts_norm=_any_norm,
+        proves="the value itself",
+    ),
+    Method(
+        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT, _solve_flywheel,
+        known_channels=frozenset(OF_FLYWHEEL),
+        accepts_constant=lambda _: False,
+        proves="the optimum",
+    ),
+    Method(
+        "second-order cones", {**_UNBALANCES, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, solve_polished,
+        refines_fidelity=True,
+        proves="the optimum",
+    ),
+    Method(
+        "second-order cones of pistons", {**_UNBALANCES, Kind.PISTON: _AFFINE}, ProofStrength.EXACT, solve_polished,
+        refines_fidelity=True,
+        proves="the optimum",
+    ),
+    Method(
+        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, _solve_leads,
+        refines_fidelity=True,
+        known_channels=frozenset({IRREGULARITY}),
+        accepts_norm=is_pointwise,
+        accepts_constant=is_no_number,
+        proves="the optimum, as far as the boxes go (P13)",
+    ),
+    Method(
+        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT, _solve_shared_leads,
+        refines_fidelity=True,
+        known_channels=frozenset({MOUNT_FORCE, *OF_BLOCK}),
+        accepts_norm=is_pointwise,
+        accepts_constant=is_no_number,
+        accepts_problem=_is_rigid,
+        proves="the optimum, as far as the boxes go (P15)",
+    ),
+    Method(
+        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT, _solve_places,
+        refines_fidelity=True,
+        known_channels=OF_SHAFT_PLACES,
+        accepts_norm=is_pointwise,
+        proves="the optimum, as far as the boxes go (P8)",
+    ),
+    Method(
+        "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, _solve_phasing,
+        refines_fidelity=True,
+        accepts_norm=is_pointwise,
+        proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
+        "pins go (S29, S30)",
+    ),
+    Method(
+        "linear matrix inequalities", {Kind.STIFFNESS: ()}, ProofStrength.EXACT, solve_convex_mounts,
+        known_channels=frozenset({*CONVEX, FREQUENCIES}),
+        accepts_problem=is_convex,
+        proves="the optimum",
+    ),
+    Method(
+        "smooth program, boxes of stiffness", {Kind.STIFFNESS: ()}, ProofStrength.PARTIAL, _solve_joint,
+        known_channels=OF_MOUNTS,
+        accepts_norm=is_pointwise,
+        proves="mostly the optimum of up to four numbers, often of six; else a bound",
+    ),
+    Method(
+        "smooth program", _MOUNTS, ProofStrength.RELAXED, _solve_joint,
+        known_channels=OF_MOUNTS,
+        accepts_norm=is_pointwise,
+        proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound",
+    ),
+    Method(
+        "flywheel, crankshaft and other decisions separately",
+        dict.fromkeys(sorted(set(KINDS.values()) - {Kind.STAR}), _ANY), ProofStrength.RELAXED, solve_separable,
+        accepts_norm=_any_norm,
+        accepts_problem=is_separable,
+        proves="what each of them proves",
+    ),
+    Method(
+        "stars, each with a smooth program", {Kind.STAR: BUILT, **_MOUNTS}, ProofStrength.RELAXED, _solve_star_mounts,
+        known_channels=OF_MOUNTS,
+        accepts_norm=is_pointwise,
+        accepts_problem=_distinguishes_stars,
+        proves="a local optimum, with a bound",
+    ),
+    Method(
+        "local programs, places at their corners",
+        {**_UNBALANCES, Kind.PLACE: _PLACED, Kind.PISTON: _AFFINE, Kind.SIZE: _MASSES, Kind.LEAD: _SHIFT},
+        ProofStrength.EXACT, solve_with_places,
+        refines_fidelity=True,
+        known_channels=OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
+        accepts_problem=_closes_without_places,
+        proves="what is proven of the rest with places at the corners of their bounds (P20)",
+    ),
+    Method(
+        "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
+        accepts_norm=_any_norm,
+        proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most",
+    ),
 )  # fmt: skip
 
 METHODS: tuple[Method, ...] = in_order("methods", Method, _CORE)
@@ -321,7 +380,7 @@ def _solve_by_method(problem: Problem) -> Result:
     """Solve a problem by the first method that suits it, with the bound of an exact method for part of its measures."""
     method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
-    conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
+    conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} else ()
     if conflict:
         return infeasible_result(problem, evaluate_start(problem), conflict, {})
     closing = _exact_part(problem, kinds, method)
@@ -395,11 +454,11 @@ class Reduction:
 
 
 REDUCTIONS: tuple[Reduction, ...] = (
-    Reduction("more samples where few are not enough", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
-    Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
+    Reduction("refined sampling", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
+    Reduction("lexicographic objectives", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
               _refuse_ranks),
-    Reduction("limits that nothing open moves", lambda p: bool(_constant_limits(p)), _without_constant_limits),
-    Reduction("an objective that nothing open moves", _has_constant_objective, _solve_without_decisions),
+    Reduction("constant limits", lambda p: bool(_constant_limits(p)), _without_constant_limits),
+    Reduction("constant objective", _has_constant_objective, _solve_without_decisions),
 )  # fmt: skip
 """Reductions of the core, in the order in which they are tried."""
 
@@ -416,7 +475,7 @@ def _exact_part(problem: Problem, kinds: frozenset[Kind], method: Method) -> tup
     if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None
     for other in METHODS:
-        if other.strength is not ProofStrength.EXACT or not kinds <= other.decides:
+        if other.strength is not ProofStrength.EXACT or not kinds <= other.kinds:
             continue
         unlimited = problem.changed(limits=())
         terms = tuple(term for term in problem.objective if other.suits(unlimited.changed(objective=(term,))))

@@ -27,9 +27,9 @@ LONG_CRANKS = Method(
     {Kind.STAR: BUILT, Kind.UNBALANCE: (Dependence.AFFINE,)},
     ProofStrength.EXACT,
     _solve_long_cranks,
-    True,
-    norms=is_pointwise,
-    also=_is_long,
+    refines_fidelity=True,
+    accepts_norm=is_pointwise,
+    accepts_problem=_is_long,
     proves="the optimum of up to sixteen throws with nothing else open, and of cranks without couples; else a bound",
     before="stars, each with cones",
 )

@@ -8,7 +8,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.methods import Decide, Reduction
 from laufruhe.solvers.result import Result
 
-_BEFORE = "limits that nothing open moves"
+_BEFORE = "constant limits"
 
 
 def _solve_assembly(problem: Problem, decide: Decide, rest: Decide) -> Result:

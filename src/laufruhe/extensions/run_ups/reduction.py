@@ -18,4 +18,4 @@ def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:
     return solve_runs(problem, open_kinds(problem), decide)
 
 
-REDUCTION = Reduction("run-ups", _applies, _solve, before="an objective that nothing open moves")
+REDUCTION = Reduction("run-ups", _applies, _solve, before="constant objective")

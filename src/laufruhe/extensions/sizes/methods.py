@@ -40,19 +40,21 @@ def _solve_mounted_sizes(problem: Problem) -> Result:
 
 
 ALONE = Method(
-    "boxes of sizes", _ALONE, ProofStrength.EXACT, _solve_sizes, True, OF_SIZES_ALONE, _is_of_row_lengths,
-    is_no_number, before="linear matrix inequalities",
+    "boxes of sizes", _ALONE, ProofStrength.EXACT, _solve_sizes,
+    refines_fidelity=True, known_channels=OF_SIZES_ALONE, accepts_norm=_is_of_row_lengths,
+    accepts_constant=is_no_number, before="linear matrix inequalities",
     proves="the optimum (Z12, Z14); with an open rod length within a gap, if kinks of a load move with it (Z13)",
 )  # fmt: skip
 WITH_STARS = Method(
     "stars, each with boxes of sizes", {Kind.STAR: BUILT, **_ALONE}, ProofStrength.EXACT,
-    _solve_star_sizes, True, OF_SIZES_ALONE, _is_of_row_lengths, is_no_number,
+    _solve_star_sizes, refines_fidelity=True, known_channels=OF_SIZES_ALONE, accepts_norm=_is_of_row_lengths,
+    accepts_constant=is_no_number,
     before="linear matrix inequalities", proves="the optimum, of 60 even stars or firing orders at most",
 )  # fmt: skip
 WITH_MOUNTS = Method(
     "local programs of sizes and mounts", {**_ALONE, Kind.STIFFNESS: (), Kind.MOUNT: ()}, ProofStrength.RELAXED,
-    _solve_mounted_sizes, False, OF_SIZES_ALONE | OF_MOUNTS, _is_of_row_lengths,
-    also=_minimises_loads,
+    _solve_mounted_sizes, known_channels=OF_SIZES_ALONE | OF_MOUNTS, accepts_norm=_is_of_row_lengths,
+    accepts_problem=_minimises_loads,
     before="stars, each with a smooth program",
     proves="a local optimum, with the bound of any masses that the sizes may have (Z15)",
 )  # fmt: skip

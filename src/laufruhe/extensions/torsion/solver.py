@@ -69,8 +69,10 @@ def solve_torsion(problem: Problem) -> Result:
 
 METHOD = Method(
     "boxes of discs and shafts", {TORSION: ()}, ProofStrength.PARTIAL,
-    solve_torsion, True,
-    frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
+    solve_torsion,
+    refines_fidelity=True,
+    known_channels=frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}),
+    accepts_norm=is_pointwise,
     proves="the optimum of root mean squares of two or three; else a local one",
-    before="flywheel, crankshaft and the rest apart",
+    before="flywheel, crankshaft and other decisions separately",
 )  # fmt: skip
