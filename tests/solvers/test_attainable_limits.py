@@ -257,7 +257,7 @@ def test_what_a_search_failed_at_is_infeasible_where_the_bound_says_so() -> None
     found = told_of(problem_of([LIGHT, QUIET]), Status.FAILED)
     assert found.status is Status.INFEASIBLE
     assert set(found.conflict) == {"light", "quiet"}
-    assert "none that keeps the other limits keeps 'quiet'" in found.message
+    assert "none that meets the other limits meets 'quiet'" in found.message
     # the light limit may be one of those that are not needed for that
     assert "needed" not in explained(found)
     assert found.decisions == ()
@@ -298,7 +298,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("at the time limit" in text for text in sentences(found)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
-    told = [(step.done, step.whole) for step in steps if step.what == "what limits can reach"]
+    told = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
     assert told == [(0, 2), (1, 2)]
     # whoever listens is told what is known before what takes longer
     assert {step.within[0] for step in steps} == {none.message}

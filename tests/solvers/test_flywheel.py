@@ -282,11 +282,11 @@ def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> 
     prices = {limit.name: limit.shadow_price for limit in both.limits}
     assert prices["counterweight mass"] == pytest.approx(0.01 * alone[1].limits[0].shadow_price, rel=1e-3)
     assert prices["degree of irregularity at rated"] == pytest.approx(alone[0].limits[0].shadow_price, rel=1e-6)
-    with pytest.raises(ModelError, match="nothing of it is minimised"):
+    with pytest.raises(ModelError, match="no objective term depends on it"):
         laufruhe.solve(
             loaded(tmp_path, SINGLE + INERTIA + web + changed(LEAST, "flywheel inertia", "mean shaking force"))
         )
-    with pytest.raises(ModelError, match="nothing that is asked depends on it"):
+    with pytest.raises(ModelError, match="no objective or limit depends on it"):
         laufruhe.solve(loaded(tmp_path, SINGLE + INERTIA + web + force))
 
 

@@ -50,5 +50,5 @@ def test_without_casadi_counterweights_are_decided_and_uneven_throws_say_what_th
     paths = [str(PROBLEMS / f"{name}.toml") for name in ("tractor-single", "inline-nine-uneven")]
     found = subprocess.run([sys.executable, "-c", SCRIPT, *paths], check=True, capture_output=True, text=True)
     assert found.stdout.splitlines() == [
-        "optimal", "what is open needs casadi, which is not installed; pip install casadi",
+        "optimal", "these open numbers need casadi, which is not installed; pip install casadi",
     ]  # fmt: skip

@@ -78,7 +78,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
     bound, zero_level = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
-        gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less what the gas may miss",
+        gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less the error of the gas pressure",
     )  # fmt: skip
     status = Status.FEASIBLE if result.status is Status.OPTIMAL else result.status
     return replace(result, status=status, certificate=weaker)

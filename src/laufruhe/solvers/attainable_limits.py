@@ -41,7 +41,7 @@ LEAST_SECONDS = 10.0
 """Time limit of all limits together [s], if the solve itself took less."""
 HALVINGS, CLOSE = 10, 1e-3
 """Largest number of bisections of a limit, and relative width at which they stop."""
-LONG = "there was no time left for it; give more by a time limit"
+LONG = "no time was left; raise the time limit"
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,8 @@ def with_attainable_limits(
     seconds = None if math.isfinite(seconds_left()) else max(LEAST_SECONDS, spent)
     with limit_time(seconds), search_scope(result.message or str(result.status)):
         for k, limit in enumerate(limits):
-            report_progress("what limits can reach", k, len(limits))
-            with search_scope(f"what '{limit.name}' can reach"), limit_time(seconds_left() / (len(limits) - k)):
+            report_progress("attainable limits", k, len(limits))
+            with search_scope(f"attainable value of '{limit.name}'"), limit_time(seconds_left() / (len(limits) - k)):
                 answers.append(_mark_time_limit(_find_attainable(limit, problem, kinds, result, solve)))
         if len(result.conflict) > 1 and any(answer.is_infeasible for answer in answers):
             result = _shrink_conflict(result, problem, solve)
@@ -128,7 +128,7 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
     """Return the attainable value of a limit under the others; its lower side if the upper one is not the cause."""
     measure, default = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
-        return _Answer(replace(default, why="a band is kept or not; no single value can be reached"))
+        return _Answer(replace(default, why="a band has no single attainable value"))
     other_limits = tuple(other for other in problem.limits if other is not limit)
     sides = [("at most", limit.maximum, replace(limit, minimum=-math.inf), replace(limit, maximum=math.inf))]
     sides += [("at least", limit.minimum, *reversed(sides[0][2:]))]
@@ -142,7 +142,7 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
         if not depends(measure.channel, kinds, problem):
             known = {entry.name: entry.value for entry in result.limits}
             value = math.nan if result.initial.resonance else known.get(limit.name, math.nan)
-            return _Answer(replace(entry, value=value, why="nothing that is open changes it"))
+            return _Answer(replace(entry, value=value, why="no open number changes it"))
         limits = (
             other_limits
             if math.isinf(other_side.minimum) and math.isinf(other_side.maximum)
@@ -199,9 +199,9 @@ def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
     # the other limits have no design either
     if result.status is Status.INFEASIBLE:
         names = quote_names(result.conflict)
-        reason = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
+        reason = f"the other limits cannot be met together either{names and ': no design meets '}{names}"
         return _Answer(replace(entry, why=reason), is_infeasible=True)
-    return _Answer(replace(entry, why=LONG if is_time_over() else "no design was found that keeps the other limits"))
+    return _Answer(replace(entry, why=LONG if is_time_over() else "no design was found that meets the other limits"))
 
 
 def _shrink_conflict(result: Result, problem: Problem, solve: Solve) -> Result:
@@ -278,9 +278,9 @@ def _infeasible_by_bound(result: Result, problem: Problem) -> Result:
     for entry in result.reached:
         if entry.side == "at most" and entry.bound > entry.limit * (1.0 + FEASIBILITY_TOL):
             names = tuple(limit.name for limit in problem.limits)
-            others = " that keeps the other limits" if len(names) > 1 else ""
+            others = " that meets the other limits" if len(names) > 1 else ""
             infeasible = infeasible_result(problem, result.initial, names, result.timing)
-            message = f"no design exists: none{others} keeps '{entry.name}'"
+            message = f"no design exists: none{others} meets '{entry.name}'"
             return replace(infeasible, message=message, reached=result.reached)
     return result
 

@@ -286,8 +286,8 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
 
 def violation_message(problem: Problem, evaluation: Evaluation) -> str:
     """Return a message that the best design found violates limits."""
-    broken = quote_names(violated_limits(problem.limits, evaluation)) or "a limit"
-    return f"the best design found breaks {broken}; relax it, or open more"
+    names = quote_names(violated_limits(problem.limits, evaluation)) or "a limit"
+    return f"the best design found violates {names}; relax it, or open more numbers"
 
 
 def evaluate_only(problem: Problem, to_start_from: bool = False) -> Result:
@@ -347,7 +347,7 @@ def infeasible_result(
 def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
     """Return a failed result: no feasible design was found, and none is proven not to exist."""
     message = (
-        f"no design was found that keeps {quote_names(tuple(names))}, and none is excluded; relax it, or give more time"
+        f"no design was found that meets {quote_names(tuple(names))}, but one may exist; relax it, or allow more time"
     )
     return replace(infeasible_result(problem, initial, (), timing), status=Status.FAILED, message=message)
 

@@ -92,7 +92,7 @@ def _subproblems(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
     for part in parts.values():
         if part.decisions and not part.objective:
             what = part.decisions[0].name.split(".")[0]
-            raise ModelError(f"{what} is open and nothing of it is minimised; add a term of it, or fix it")
+            raise ModelError(f"{what} is open, but no objective term depends on it; add one, or fix it")
     return {group: part for group, part in parts.items() if part.decisions or part.objective or part.limits}
 
 
@@ -121,7 +121,7 @@ def _joint_certificate(results: list[Result], value: float) -> Certificate:
     certificates = [certificate for certificate, _ in pairs if certificate is not None]
     kind = min((certificate.kind for certificate in certificates), key=PROOF_RANK)
     residual = max(certificate.kkt_residual for certificate in certificates)
-    method = "; beside it ".join(certificate.method for certificate in certificates)
+    method = "; and ".join(certificate.method for certificate in certificates)
     if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in results)):
         return unproven_certificate(value, residual, method)
     gap = (value - bound) / value if value > 0.0 else 0.0

@@ -97,9 +97,9 @@ def _joint_result(
         name = problem.ranks[len(stages)].terms[0].measure.name
         # the last design meets all limits of the missing rank
         reason = (
-            "was not decided: time was over"
+            "was not minimised: the time limit was reached"
             if is_time_over()
-            else "found no design under the limits of those before it"
+            else "has no design under the limits of the objectives before it"
         )
         message = f"objective {len(stages) + 1}, {name}, {reason}"
     weakest = min((rank.proof for rank in ranks), key=PROOF_RANK)
@@ -154,7 +154,7 @@ def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) ->
     certificate = first.certificate
     if certificate is None:
         return None
-    method = f"{certificate.method}; then {len(ranks) - 1} more in order"
+    method = f"{certificate.method}; then {len(ranks) - 1} further objectives in order"
     return replace(certificate, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
 
 

@@ -294,7 +294,7 @@ def solve(
         except ModuleNotFoundError as error:
             if error.name not in OPTIONAL_PACKAGES:
                 raise
-            why = f"what is open needs {error.name}, which is not installed; pip install {error.name}"
+            why = f"these open numbers need {error.name}, which is not installed; pip install {error.name}"
             raise SolverError(why) from None
         except SolverError:
             if not is_time_over():
@@ -325,7 +325,7 @@ def _at_time_limit(problem: Problem, result: Result | None) -> Result:
                 problem.phasing is None
                 and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= FEASIBILITY_TOL
             ):
-                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the design as given; {TIME_LIMIT_NOTE}")
+                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the baseline design; {TIME_LIMIT_NOTE}")
                 return build_result(initial, initial.evaluation, proof, {})
     if result is None:
         raise SolverError("no design was found within the time limit; raise it")
@@ -358,12 +358,16 @@ def refuse(problem: Problem) -> None:
         return
     kinds = open_kinds(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
-        raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
+        raise ModelError(
+            "fidelity.mounts and fidelity.modes depend on mounts, which are open; remove them from [fidelity]"
+        )
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
-        raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
+        raise ModelError(
+            "flywheel is open, but no objective or limit depends on it; fix it, or add its inertia to the objective"
+        )
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
-        raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
+        raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).solver is _solve_phasing:
         _refuse_long_cranks(problem)
 
@@ -401,15 +405,15 @@ def _constant_limits(problem: Problem) -> list[Limit]:
 
 
 def _without_constant_limits(problem: Problem, decide: Decide, _: Decide) -> Result:
-    fixed = _constant_limits(problem)
+    constant = _constant_limits(problem)
     initial = evaluate_start(problem)
     # raise ModelError first if the initial design cannot be evaluated
     objective_value(problem, initial)
-    problem, least_shafts = exclude_collisions(problem, fixed, initial)
-    violated = violated_limits(fixed, with_fine_sampling(least_shafts))
+    problem, least_shafts = exclude_collisions(problem, constant, initial)
+    violated = violated_limits(constant, with_fine_sampling(least_shafts))
     if violated:
         return infeasible_result(problem, initial, violated, {})
-    open_limits = tuple(limit for limit in problem.limits if limit not in fixed)
+    open_limits = tuple(limit for limit in problem.limits if limit not in constant)
     return with_constant_limits(decide(problem.changed(limits=open_limits)), problem.limits)
 
 
@@ -424,7 +428,7 @@ def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Resul
     design = evaluate_design(problem, problem.start)
     if design.violation > FEASIBILITY_TOL:
         return rest(problem)
-    proof = ProofData(design.value, ProofStrength.EXACT, 0.0, "nothing open changes what is minimised")
+    proof = ProofData(design.value, ProofStrength.EXACT, 0.0, "no open number changes the objective")
     return build_result(design, design.evaluation, proof, {})
 
 

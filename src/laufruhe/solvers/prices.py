@@ -104,8 +104,8 @@ class Slopes:
         step = -(-len(self.hull) // MOST_CORNERS)
         if step == 1:
             return self.hull
-        ways = (self.hull - self.hull.mean(axis=0))[::step]
-        return np.asarray(self.hull[np.unique(np.argmax(self.hull @ ways.T, axis=0))])
+        directions = (self.hull - self.hull.mean(axis=0))[::step]
+        return np.asarray(self.hull[np.unique(np.argmax(self.hull @ directions.T, axis=0))])
 
     @property
     def is_smooth(self) -> bool:
@@ -169,28 +169,28 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
     columns = np.concatenate(parts)
     numbers = np.split(np.arange(len(columns)), np.cumsum([len(part) for part in parts])[:-1])
     # the last variable is the residual of the balance
-    each, last = np.eye(len(columns) + 1), len(columns)
-    totals = np.array([each[slopes].sum(axis=0) for slopes in numbers[::2]])
+    unit, last = np.eye(len(columns) + 1), len(columns)
+    totals = np.array([unit[slopes].sum(axis=0) for slopes in numbers[::2]])
     pullback = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
-    above = [pullback - each[last], -pullback - each[last], *(-each[slopes] for slopes in numbers[::2]), -each[last:]]
+    above = [pullback - unit[last], -pullback - unit[last], *(-unit[slopes] for slopes in numbers[::2]), -unit[last:]]
     maximum = [np.zeros(sum(map(len, above)))]
     for k, slopes in enumerate(numbers[1::2]):
         # a segment of the objective has factors up to one, a segment of a limit up to its price
-        held = totals[k] if k >= count else np.zeros(last + 1)
-        above += [each[slopes] - held, -each[slopes] - held]
+        bound = totals[k] if k >= count else np.zeros(last + 1)
+        above += [unit[slopes] - bound, -unit[slopes] - bound]
         maximum.append(np.full(2 * len(slopes), 1.0 if k < count else 0.0))
     program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *maximum]), count)
-    left = program.minimum(each[last])
+    left = program.minimum(unit[last])
     if not left <= BALANCED:
         return None
-    program = program.under(each[last], 1.01 * left + _RESIDUAL_MARGIN)
-    found = []
+    program = program.under(unit[last], 1.01 * left + _RESIDUAL_MARGIN)
+    prices = []
     for total, scale in zip(totals[count:], scales[count:], strict=True):
         low, high = program.minimum(total), -program.minimum(-total)
         if math.isnan(low) or math.isnan(high):
             return None
-        found.append(Price(max(low, 0.0) * size / scale, high * size / scale))
-    return found
+        prices.append(Price(max(low, 0.0) * size / scale, high * size / scale))
+    return prices
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,19 +231,19 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
     if bounds.width == 1:
         tolerance = (bounds.scale if decision.is_affine else bounds.upper - bounds.lower) * ACTIVE
         value = float(column[0])
-        found = {decision.name: np.ones(1)} if value >= bounds.upper - tolerance else {}
-        return {decision.name: -np.ones(1)} if value <= bounds.lower + tolerance else found
+        normals = {decision.name: np.ones(1)} if value >= bounds.upper - tolerance else {}
+        return {decision.name: -np.ones(1)} if value <= bounds.lower + tolerance else normals
     size = float(np.hypot(*column))
     if size <= bounds.scale * ACTIVE:
         return {}
     direction = column / size
-    found = {decision.name: direction} if size >= bounds.upper - bounds.scale * ACTIVE else {}
+    normals = {decision.name: direction} if size >= bounds.upper - bounds.scale * ACTIVE else {}
     turn = np.array([-direction[1], direction[0]])
     for edge, sign in zip(bounds.edges, (-1.0, 1.0), strict=False):
         if direction @ edge >= 1.0 - EDGE:
             # a rotation by one radian moves the vector by its size
-            found[angle_name(decision)] = sign * turn / size
-    return found
+            normals[angle_name(decision)] = sign * turn / size
+    return normals
 
 
 def _angle_normals(decision: Decision, column: Array) -> list[Array]:
@@ -287,15 +287,15 @@ def affine_prices(
     ]  # fmt: skip
     # bounds of an angle act on a size of zero and have no price there
     apex = [
-        (domain.columns, own)
+        (domain.columns, normal)
         for domain in problem.domains
-        for own in _angle_normals(domain.decision, x[domain.columns])
+        for normal in _angle_normals(domain.decision, x[domain.columns])
     ]
     normals = np.zeros((len(edges) + len(apex), problem.size))
     for row, (columns, normal) in zip(normals, [*edges.values(), *apex], strict=True):
         row[columns] = normal
-    scaled = [None if own is None else own.scaled(problem.units) for own in (*objective, *limit_slopes)]
-    known = [own for own in scaled if own is not None]
+    scaled = [None if slopes is None else slopes.scaled(problem.units) for slopes in (*objective, *limit_slopes)]
+    known = [slopes for slopes in scaled if slopes is not None]
     count, ranges = len(objective), None
     if len(known) == len(scaled) and not problem.groups:
         ranges = prices_of(known[:count], known[count:], normals * problem.units)
@@ -335,9 +335,9 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
 
 def _disc_segments(slope: Array) -> list[Array]:
     # segments that add up to the image of the unit ball, shape (n,) each
-    sizes, ways = np.linalg.svd(slope, full_matrices=False)[1:]
+    sizes, directions = np.linalg.svd(slope, full_matrices=False)[1:]
     strong = sizes > EDGE * sizes.max(initial=0.0)
-    axes = sizes[strong, None] * ways[strong]
+    axes = sizes[strong, None] * directions[strong]
     if len(axes) != 2:
         return list(axes)
     turns = math.pi * np.arange(_DIRECTIONS) / _DIRECTIONS

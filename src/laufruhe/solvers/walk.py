@@ -438,7 +438,7 @@ def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bo
         problem=problem_of_design,
         status=Status.FEASIBLE,
         objective=ObjectiveValue.of(original, witness.value, objective_value(original, result.initial)),
-        certificate=unproven_certificate(witness.value, math.inf, "a walk by exact evaluations, which proves nothing"),
+        certificate=unproven_certificate(witness.value, math.inf, "local search by exact evaluations, without a bound"),
         decisions=decisions,
         limits=limit_values(problem_of_design, witness.evaluation),
         final=witness.evaluation,
@@ -448,9 +448,9 @@ def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bo
         ranks=_rank_values(result, witness),
         nearest=None,
     )
-    source, claim = "a walk", bound
+    source, claim = "check by local search", bound
     if result.status is Status.INFEASIBLE:
-        source, claim = "a walk; it was said that no design keeps the limits", math.inf
+        source, claim = "check by local search: a design meets the limits, although none was said to exist", math.inf
     return without_proof(unproven, BoundError(source, claim, witness.value))
 
 

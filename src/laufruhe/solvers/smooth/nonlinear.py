@@ -183,20 +183,20 @@ def _run_first_stage(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, stop_when: StopWhen | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], RunStarts]:
     """Return the optima of the starts, and the function that runs further starts."""
-    rest = points[1:]
-    count = min(len(rest), workers if workers is not None else worker_count())
+    remaining = points[1:]
+    count = min(len(remaining), workers if workers is not None else worker_count())
     # the linear solver is not safe for threads
     ready_workers = _ReadyWorkers(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
     if ready_workers is not None:
-        ready_workers.begin((task, rest[:ROUND] if stop_when is not None else rest))
+        ready_workers.begin((task, remaining[:ROUND] if stop_when is not None else remaining))
     # the duration of one start decides if the others run in processes
     started = time.process_time()
     optima = run((task, points[:1]))
     spent = sum(o.seconds for o in optima)
-    pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - started - spent)
+    pays = spent * len(remaining) > WORTH_PROCESSES + (time.process_time() - started - spent)
     run_starts: RunStarts = ready_workers or (_SharedStarts(stack, count) if count > 1 and pays else run)
-    while rest and not is_time_over() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
-        batch, rest = (rest[:ROUND], rest[ROUND:]) if stop_when is not None else (rest, [])
+    while remaining and not is_time_over() and not (stop_when is not None and stop_when(_merge_equal(optima, task))):
+        batch, remaining = (remaining[:ROUND], remaining[ROUND:]) if stop_when is not None else (remaining, [])
         optima += run_starts((task, batch))
     return optima, run_starts
 

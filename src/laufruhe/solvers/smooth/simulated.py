@@ -39,7 +39,7 @@ class SimulatedVariables:
         if self._peaks is None:
             return
         if not self._peaks.is_known:
-            raise ModelError("a simulation of so many turns is checked, not designed for; make it shorter")
+            raise ModelError("a simulation of so many turns can be evaluated, but not optimised; make it shorter")
         self.symbols = ca.MX.sym("simulated", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
         columns = decision_vector(domains_of(problem.unbalances))
