@@ -20,9 +20,9 @@ def smallest(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool])
     """
     subset = list(conflicting)
     for element in tuple(subset):
-        without = [other for other in subset if other is not element]
-        if conflicts(without):
-            subset = without
+        reduced = [other for other in subset if other is not element]
+        if conflicts(reduced):
+            subset = reduced
     return subset
 
 

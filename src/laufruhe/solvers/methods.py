@@ -72,7 +72,7 @@ def solve_with_places(problem: Problem) -> Result:
     from laufruhe.solvers.boxes.places import solve_places_with
 
     method = _method(without_places(problem))
-    # `Method.solve` judges the fidelity of all numbers, so the inner solver does not
+    # `Method.solve` refines the fidelity, so the inner solver does not
     return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
 
 
@@ -80,11 +80,11 @@ def _closes_without_places(problem: Problem) -> bool:
     return Kind.PLACE in open_kinds(problem) and _method(without_places(problem)).strength is ProofStrength.EXACT
 
 
-def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
+def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
     """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
     from laufruhe.solvers.general import solve_generally
 
-    return solve_generally(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, near)
+    return solve_generally(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
 
 
 def _solve_flywheel(problem: Problem) -> Result:
@@ -140,7 +140,7 @@ def _is_rigid(problem: Problem) -> bool:
 
 
 def _distinguishes_stars(problem: Problem) -> bool:
-    # measures that are numbers tell stars apart only at even steps
+    # a measure that is a single number ranks stars only if throws stand on even steps
     moves = problem.phasing is not None and problem.phasing.continuous
     numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
     return problem.engine.block is not None and not (moves and any(numbers))

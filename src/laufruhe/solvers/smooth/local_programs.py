@@ -243,7 +243,7 @@ def prove_design(program: LocalProgram, best: Array, bounded: BoundByBoxes) -> P
     return result
 
 
-def proof_data(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
+def proof_data(program: LocalProgram, design: Design, bound: float, strength: ProofStrength, method: str) -> ProofData:
     """Return a lower bound with shadow prices of active limits and bounds, and the residual of their balance.
 
     Parameters
@@ -281,7 +281,7 @@ def proof_data(program: LocalProgram, design: Design, bound: float, reach: Proof
         prices[limit, side] = Price.both(float(share) * scale / (largest * (abs(edge) or 1.0)))
         remainder = remainder - float(share) * scale / largest * slopes[1 + k]
     bounds = _two_sided_prices(program, best, slopes, remainder, sides, prices)
-    return ProofData(bound, reach, float(residual), method, prices, bounds)
+    return ProofData(bound, strength, float(residual), method, prices, bounds)
 
 
 def _two_sided_prices(
