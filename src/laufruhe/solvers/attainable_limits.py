@@ -41,7 +41,7 @@ LEAST_SECONDS = 10.0
 """Time limit of all limits together [s], if the solve itself took less."""
 HALVINGS, CLOSE = 10, 1e-3
 """Largest number of bisections of a limit, and relative width at which they stop."""
-LONG = "no time was left; raise the time limit"
+LONG = "there was no time left; raise the time limit"
 
 
 @dataclass(frozen=True, eq=False)

@@ -325,7 +325,7 @@ def _at_time_limit(problem: Problem, result: Result | None) -> Result:
                 problem.phasing is None
                 and max(initial.violation, violation_at_fine_sampling(problem, initial.evaluation)) <= FEASIBILITY_TOL
             ):
-                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the baseline design; {TIME_LIMIT_NOTE}")
+                proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the initial design; {TIME_LIMIT_NOTE}")
                 return build_result(initial, initial.evaluation, proof, {})
     if result is None:
         raise SolverError("no design was found within the time limit; raise it")

@@ -202,7 +202,7 @@ class _Program:
 def _compiled_program(
     oracle: str, expand: bool, max_iterations: int, external_model: SerializedExternal | None, stay_near: bool = False
 ) -> _Program:
-    """Return the compiled solver of a program; with `stay_near` its barrier is small. Compiling is as slow as several starts."""
+    """Return the compiled solver of a program, which takes as long as several starts; `stay_near`: small barrier."""
     function, external = ca.Function.deserialize(oracle), None
     if expand:
         scalars = function.expand()
