@@ -112,7 +112,7 @@ def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.M
     told.pop("counterweights", None)
     told["engine"] = {**told["engine"], "crank_lead": {"between": [4, 16]}}
     told |= {"objective": {"minimise": "rms roll moment"}, "tolerance": 1e-2, "fidelity": {"samples": 180}}
-    scaled(SharedGasBoxes, "_bounded", times(1.01))(monkeypatch)
+    scaled(SharedGasBoxes, "_bound", times(1.01))(monkeypatch)
     with pytest.raises(BoundError):
         laufruhe.solve(load_tables(told, Path("shared.toml")))
 

@@ -24,8 +24,8 @@ ALLOWED = {
     "min(self._minimum, child.level)",
     "min(queue[0].bound if queue else math.inf, self._minimum, self.level)",
     # the least of the bounds of several stars
-    "min(known, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",
-    "min(known, float(bounds.min(initial=math.inf)))",
+    "min(incumbent, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",
+    "min(incumbent, float(bounds.min(initial=math.inf)))",
     # of an objective in ranks the least value that is known, when a walk finds a better one
     "min(rank.minimum, value)",
     # what springs do at most, and how much is worth looking at

@@ -24,7 +24,7 @@ from laufruhe.problem.channels import counted_cases, mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, with_mounts
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_cases import static_loads
-from laufruhe.prove.mounts.box_numbers import UNDER
+from laufruhe.prove.mounts.box_numbers import LINEAR_BOUNDS
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
@@ -142,7 +142,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
     # of loads that are held no operating point is asked
     still = evaluate(replace(problem, points=()))
     for low, high in zip(*boxes(problem, 30, 3), strict=True):
-        found = UNDER[measure.channel](model, measure, low[None], high[None])
+        found = LINEAR_BOUNDS[measure.channel](model, measure, low[None], high[None])
         shares = generator.random((5, 2))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in shares]
         values = np.array([with_mounts(still, engine).value(measure) for engine in drawn])

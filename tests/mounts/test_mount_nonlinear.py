@@ -203,10 +203,10 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
     def by_provers(question):
         value = question.value
         values.append(value)
-        assert question.known.place == pytest.approx([number.real for number in question.near])
+        assert question.witness.place == pytest.approx([number.real for number in question.good_values])
         return BoxResult(0.9 * value, 3, (np.array(stiffness),) if len(values) == 1 else ())
 
-    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.proven", by_provers)
+    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.run_provers", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])
     given = search.best.design.value
     found = bound_search(problem, search, False)

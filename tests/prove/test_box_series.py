@@ -33,11 +33,11 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
         sides = directions_of(
             [[side.real, side.imag, end.real] for side, end in zip(told["sides"], told["ends"], strict=True)]
         )
-        assert np.bincount(sides.own).tolist() == list(ranks)
+        assert np.bincount(sides.number_of_column).tolist() == list(ranks)
         inverse = np.linalg.inv(told["middle"])
         motion = np.einsum("kij,kj->ki", inverse, told["loads"])
         at = series(halves, halves, inverse[None], sides, sides.inside(told["sides"]), motion[None])
-        turned = sides.along(told["ends"]) * halves[0, sides.own]
+        turned = sides.along(told["ends"]) * halves[0, sides.number_of_column]
         answer = mapped(at, told["value"][None], turned)
         ended += int(np.isfinite(answer.rest).sum())
         corners = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(ranks))).reshape(len(ranks), -1).T
@@ -71,7 +71,7 @@ def test_a_number_of_no_width_moves_nothing() -> None:
     inverse = np.linalg.inv(told["middle"])
     motion = np.einsum("kij,kj->ki", inverse, told["loads"])
     at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
-    answer = mapped(at, told["value"][None], sides.along(told["ends"]) * wide[0, sides.own])
+    answer = mapped(at, told["value"][None], sides.along(told["ends"]) * wide[0, sides.number_of_column])
     assert np.all(answer.slopes[0, :, 1] == 0.0)
     assert np.all(answer.bends[0, :, 1] == 0.0)
     assert np.all(answer.bends[0, :, 0] > 0.0)

@@ -12,7 +12,7 @@ import pytest
 from laufruhe.numerics.budget import limit_time
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts import provers
-from laufruhe.prove.mounts.provers import Prover, Question, proven
+from laufruhe.prove.mounts.provers import Prover, Question, run_provers
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
 FORCE = '[objective]\nminimise = "rms mount force"\n'
@@ -50,7 +50,7 @@ def test_each_has_its_turn_until_one_closes(
     never = Prover("never", lambda _: False, bounds_of("n", [(1.0, 1)]).bounds)
     monkeypatch.setattr(provers, "provers", lambda: (never, bounds_of("f", first), bounds_of("s", second)))
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
-    found = proven(Question(problem, 1.0, 0.1))
+    found = run_provers(Question(problem, 1.0, 0.1))
     assert (found.bound, found.boxes, "".join(name for name, _ in asked)) == (bound, boxes, order)
     assert bool(found.places) is bool(order)
     # each knows the best bound before its own
@@ -58,11 +58,11 @@ def test_each_has_its_turn_until_one_closes(
     assert all(known in told for _, known in asked)
     with limit_time(1e-9):
         asked.clear()
-        proven(Question(problem, 1.0, 0.1))
+        run_provers(Question(problem, 1.0, 0.1))
         assert "".join(name for name, _ in asked) == order[:1]
 
 
 @pytest.mark.slow
 def test_a_question_without_a_design_asks_if_there_is_one(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
-    assert proven(Question(problem, math.inf, math.inf)).bound < math.inf
+    assert run_provers(Question(problem, math.inf, math.inf)).bound < math.inf

@@ -18,9 +18,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import under
+from laufruhe.prove.mounts.box_norms import lower_bound_of_norm
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bounds, divides
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem, stiffness_bounds
 from laufruhe.prove.witness import Witness
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
@@ -49,7 +49,7 @@ orders = 24
 
 def divided_bound(problem: Problem, value: float, room: float, known: Witness | None = None) -> BoxResult:
     """Return the bound by all boxes that are worth it; of no boxes zero."""
-    return next(divided_bounds(problem, value, room, (1.0,), known), BoxResult(0.0, 0))
+    return next(stiffness_bounds(problem, value, room, (1.0,), known), BoxResult(0.0, 0))
 
 
 ASKED = {
@@ -93,7 +93,7 @@ def boxes(problem: Problem, count: int, seed: int) -> tuple[np.ndarray, np.ndarr
 @pytest.mark.parametrize("name", first_fast(ASKED, 2))
 def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED[name])
-    assert divides(problem)
+    assert is_stiffness_problem(problem)
     given = evaluate(problem)
     search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, given))
     low, high = boxes(problem, 25, 1)
@@ -121,7 +121,7 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)
         at = search.model.expanded(search.model.lines(), low[None], high[None])
-        found = under(search.model, problem.objective[0].measure, search.model.lines(), at)
+        found = lower_bound_of_norm(search.model, problem.objective[0].measure, search.model.lines(), at)
         assert float(found.value[0]) == pytest.approx(value, abs=float(found.rest[0]))
         lacking.append(float(found.rest[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]
@@ -296,11 +296,11 @@ def test_how_often_bounds_are_divided_may_be_said(tmp_path: Path) -> None:
 def test_what_is_not_divided(tmp_path: Path) -> None:
     """Positions, losses and unbalances move more than stiffness; nine numbers are too many."""
     lossy = changed(MOUNTS, ('position  = ["300', 'loss_factor = { between = [0.05, 0.2] }\nposition  = ["300'))
-    assert not divides(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", ASKED["rms"]))
+    assert not is_stiffness_problem(problem_of(tmp_path, ENGINE, BLOCK, lossy, "[objective]", ASKED["rms"]))
     many = load(PROBLEMS / "powertrain-least-force.toml")
-    assert divides(many)
+    assert is_stiffness_problem(many)
     assert divided_bound(many, 13.1, 1e-3).boxes == 0
-    assert not divides(load(PROBLEMS / "tractor-four-elastic.toml"))
+    assert not is_stiffness_problem(load(PROBLEMS / "tractor-four-elastic.toml"))
     assert divided_bound(replace(many, search=replace(many.search, boxes=3)), 13.1, 1e-3).boxes >= 3
 
 

@@ -106,7 +106,7 @@ def test_a_torque_at_either_point_changes_a_norm_by_no_more_than_is_told(norm: s
             "maximum": sizes.max(),
             "peak to peak": np.ptp(torques, axis=1).max(),
         }[norm]
-        told = boxes._by_gas(measure, changes)
+        told = boxes._gas_change(measure, changes)
         assert true * (1.0 - 1e-12) <= told <= 3.0 * true
 
 

@@ -45,4 +45,4 @@ def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.
     for known, boxes in ((0.4, 9), (0.7, 1)):
         question = Question(problem, 1.0, 0.1, bound=known)
         assert [found.boxes for found in prover.load_answers(question)][-1] == boxes
-    assert not [*prover.load_answers(Question(problem, 1.0, 0.1, of_many=True))]
+    assert not [*prover.load_answers(Question(problem, 1.0, 0.1, in_batch=True))]

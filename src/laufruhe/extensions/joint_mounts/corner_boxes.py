@@ -34,7 +34,7 @@ from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult, Thin
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.mounts.subdivision import EVEN, divides
+from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
 from laufruhe.prove.witness import Witness, check_near_witness
 
 MOST_OPEN = 5
@@ -78,7 +78,7 @@ def mixes_corners(problem: Problem) -> bool:
 
     One open number, or stiffness alone, needs no vertices.
     """
-    if len(problem.decisions) < 2 or len(problem.mount_decisions) > MOST_OPEN or divides(problem):
+    if len(problem.decisions) < 2 or len(problem.mount_decisions) > MOST_OPEN or is_stiffness_problem(problem):
         return False
     terms = problem.load_terms
     if named_part(problem) is not problem or problem.mount_terms or len(terms) != len(problem.objective):

@@ -20,7 +20,7 @@ from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Multipliers, minorant
-from laufruhe.prove.mounts.box_response import NOTHING, LoadedOrders, is_travel
+from laufruhe.prove.mounts.box_response import NEGLIGIBLE, LoadedOrders, is_travel
 from laufruhe.prove.mounts.ranges import SLACK
 
 
@@ -86,7 +86,7 @@ class MountedLoads:
             waves = np.exp(1j * float(base) * np.outer(angles, np.arange(loads.shape[1])))
             loads[0] -= np.einsum("pk,pki->ki", waves, loads[1 + len(slopes) :])
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)
-            for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
+            for k in np.flatnonzero(size > NEGLIGIBLE * size.max(initial=0.0)):
                 number, place = float(k) * float(base), int(k) * base / self._model.base
                 rows.append((p, round(place), number, number * point.speed, loads[:, k]))
         points, places, numbers, omegas, wrenches = (np.array(column) for column in zip(*rows, strict=True))

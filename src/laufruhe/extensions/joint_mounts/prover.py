@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
-from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers.mounts.places import design_at_start
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
@@ -27,7 +27,7 @@ EARLY = 0.1
 def corner_answers(question: Question) -> Iterator[BoxResult]:
     """Yield one bound by vertices; a better design at a vertex lowers the value of the question."""
     problem = question.problem
-    if question.of_many or question.value == math.inf:
+    if question.in_batch or question.value == math.inf:
         return
 
     def exact_value(mounts: Array, columns: Array) -> float:
@@ -37,19 +37,19 @@ def corner_answers(question: Question) -> Iterator[BoxResult]:
         return design.value - sampling_overestimate(problem, design.evaluation)
 
     boxes = DesignBoxes(problem, question.value, exact_value)
-    result = designed_bound(boxes, question.room, question.known)
+    result = designed_bound(boxes, question.gap_tolerance, question.witness)
     question.value = boxes.value
     yield replace(result, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
 def load_answers(question: Question) -> Iterator[BoxResult]:
     """Yield bounds by boxes of mounts and unbalances; stop early if another prover has the better bound."""
-    if question.of_many:
+    if question.in_batch:
         return
     problem, witness = question.problem, _witness(question)
     # a problem of one number needs few boxes
     shares = (1.0,) if len(problem.decisions) == 1 else (EARLY, 1.0)
-    for result in load_bounds(problem, question.value, question.room, shares, witness):
+    for result in load_bounds(problem, question.value, question.gap_tolerance, shares, witness):
         yield replace(result, places=())
         if result.bound < question.bound:
             return
@@ -57,20 +57,20 @@ def load_answers(question: Question) -> Iterator[BoxResult]:
 
 def throw_answers(question: Question) -> Iterator[BoxResult]:
     """Yield one bound by boxes of throws, mounts and unbalances, for any firing order (E72)."""
-    throws = None if question.moves is None else throws_at(question.problem, *question.moves)
+    throws = None if question.open_throws is None else throws_at(question.problem, *question.open_throws)
     if throws is not None:
         witness = _witness(question)
         if witness is not None:
             witness = replace(witness, place=np.append(witness.place, throws.angles[throws.open]))
-        yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), witness, throws)
+        yield from load_bounds(throws.waves.problem, question.value, question.gap_tolerance, (1.0,), witness, throws)
 
 
 def _witness(question: Question) -> Witness | None:
     # place of the known design: numbers of mounts, then columns of unbalances
-    witness, problem = question.known, question.problem
+    witness, problem = question.witness, question.problem
     if witness is None:
         return None
-    pairs = zip(question.near, problem.decisions, strict=True)
+    pairs = zip(question.good_values, problem.decisions, strict=True)
     columns = decision_vector(
         domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine]
     )
@@ -79,6 +79,8 @@ def _witness(question: Question) -> Witness | None:
 
 CORNERS = Prover("boxes of mounts, with unbalances", mixes_corners, corner_answers, "boxes of stiffness")
 LOADS = Prover(
-    "boxes of mounts and unbalances", lambda problem: not divides(problem) and is_boxed(problem), load_answers
+    "boxes of mounts and unbalances",
+    lambda problem: not is_stiffness_problem(problem) and is_boxed(problem),
+    load_answers,
 )
-THROWS = Prover("boxes of throws, mounts and unbalances", lambda _: True, throw_answers, of_moves=True)
+THROWS = Prover("boxes of throws, mounts and unbalances", lambda _: True, throw_answers, for_open_throws=True)

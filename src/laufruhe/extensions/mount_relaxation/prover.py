@@ -31,7 +31,7 @@ from laufruhe.prove.branch_and_bound import (
 )
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Prover, Question
-from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
 # relative gaps to prove, one after the other
@@ -50,7 +50,7 @@ END_SHARE = 0.3
 
 def applies(problem: Problem) -> bool:
     """Return True if the spring relaxation may bound better than boxes of one open number."""
-    is_one_number = len(problem.decisions) == 1 and not divides(problem)
+    is_one_number = len(problem.decisions) == 1 and not is_stiffness_problem(problem)
     return not is_one_number and not simulated_measures(problem) and is_bounded(named_part(problem))
 
 
@@ -62,10 +62,16 @@ def is_bounded(problem: Problem) -> bool:
 
 def bounds(question: Question) -> Iterator[BoxResult]:
     """Yield bounds; if stiffness alone is open, yield the bound of the root box first."""
-    stiffness_alone = divides(question.problem)
+    stiffness_alone = is_stiffness_problem(question.problem)
     for root_only in (True, False) if stiffness_alone else (False,):
         result = spring_bound(
-            question.problem, question.value, question.room, question.near, question.of_many, root_only, question.known
+            question.problem,
+            question.value,
+            question.gap_tolerance,
+            question.good_values,
+            question.in_batch,
+            root_only,
+            question.witness,
         )
         if not result.boxes:
             return

@@ -39,7 +39,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import GAP_SAFETY
 from laufruhe.prove.mounts.ranges import number_ranges
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem
 
 # total work of the relaxations, each its number of moments to the power EFFORT, and the most relaxations
 WORK, EFFORT, MOST_BOXES = 6e7, 5, 100
@@ -100,7 +100,7 @@ class SdpRelaxation:
         self.lower, self.upper = np.append(lower, -ones), np.append(upper, ones)
         self.mode_sides = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
         self.candidates: list[Array] = []
-        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if divides(problem) else None
+        self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if is_stiffness_problem(problem) else None
         self._model = AffineModel(off_resonance(problem))
         unbalances = [v for v, d in zip(reference, problem.decisions, strict=True) if d.is_affine]
         basis = unbalance_basis(self._model.domains, unbalances)

@@ -16,7 +16,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result, violated_limits
 from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
 from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
@@ -47,7 +47,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     search = MountSearch(
         search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSE_STEP
     )
-    has_bound = divides(problem) and bounds_runs(problem)
+    has_bound = is_stiffness_problem(problem) and bounds_runs(problem)
     search.run()
     can_refine = bool(search.optima) and not has_stops and not is_single_start
     if can_refine and search.best is not None and search.best.design.violation <= NEAR:

@@ -23,7 +23,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
-from laufruhe.prove.mounts.provers import Question, proven
+from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, evaluate_design
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
@@ -99,7 +99,7 @@ def _bound(problem: Problem, design: Design) -> float:
     relaxed, reference = with_masses(problem, model, design.values)
     gap_tolerance = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return max(
-        proven(Question(relaxed, design.value, gap_tolerance, reference)).bound, mounts_bound(relaxed, reference)
+        run_provers(Question(relaxed, design.value, gap_tolerance, reference)).bound, mounts_bound(relaxed, reference)
     )
 
 

@@ -57,9 +57,9 @@ class LeadSwing:
                 parts = []
                 for engine in engines:
                     torque = gas_torque(engine, point, fidelity)
-                    own = spectrum_of(moving_inertia(engine, fidelity, angles)[0], engine.cycle.base_order)
-                    mass = float(np.abs(own.coefficients[1:] * own.orders[1:]).sum())
-                    parts.append(_Part(torque.integral, own, largest_torque(torque), mass))
+                    swing = spectrum_of(moving_inertia(engine, fidelity, angles)[0], engine.cycle.base_order)
+                    slope = float(np.abs(swing.coefficients[1:] * swing.orders[1:]).sum())
+                    parts.append(_Part(torque.integral, swing, largest_torque(torque), slope))
                 self._points.append((point.speed, parts))
 
     def minimum_over(self, middle: Array, half: Array) -> float:
@@ -67,30 +67,33 @@ class LeadSwing:
         return max(self._minimum_at_point(speed, parts, middle, half) for speed, parts in self._points)
 
     def _minimum_at_point(self, speed: float, parts: Sequence[_Part], middle: Array, half: Array) -> float:
-        by = [0.0, *(middle - self._start)]
+        changes = [0.0, *(middle - self._start)]
         work: Array = np.sum(
-            [_earlier(part.work, d).sample(self._steps) for part, d in zip(parts, by, strict=True)], axis=0
+            [_earlier(part.work, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)], axis=0
         )
-        swinging = [_earlier(part.inertia, d).sample(self._steps) for part, d in zip(parts, by, strict=True)]
+        swinging = [_earlier(part.inertia, d).sample(self._steps) for part, d in zip(parts, changes, strict=True)]
         inertia: Array = self._turning + np.sum(swinging, axis=0)
-        more = float(sum(part.torque * r for part, r in zip(parts[1:], half, strict=True)))
-        heavier = float(sum(part.slope * r for part, r in zip(parts[1:], half, strict=True)))
-        if inertia.min() <= heavier:
+        work_error = float(sum(part.torque * r for part, r in zip(parts[1:], half, strict=True)))
+        inertia_error = float(sum(part.slope * r for part, r in zip(parts[1:], half, strict=True)))
+        if inertia.min() <= inertia_error:
             return 0.0
         try:
-            low = start_energy(work, inertia - heavier, speed) - more
-            high = start_energy(work, inertia + heavier, speed) + more
+            low = start_energy(work, inertia - inertia_error, speed) - work_error
+            high = start_energy(work, inertia + inertia_error, speed) + work_error
         except ModelError:
             # the crank may stop
             return 0.0
         squares = (0.5 * (low + high) + work) / inertia
         a, b = int(np.argmax(squares)), int(np.argmin(squares))
-        light, heavy = inertia[a] + heavier, inertia[b] - heavier
-        # linear in the energy, so least at an end
+        light, heavy = inertia[a] + inertia_error, inertia[b] - inertia_error
+        # linear in the energy, so minimal at an end
         difference = min(
-            2.0 * ((energy + work[a] - more) / light - (energy + work[b] + more) / heavy) for energy in (low, high)
+            2.0 * ((energy + work[a] - work_error) / light - (energy + work[b] + work_error) / heavy)
+            for energy in (low, high)
         )
-        fastest = [math.sqrt(2.0 * max(high + work[k] + more, 0.0) / (inertia[k] - heavier)) for k in (a, b)]
+        fastest = [
+            math.sqrt(2.0 * max(high + work[k] + work_error, 0.0) / (inertia[k] - inertia_error)) for k in (a, b)
+        ]
         return max(float(difference), 0.0) / sum(fastest) / speed
 
 
@@ -103,5 +106,5 @@ def largest_torque(torque: Spectrum) -> float:
     swing = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
     values = np.concatenate([swing.sample(steps), swing.values(swing.kink_angles)])
-    bent = curvature(swing.mapped(lambda each: each[:, None, None]))[0]
-    return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * bent.max(initial=0.0))
+    curvatures = curvature(swing.mapped(lambda values: values[:, None, None]))[0]
+    return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * curvatures.max(initial=0.0))

@@ -1,8 +1,8 @@
-"""Lower bounds of designs whose phase leads lie in a box (P13, P14).
+"""Lower bounds of the objective over boxes of phase leads (P13, P14).
 
-Dual rows Z of the loads V(c, x) at the middle c of a box with half widths r_s, and multipliers of the limits, give one
-function of leads and unbalances that is nowhere over the objective of a feasible design. In the box it differs from
-its value at c by a part linear in the leads, least at a corner, and by a remainder of second order:
+Dual rows Z of the loads V(c, x) at the middle c of a box with half widths r_s, and multipliers of the limits, give a
+function of leads and unbalances that is a lower bound of the objective. In the box the function differs from its value
+at c by a part linear in the leads, which is minimal at a corner, and by a remainder of second order:
 
     N(V(c + d, x)) >= <Z, V(c, x)> + sum_s d_s <Z, V_s'(c, x)> - sum_s r_s^2 K_s / 2,                (P13)
 
@@ -61,22 +61,22 @@ class LeadBound:
 
 
 @dataclass(frozen=True, eq=False)
-class _Rest:
+class _SecondDerivative:
     """Bounds of the second derivative of a measure by the lead of a shaft.
 
     Attributes
     ----------
-    whole
+    norm
         Upper bound of its norm.
     maximum
         Upper bound of its length between kinks, by signal, shape (signals,).
-    bends
+    kinks
         Angles of kinks at the start leads, and jumps of slope and value there, by signal.
     """
 
-    whole: float
+    norm: float
     maximum: Array
-    bends: tuple[tuple[Array, Array, Array], ...]
+    kinks: tuple[tuple[Array, Array, Array], ...]
 
 
 class LeadBoxes:
@@ -95,10 +95,10 @@ class LeadBoxes:
         self._ratios = np.array([abs(shafts[name].ratio) for name in model.names])
         self._terms = [term.measure for term in problem.load_terms]
         self._limits = [limit.measure for limit in problem.load_limits]
-        self._rests = {m: [self._rest(m, s) for s in range(len(model.names))]
-                       for m in dict.fromkeys([*self._terms, *self._limits]) if m.is_load}  # fmt: skip
-        torque_measures = dict.fromkeys(measure for measure in problem.measures if measure.channel.depends_on_torque)
-        self._swings = {measure: LeadSwing(problem, model, measure) for measure in torque_measures}
+        self._curvatures = {m: [self._second_derivative(m, s) for s in range(len(model.names))]
+                            for m in dict.fromkeys([*self._terms, *self._limits]) if m.is_load}  # fmt: skip
+        swinging = dict.fromkeys(measure for measure in problem.measures if measure.channel.depends_on_torque)
+        self._swings = {measure: LeadSwing(problem, model, measure) for measure in swinging}
 
     def numbers(self, leads: Array) -> list[float]:
         """Return every degree of irregularity of the problem at some leads."""
@@ -109,8 +109,8 @@ class LeadBoxes:
         problem = self.model.problem
         degrees = {measure: swing.minimum_over(middle, half) for measure, swing in self._swings.items()}
         total = sum(term.weight * degrees[term.measure] for term in problem.objective if term.measure in degrees)
-        over = {x.name: degrees[x.measure] / x.maximum - 1.0 for x in problem.limits if x.measure in degrees}
-        return total, {name: by for name, by in over.items() if by > SLACK}
+        excess = {x.name: degrees[x.measure] / x.maximum - 1.0 for x in problem.limits if x.measure in degrees}
+        return total, {name: violation for name, violation in excess.items() if violation > SLACK}
 
     def bound(
         self, middle: Array, half: Array, program: AffineProblem, norms: Sequence[PhaseLeadNorm],
@@ -127,65 +127,68 @@ class LeadBoxes:
         norms
             Norms of the program with their slopes by the leads, terms before limits.
         """
-        (degree, broken), (degree_here, broken_here) = self.degrees(middle, half), self.degrees(middle, 0.0 * half)
-        under = minorant(program, multipliers)
-        rows = [*(w * z for (w, _), z in zip(program.terms, under.multipliers.terms, strict=True)),
-                *under.multipliers.limits]  # fmt: skip
-        slopes, rests = np.zeros(len(middle)), np.zeros(len(middle))
+        degree, broken = self.degrees(middle, half)
+        degree_at_middle, broken_at_middle = self.degrees(middle, 0.0 * half)
+        affine = minorant(program, multipliers)
+        rows = [*(w * z for (w, _), z in zip(program.terms, affine.multipliers.terms, strict=True)),
+                *affine.multipliers.limits]  # fmt: skip
+        slopes, remainders = np.zeros(len(middle)), np.zeros(len(middle))
         # by shaft, pairing of the dual rows with slopes and curvatures of the unbalances
-        tilts = np.zeros((2, len(middle), len(under.gradient)))
+        tilts = np.zeros((2, len(middle), len(affine.gradient)))
         measures = [*(self._terms if program.terms else ()), *self._limits]
-        for measure, led, z in zip(measures, norms, rows, strict=True):
-            for s, (constant, steep, flat) in enumerate(led.derivatives):
+        for measure, lead_norm, z in zip(measures, norms, rows, strict=True):
+            for s, (constant, slope_derivative, shaft_slope) in enumerate(lead_norm.derivatives):
                 slopes[s] += float(np.vdot(z, constant))
-                tilts[:, s] += [z.ravel() @ each.reshape(z.size, -1) for each in (flat, steep)]
+                tilts[:, s] += [z.ravel() @ slope.reshape(z.size, -1) for slope in (shaft_slope, slope_derivative)]
                 if measure.is_load:
-                    rests[s] += self._remainder(measure, s, led, z, middle, float(half[s]))
-        arcs = minimum_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
-        value = under.constant + arcs - float(rests.sum())
-        at_middle = under.constant + sum(domain.minimum(under.gradient) for domain in self.model.domains)
+                    remainders[s] += self._remainder(measure, s, lead_norm, z, middle, float(half[s]))
+        arcs = minimum_on_arcs(self.model.domains, self._ratios, half, affine.gradient, slopes, tilts)
+        value = affine.constant + arcs - float(remainders.sum())
+        at_middle = affine.constant + sum(domain.minimum(affine.gradient) for domain in self.model.domains)
         excluded = False
         if not program.terms:
-            prices = replace(under.multipliers, terms=()).shadow_prices(program)
+            prices = replace(affine.multipliers, terms=()).shadow_prices(program)
             sizes = [maximum + norm.value(np.zeros(program.size)) for maximum, norm in program.limits]
             excluded = value > ROUNDING * sum(price * size for price, size in zip(prices, sizes, strict=True))
         return LeadBound(
             math.inf if excluded or broken else degree + max(value, 0.0),
-            math.inf if broken_here else degree_here + max(at_middle, 0.0),
-            rests + half * np.abs(slopes),
+            math.inf if broken_at_middle else degree_at_middle + max(at_middle, 0.0),
+            remainders + half * np.abs(slopes),
             tuple(broken),
         )
 
-    def _remainder(self, measure: Measure, s: int, led: PhaseLeadNorm, z: Array, middle: Array, half: float) -> float:
-        """Return an upper bound of the second order of a lead in <Z, V>."""
-        rest, norm = self._rests[measure][s], led.norm
+    def _remainder(
+        self, measure: Measure, s: int, lead_norm: PhaseLeadNorm, z: Array, middle: Array, half: float
+    ) -> float:
+        """Return an upper bound of the second-order change of <Z, V> by the lead of shaft s in the box."""
+        derivative, norm = self._curvatures[measure][s], lead_norm.norm
         if measure.norm.refinement == 1:
-            return 0.5 * half**2 * rest.whole * norm.dual_norm(z)
-        size = lengths(z).reshape(len(rest.maximum), -1)
-        total = 0.5 * half**2 * float(size.sum(axis=1) @ rest.maximum)
-        by = float(middle[s] - self.model.start[s])
-        for k, (angles, slopes, jumps) in enumerate(rest.bends):
+            return 0.5 * half**2 * derivative.norm * norm.dual_norm(z)
+        size = lengths(z).reshape(len(derivative.maximum), -1)
+        total = 0.5 * half**2 * float(size.sum(axis=1) @ derivative.maximum)
+        change = float(middle[s] - self.model.start[s])
+        for k, (angles, slopes, jumps) in enumerate(derivative.kinks):
             used = np.flatnonzero(size[k])
-            if len(used) and len(angles) and led.angles is not None:
-                rows = led.angles[0 if len(led.angles) == 1 else self._point_of_signal(measure, k)]
+            if len(used) and len(angles) and lead_norm.angles is not None:
+                rows = lead_norm.angles[0 if len(lead_norm.angles) == 1 else self._point_of_signal(measure, k)]
                 period = float(self.model.shares(measure)[0].bare[0].period)
-                distance = np.abs(np.mod(rows[used, None] + by - angles + 0.5 * period, period) - 0.5 * period)
+                distance = np.abs(np.mod(rows[used, None] + change - angles + 0.5 * period, period) - 0.5 * period)
                 kinks = np.maximum(half - distance, 0.0) @ slopes + (distance <= half) @ jumps
                 total += float(size[k][used] @ kinks)
         return total
 
     def _point_of_signal(self, measure: Measure, signal: int) -> int:
         counted = np.flatnonzero(measure.shares(self.model.problem.points) > 0.0)
-        return int(counted[signal * len(counted) // len(self._rests[measure][0].maximum)])
+        return int(counted[signal * len(counted) // len(self._curvatures[measure][0].maximum)])
 
-    def _rest(self, measure: Measure, s: int) -> _Rest:
+    def _second_derivative(self, measure: Measure, s: int) -> _SecondDerivative:
         shares = measure.shares(self.model.problem.points)
-        square, maximum, bends = 0.0, [], []
-        for weight, own in zip(shares[shares > 0.0], self.model.counted(measure, s), strict=True):
-            square += weight * float(np.mean(mean_square(own.series.derivative.derivative)))
-            maximum.append(curvature(own)[0])
-            bends += _bends(own)
-        return _Rest(math.sqrt(square), np.concatenate(maximum), tuple(bends))
+        square, maximum, kinks = 0.0, [], []
+        for weight, signal in zip(shares[shares > 0.0], self.model.counted(measure, s), strict=True):
+            square += weight * float(np.mean(mean_square(signal.series.derivative.derivative)))
+            maximum.append(curvature(signal)[0])
+            kinks += _kinks(signal)
+        return _SecondDerivative(math.sqrt(square), np.concatenate(maximum), tuple(kinks))
 
 
 def minimum_on_arcs(
@@ -198,6 +201,8 @@ def minimum_on_arcs(
 
     Parameters
     ----------
+    domains
+        Sets of the unbalances.
     ratios, half, slopes
         Shape (shafts,).
     gradient, tilts
@@ -211,15 +216,15 @@ def minimum_on_arcs(
     sides = [((math.cos(a), math.sin(a)), (math.cos(a), -math.sin(a)), (1.0 / math.cos(a), 0.0)) for a in arcs]
     minimum = math.inf
     for corner in itertools.product(*sides):
-        along, across = np.array(corner).T
-        by = across / ratios
-        turned = gradient + (along - 1.0) @ tilts[0] + by @ tilts[1]
-        minimum = min(minimum, float(by @ slopes) + sum(domain.minimum(turned) for domain in domains))
+        cosine, sine = np.array(corner).T
+        leads = sine / ratios
+        corner_gradient = gradient + (cosine - 1.0) @ tilts[0] + leads @ tilts[1]
+        minimum = min(minimum, float(leads @ slopes) + sum(domain.minimum(corner_gradient) for domain in domains))
     # d differs from sin(n d) / n by the cube
     return minimum - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0
 
 
-def _bends(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
+def _kinks(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
     # per place: angles of kinks, jumps of slope, jumps of value
     places = signal.coefficients.shape[1]
     if signal.kinks is None:

@@ -82,8 +82,10 @@ class _MonotoneBoxes(BoxBisection):
 
     what = "boxes"
 
-    def __init__(self, problem: MonotoneProblem, value: float, room: float, known: Witness | None = None) -> None:
-        super().__init__(value, room, known)
+    def __init__(
+        self, problem: MonotoneProblem, value: float, gap_tolerance: float, witness: Witness | None = None
+    ) -> None:
+        super().__init__(value, gap_tolerance, witness)
         self._uncut, self._problem = problem, problem.with_cutoff(self.cutoff)
 
     @property
@@ -93,10 +95,11 @@ class _MonotoneBoxes(BoxBisection):
 
     def bound_box(self, lower: Array, upper: Array) -> tuple[float, Box] | FathomedPart:
         """Return a box without slices that violate limits, and its least sum."""
-        rest = _cut(self._problem, lower, upper)
-        if rest is None:
+        contracted = _cut(self._problem, lower, upper)
+        if contracted is None:
             return FathomedPart(self.level)
-        return self._problem.minimum_over(*rest), Box(*rest, widest(*rest, self._problem.upper - self._problem.lower))
+        side = widest(*contracted, self._problem.upper - self._problem.lower)
+        return self._problem.minimum_over(*contracted), Box(*contracted, side)
 
     def halve(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | FathomedPart]:
         """Return the halves of boxes across their relatively longest side."""
@@ -108,7 +111,7 @@ class _Around:
     """Thin boxes, to check bounds around a known design."""
 
     problem: MonotoneProblem
-    known: Witness
+    witness: Witness
     what: str = _MonotoneBoxes.what
 
     def around(self, place: Array) -> tuple[Array, Array]:
@@ -117,30 +120,33 @@ class _Around:
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the least sum of a box; infinite if limits cut off all of it."""
-        result = _MonotoneBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bound_box(*box)
+        result = _MonotoneBoxes(self.problem, self.witness.value * (1.0 + EXCESS), 0.0).bound_box(*box)
         return math.inf if isinstance(result, FathomedPart) else result[0]
 
 
-def divided(
-    problem: MonotoneProblem, value: float, room: float, maximum: int = MOST_BOXES, known: Witness | None = None
+def bisect_monotone(
+    problem: MonotoneProblem, value: float, gap_tolerance: float, max_boxes: int = MOST_BOXES,
+    witness: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
-    """Halve boxes until none may hold a design that is `room` better than `value` (T9).
+    """Halve boxes until none can hold a design better than `value` by more than the gap tolerance (T9).
 
     Parameters
     ----------
+    problem
+        Monotone functions and bounds of the open numbers.
     value
         Objective of the incumbent [SI]; infinite if there is none.
-    room
-        Absolute gap tolerance [SI].
-    maximum
+    gap_tolerance
+        Improvement that counts as none [SI].
+    max_boxes
         Largest number of boxes.
-    known
-        The incumbent, to check bounds.
+    witness
+        Incumbent, to check bounds; None without one.
     """
-    boxes = _MonotoneBoxes(problem, value, room, known)
-    if known is not None:
-        check_near_witness(_Around(problem, known), known.place, known)
-    return boxes.run(boxes.bound_box(problem.lower, problem.upper), maximum)
+    boxes = _MonotoneBoxes(problem, value, gap_tolerance, witness)
+    if witness is not None:
+        check_near_witness(_Around(problem, witness), witness.place, witness)
+    return boxes.run(boxes.bound_box(problem.lower, problem.upper), max_boxes)
 
 
 def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
@@ -159,17 +165,17 @@ def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign
     # tests whether the slice at a value of number k violates a limit everywhere
     limits = [(maximum, f, f.lowest_corner(lower, upper)) for maximum, f in problem.limits if f.signs[k] == sign]
 
-    def violated(at: float) -> bool:
+    def is_violated(position: float) -> bool:
         slices = (
-            (maximum, function, np.where(np.arange(len(lower)) == k, at, corner))
+            (maximum, function, np.where(np.arange(len(lower)) == k, position, corner))
             for maximum, function, corner in limits
         )
         return any(function.value(x) > maximum for maximum, function, x in slices)
 
-    return violated
+    return is_violated
 
 
-def _cut_side(violated: Callable[[float], bool], start: float, end: float) -> float:
-    if start == end or not violated(start):
+def _cut_side(is_violated: Callable[[float], bool], start: float, end: float) -> float:
+    if start == end or not is_violated(start):
         return start
-    return bisect_property(violated, start, end, CUTS)[0]
+    return bisect_property(is_violated, start, end, CUTS)[0]

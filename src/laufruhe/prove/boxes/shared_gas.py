@@ -77,27 +77,27 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     half
         Largest change of the lead of the other piston [rad].
     """
-    other, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
-    assert isinstance(other, Facing)
+    facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
+    assert isinstance(facing, Facing)
     count = CELLS * cycle.turns
-    own, far, ahead = _Travel(part.crank_radius, part.rod_ratio), _Travel(*_size(other)), other.ahead
+    near, far, ahead = _Travel(part.crank_radius, part.rod_ratio), _Travel(*_size(facing)), facing.ahead
     gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
-    (m1, m2, _), (n1, n2, n3) = own.maximum, far.maximum
+    (m1, m2, _), (n1, n2, n3) = near.maximum, far.maximum
     top, bottom = (ratio * angle for angle in chamber.dead_centres)
-    minimum, room = (float(own.at(a) + far.at(a + ahead)) for a in (top, bottom))
-    room -= minimum
+    minimum, stroke = (float(near.at(a) + far.at(a + ahead)) for a in (top, bottom))
+    stroke -= minimum
     first, last = float(far.slope(top + ahead)), float(far.slope(bottom + ahead))
     # both dead centres move by no more than the lead
     grows, loose = last - first, 4.0 * half * n2
-    narrow = room - half * (abs(grows) + loose)
+    narrow = stroke - half * (abs(grows) + loose)
     if narrow <= 0.0:
         return np.full(count, math.inf)
-    swept = (own.at(gamma) + far.at(gamma + ahead) - minimum) / room
+    swept = (near.at(gamma) + far.at(gamma + ahead) - minimum) / stroke
     rate, bend = far.slope(gamma + ahead), far.bend(gamma + ahead)
     rough = (half * 4.0 * n1 + g * (m1 + n1)) / narrow
     off = (g + half) * n2 + 2.0 * half * n2 + rough * (abs(grows) + loose) + loose
     moved = (np.abs(rate - first - swept * grows) + off) / narrow
-    opening = np.abs(own.slope(gamma) + rate) + g * (m2 + n2) + half * n2
+    opening = np.abs(near.slope(gamma) + rate) + g * (m2 + n2) + half * n2
     wide = half * moved + g * opening / narrow
     small = 1.0 / (gas.compression_ratio - 1.0)
     over, steep = _pressed(gas, cycle, np.maximum(swept - wide, 0.0) + small, swept + wide + small,
@@ -105,8 +105,8 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     return half * part.piston_area * (steep * moved * opening + over * (np.abs(bend) + (g + half) * n3))
 
 
-def _size(other: Facing) -> tuple[float, float]:
-    return other.crank_radius, other.crank_radius / other.rod_length
+def _size(facing: Facing) -> tuple[float, float]:
+    return facing.crank_radius, facing.crank_radius / facing.rod_length
 
 
 def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:
@@ -129,13 +129,16 @@ def _pressed(
     squeezed, later = (gas.intake_pressure * ((1.0 + small) / v) ** n1 for v in (low, high))
     burnt = np.maximum(low, cut)
     spent, last = (gas.peak_pressure * np.minimum(1.0, cut / v) ** n2 for v in (burnt, high))
-    still = np.full_like(low, gas.intake_pressure), np.full_like(low, gas.exhaust_pressure)
-    ends = ((squeezed, later), (spent, last), still)
+    constant = np.full_like(low, gas.intake_pressure), np.full_like(low, gas.exhaust_pressure)
+    ends = ((squeezed, later), (spent, last), constant)
     slopes = (n1 * squeezed / low, np.where(high > cut, n2 * spent / burnt, 0.0), np.zeros_like(low))
     over, steep = np.zeros_like(low), np.zeros_like(low)
-    for here, pair, slope in zip(strokes, ends, slopes, strict=True):
-        maximum = np.maximum(*(np.abs(each - gas.crankcase_pressure) for each in pair))
-        over, steep = np.maximum(over, np.where(here, maximum, 0.0)), np.maximum(steep, np.where(here, slope, 0.0))
+    for is_in_stroke, pair, slope in zip(strokes, ends, slopes, strict=True):
+        maximum = np.maximum(*(np.abs(pressure - gas.crankcase_pressure) for pressure in pair))
+        over, steep = (
+            np.maximum(over, np.where(is_in_stroke, maximum, 0.0)),
+            np.maximum(steep, np.where(is_in_stroke, slope, 0.0)),
+        )
     return over, steep
 
 
@@ -147,13 +150,13 @@ class SharedGasBoxes:
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        still = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
-        self._model = PhaseLeadModel(still)
+        motored = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
+        self._model = PhaseLeadModel(motored)
         self._names = self._model.names
-        if not all(_is_known(point.gas) for point in problem.points):
+        if not all(_has_formula(point.gas) for point in problem.points):
             raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")
         self._fixed = self._fixed_pistons(problem.engine)
-        self._masses = {m: [self._moved(m, s) for s in range(len(self._names))] for m in self._measures}
+        self._masses = {m: [self._slope(m, s) for s in range(len(self._names))] for m in self._measures}
         self._gains = {m: [self._gain(m, point) for point in problem.points] for m in self._measures}
 
     @property
@@ -162,28 +165,28 @@ class SharedGasBoxes:
 
     def _fixed_pistons(self, engine: Engine) -> list[str]:
         """Return the fixed piston of every shared chamber."""
-        found = []
+        fixed = []
         for part in engine.slider_cranks:
             for other in engine.slider_cranks:
                 if other is not part and part.faces(other):
-                    led = part.shaft.name in self._names, other.shaft.name in self._names
-                    if led == (True, True):
+                    have_leads = part.shaft.name in self._names, other.shaft.name in self._names
+                    if have_leads == (True, True):
                         why = "come earlier both, and one that stands is needed between two that share a chamber"
                         raise ModelError(f"{part.shaft.name} and {other.shaft.name} {why}; fix one lead")
-                    if led[1]:
-                        found.append(part.name)
+                    if have_leads[1]:
+                        fixed.append(part.name)
         parts_with_leads = (part for part in engine.slider_cranks if part.shaft.name in self._names)
         for part in parts_with_leads:
             if not any(part.faces(other) for other in engine.slider_cranks if other is not part):
                 why = "comes earlier with gas of its own beside chambers that are shared; fix its lead"
                 raise ModelError(f"{part.shaft.name} {why}")
-        return found
+        return fixed
 
-    def _moved(self, measure: Measure, shaft: int) -> float:
+    def _slope(self, measure: Measure, shaft: int) -> float:
         # upper bound of the slope of a norm by the lead of the masses on a shaft [1/rad]
         shares = measure.shares(self.problem.points)
-        own = [signal.derivative for signal in self._model.counted(measure, shaft)]
-        return float(measure.norm.upper_bound(own, shares[shares > 0.0]))
+        derivatives = [signal.derivative for signal in self._model.counted(measure, shaft)]
+        return float(measure.norm.upper_bound(derivatives, shares[shares > 0.0]))
 
     def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
         # load of a unit roll moment at every counted place, shape (places,)
@@ -204,10 +207,10 @@ class SharedGasBoxes:
         lower, upper
             Leads [rad], shape (boxes, leads).
         """
-        bounds = [self._bounded(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
+        bounds = [self._bound(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
         return np.array(bounds), np.argmax(upper - lower, axis=1)
 
-    def _bounded(self, middle: Array, half: Array) -> float:
+    def _bound(self, middle: Array, half: Array) -> float:
         try:
             evaluation = evaluate(self.problem, self.problem.design([float(x) for x in middle]))
         except ModelError:
@@ -222,8 +225,8 @@ class SharedGasBoxes:
             if measure.norm.averages:
                 signals = [signal.averaged(signal.period / evaluation.samples) for signal in signals]
             rows = load_rows(measure, self.problem.points, signals, evaluation.engine, evaluation.samples)
-            by_mass = float(half @ np.array(self._masses[measure]))
-            return rows.value - by_mass - self._by_gas(measure, changes)
+            mass_change = float(half @ np.array(self._masses[measure]))
+            return rows.value - mass_change - self._gas_change(measure, changes)
 
         limits = [limit for limit in self.problem.limits if limit.measure.is_load or limit.measure.is_mass]
         if any(minimum(limit.measure) > limit.maximum * (1.0 + 1e-6) for limit in limits):
@@ -232,22 +235,22 @@ class SharedGasBoxes:
 
     def _torques(self, engine: Engine, half: float) -> list[Array]:
         """Return the change of torque of all shared chambers at every operating point, on cells of a cycle [N m]."""
-        found = []
+        torques = []
         for point in self.problem.points:
             total = np.zeros(CELLS * engine.cycle.turns)
             gas = self.problem.fidelity.gas_of(point)
             for part in engine.slider_cranks:
                 if part.name in self._fixed and isinstance(gas, Seiliger):
-                    own = torque_change(gas, part, engine.cycle, half)
+                    change = torque_change(gas, part, engine.cycle, half)
                     place = math.floor(part.firing_angle / engine.cycle.angle * len(total))
-                    total = total + np.maximum(np.roll(own, place), np.roll(own, place + 1))
-            found.append(total)
-        return found
+                    total = total + np.maximum(np.roll(change, place), np.roll(change, place + 1))
+            torques.append(total)
+        return torques
 
-    def _by_gas(self, measure: Measure, changes: Sequence[Array]) -> float:
+    def _gas_change(self, measure: Measure, changes: Sequence[Array]) -> float:
         """Return an upper bound of the change of a norm by changes of torque."""
         shares, gains, norm = measure.shares(self.problem.points), self._gains[measure], measure.norm
-        squares = [float(np.mean(each**2)) for each in changes]
+        squares = [float(np.mean(change**2)) for change in changes]
         if norm.refinement == 1:
             return math.sqrt(
                 sum(w * float(np.mean(k**2)) * s for w, k, s in zip(shares, gains, squares, strict=True) if w)
@@ -256,12 +259,12 @@ class SharedGasBoxes:
             math.sqrt(2.0 * len(measure.orders) * square)
             if measure.orders is not None
             # a change less its mean is at most its largest value and its mean together
-            else float(each.max() + measure.alternating * each.mean())
-            for each, square in zip(changes, squares, strict=True)
+            else float(change.max() + measure.alternating * change.mean())
+            for change, square in zip(changes, squares, strict=True)
         ]
         twice = norm.value(Grid(np.ones(2), 2), np.array([[1.0], [-1.0]]))
         return twice * max((float(k.max()) * t for w, k, t in zip(shares, gains, tops, strict=True) if w), default=0.0)
 
 
-def _is_known(gas: object) -> bool:
+def _has_formula(gas: object) -> bool:
     return gas is None or isinstance(gas, Seiliger)

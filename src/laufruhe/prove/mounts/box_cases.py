@@ -25,7 +25,9 @@ STEPS, HALVINGS = 30, 12
 ROUNDS, WIDER, FASTER = 16, 1.0 + 1e-6, 1.4
 # accuracy of an equilibrium as a share of a gap, and spans of travel within which a stop may close
 EXACT, NEXT = 1e-9, 2.0
-STILL = LoadedOrders(*(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128), 0)
+AT_REST = LoadedOrders(
+    *(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128), 0
+)
 _AS_LOADS: Mapping[Channel, Channel] = {
     channels.STATIC_TRAVEL: channels.MOUNT_TRAVEL,
     channels.STATIC_FORCE: channels.MOUNT_FORCE,
@@ -35,10 +37,15 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
     mounting, best = model.mounting(model.lower), zero_bound(lower)
-    every = stops_of(mounting)
-    used = every.stiffness > 0.0
+    all_stops = stops_of(mounting)
+    used = all_stops.stiffness > 0.0
     # in coordinates with unit mass
-    stops = Stops(every.rows[used] @ model.root.T, every.gaps[used], every.stiffness[used], every.directions[:, used])
+    stops = Stops(
+        all_stops.rows[used] @ model.root.T,
+        all_stops.gaps[used],
+        all_stops.stiffness[used],
+        all_stops.directions[:, used],
+    )
     for case in counted_cases(measure, model.problem.engine):
         load = model.root @ case_wrench(mounting.block, case)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -52,7 +59,7 @@ def _bound_case(
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
     stable = np.linalg.eigvalsh(soft)[:, 0] > 0.0
-    matrices, soft = (np.where(stable[:, None, None], each, np.eye(6)) for each in (matrices, soft))
+    matrices, soft = (np.where(stable[:, None, None], matrix, np.eye(6)) for matrix in (matrices, soft))
     travel = _equilibrium(matrices, stops, load) @ stops.rows.T
     signs, best = np.sign(stops.beyond(travel)), zero_bound(lower)
     for _ in range(2):
@@ -71,19 +78,19 @@ def _with_stops(
     on = signs != 0.0
     pushed = load + np.einsum("bk,ki->bi", signs * stops.stiffness * stops.gaps, stops.rows)
     inverse = np.linalg.inv(np.asarray(matrices + stops.added(on), dtype=np.float64))
-    at = series(
+    expansion = series(
         centres, halves, inverse[:, None], model.sides, model.sides.inside(model.stiffness_slopes),
         np.einsum("bij,bj->bi", inverse, pushed)[:, None],
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))
-    violation, span = _stop_errors(stops, at, corner, signs, travel)
+    violation, span = _stop_errors(stops, expansion, corner, signs, travel)
     rows, factors = counted_rows(model.problem, measure)
-    maps, turned = model.maps(STILL, at, _AS_LOADS[measure.channel], rows)
+    maps, map_slopes = model.maps(AT_REST, expansion, _AS_LOADS[measure.channel], rows)
     value = maps.real * factors[:, None]
-    by_side = None if turned is None else turned.real * factors[:, None]
+    side_maps = None if map_slopes is None else map_slopes.real * factors[:, None]
     ends = stops.directions[rows] * factors[:, None] * (not is_travel(_AS_LOADS[measure.channel]))
     value = value + np.einsum("rk,bk,ki->bri", ends, on * stops.stiffness, stops.rows)[:, None]
-    answer = mapped(at, value, by_side)
+    answer = mapped(expansion, value, side_maps)
     points = answer.value[:, 0] - (signs * stops.stiffness * stops.gaps) @ ends.T
     points, slopes = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
     size = np.linalg.norm(points, axis=-1)
@@ -91,8 +98,8 @@ def _with_stops(
     slope = np.einsum("bnpa,bpa->bpn", slopes, along)
     # error by stops that may be open or closed
     reach = _along(corner, value[:, 0])
-    if by_side is not None:
-        reach = reach + sum(_along(corner, side) for side in model.sides.apart(by_side[:, 0]))
+    if side_maps is not None:
+        reach = reach + sum(_along(corner, side) for side in model.sides.maps_by_number(side_maps[:, 0]))
     error = reach * np.sum(violation * _along(corner, stops.rows), axis=1, keepdims=True) + violation @ np.abs(ends).T
     rest = answer.rest[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
     # the series diverges close to a free mode
@@ -113,38 +120,40 @@ def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
     for _ in range(STEPS):
         over = stops.beyond(y @ stops.rows.T)
         residual = load - np.einsum("bij,bj->bi", matrices, y) - (over * stops.stiffness) @ stops.rows
-        whole = matrices + stops.added(over != 0.0)
-        step: Array = np.asarray(np.linalg.solve(whole, residual[..., None])[..., 0], dtype=np.float64)
-        here, share = energy(y), np.ones(len(y))
+        tangent = matrices + stops.added(over != 0.0)
+        step: Array = np.asarray(np.linalg.solve(tangent, residual[..., None])[..., 0], dtype=np.float64)
+        start_energy, share = energy(y), np.ones(len(y))
         for _ in range(HALVINGS):
-            share = np.where(energy(y + share[:, None] * step) <= here, share, 0.5 * share)
+            share = np.where(energy(y + share[:, None] * step) <= start_energy, share, 0.5 * share)
         y = np.asarray(y + share[:, None] * step)
         if np.all(np.linalg.norm(share[:, None] * step, axis=1) <= 1e-12 * np.linalg.norm(y, axis=1)):
             break
     return np.asarray(y)
 
 
-def _stop_errors(stops: Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
+def _stop_errors(
+    stops: Stops, expansion: Expansion, corner: Array, signs: Array, equilibrium: Array
+) -> tuple[Array, Array]:
     """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60)."""
-    response = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
+    response = mapped(expansion, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
     travel = np.asarray(response.value[:, 0].real)
     span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.rest[:, 0, None]
     # distance of springs beyond their gaps, and of open stops within
     distance = np.where(signs != 0.0, signs * travel - stops.gaps, stops.gaps - np.abs(travel))
     along = _along(corner, stops.rows)
-    wide = np.maximum(span, np.abs(met - travel) + EXACT * stops.gaps)
+    wide = np.maximum(span, np.abs(equilibrium - travel) + EXACT * stops.gaps)
     ends = np.zeros(wide.shape, dtype=bool)
     for n in range(ROUNDS):
         force = stops.stiffness * np.maximum(wide - distance, 0.0)
         wider = (span + along * np.sum(force * along, axis=1, keepdims=True)) * WIDER
         ends = wider <= wide
         wide = np.where(ends, wide, wide + FASTER**n * (wider - wide))
-    known = np.all(np.isfinite(wide) & ends, axis=1)
+    is_bounded = np.all(np.isfinite(wide) & ends, axis=1)
     force = stops.stiffness * np.maximum(wide - distance, 0.0)
-    return np.where(known[:, None], force, np.inf), span
+    return np.where(is_bounded[:, None], force, np.inf), span
 
 
 def _along(root: Array, vectors: Array) -> Array:
     # lengths of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)
-    whole = np.broadcast_to(vectors, (len(root), *vectors.shape[-2:]))
-    return np.asarray(np.linalg.norm(np.linalg.solve(root, whole.swapaxes(1, 2)), axis=1))
+    by_box = np.broadcast_to(vectors, (len(root), *vectors.shape[-2:]))
+    return np.asarray(np.linalg.norm(np.linalg.solve(root, by_box.swapaxes(1, 2)), axis=1))

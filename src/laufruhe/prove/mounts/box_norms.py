@@ -18,7 +18,7 @@ PARTS = ("value", "slopes", "rest", "bends")
 
 @dataclass(frozen=True, eq=False)
 class LinearBound:
-    """Lower bound value + slopes . s - rest of a quantity over boxes, s from -1 to 1 in each number (E38).
+    """Lower bound value + slopes . s - rest of a measure over boxes, s from -1 to 1 in each number (E38).
 
     Attributes
     ----------
@@ -40,10 +40,10 @@ class LinearBound:
         """Least value over every box, shape (boxes,)."""
         return np.asarray(self.value - self.rest - np.abs(self.slopes).sum(axis=-1))
 
-    def where(self, known: Mask) -> LinearBound:
+    def where(self, mask: Mask) -> LinearBound:
         """Return the bound on boxes of a mask, and zero on the others."""
-        masks = (known, known[:, None], known, known[:, None])
-        parts = (np.where(mask, getattr(self, part), 0.0) for part, mask in zip(PARTS, masks, strict=True))
+        masks = (mask, mask[:, None], mask, mask[:, None])
+        parts = (np.where(keep, getattr(self, part), 0.0) for part, keep in zip(PARTS, masks, strict=True))
         return LinearBound(*parts)
 
     def or_else(self, other: LinearBound) -> LinearBound:
@@ -58,14 +58,14 @@ def zero_bound(lower: Array) -> LinearBound:
     return LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
-def under(model: BoxModel, quantity: Measure, lines: LoadedOrders, at: Expansion) -> LinearBound:
+def lower_bound_of_norm(model: BoxModel, measure: Measure, lines: LoadedOrders, expansion: Expansion) -> LinearBound:
     """Return a linear lower bound of a norm of forces or travel on every box (E38)."""
-    rows, factors = counted_rows(model.problem, quantity)
-    answer = model.answer(lines, at, quantity.channel, rows, factors)
-    return norm_under(model.problem, quantity, answer, lines)
+    rows, factors = counted_rows(model.problem, measure)
+    answer = model.answer(lines, expansion, measure.channel, rows, factors)
+    return norm_under(model.problem, measure, answer, lines)
 
 
-def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
+def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
     """Return a linear lower bound of a norm of responses on every box (E38).
 
     Parameters
@@ -75,14 +75,14 @@ def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, line
     lines
         Orders of the responses.
     """
-    share, weights = quantity.shares(problem.points), line_weights(problem, quantity, lines)
-    if quantity.norm.is_euclidean:
+    share, weights = measure.shares(problem.points), line_weights(problem, measure, lines)
+    if measure.norm.is_euclidean:
         return root_under(answer, weights)
     points = [p for p in np.flatnonzero(share > 0.0) if np.any(lines.points == p)]
-    by_point = [_sampled(quantity, answer, lines, int(p)) for p in points]
+    by_point = [_sampled(measure, answer, lines, int(p)) for p in points]
     if not by_point:
         return zero_bound(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
-    if not quantity.norm.sums_lengths:
+    if not measure.norm.sums_lengths:
         best = np.argmax([bound.value for bound in by_point], axis=0)
         pick = np.arange(len(best))
         parts = (
@@ -91,8 +91,8 @@ def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, line
         largest = LinearBound(*(part[best, pick] for part in parts))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
-        squares = 2.0 * weights * (lines.orders > 0.0) if quantity.norm.is_diameter else weights
-        return largest if quantity.norm.is_largest_mean else largest.or_else(root_under(answer, squares))
+        squares = 2.0 * weights * (lines.orders > 0.0) if measure.norm.is_diameter else weights
+        return largest if measure.norm.is_largest_mean else largest.or_else(root_under(answer, squares))
     value, slopes = (
         sum(share[p] * getattr(bound, part) for p, bound in zip(points, by_point, strict=True))
         for part in ("value", "slopes")
@@ -101,40 +101,41 @@ def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, line
     return LinearBound(np.asarray(value), np.asarray(slopes), rest, bends)
 
 
-def counted_rows(problem: Problem, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
-    """Return the rows of the mounts that a quantity counts, and the factors on them."""
-    chosen = quantity.places([mount.name for mount in problem.engine.mounts])
+def counted_rows(problem: Problem, measure: Measure) -> tuple[NDArray[np.intp], Array]:
+    """Return the rows of the mounts that a measure counts, and the factors on them."""
+    chosen = measure.places([mount.name for mount in problem.engine.mounts])
     rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
-    return rows, np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
+    return rows, np.tile(np.array(measure.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
 
 
-def line_weights(problem: Problem, quantity: Measure, lines: LoadedOrders) -> Array:
+def line_weights(problem: Problem, measure: Measure, lines: LoadedOrders) -> Array:
     """Return the weights of squares of orders in the mean over cycle, mounts and operating points, shape (lines,)."""
-    chosen = quantity.places([mount.name for mount in problem.engine.mounts])
-    share = quantity.shares(problem.points)
+    chosen = measure.places([mount.name for mount in problem.engine.mounts])
+    share = measure.shares(problem.points)
     return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: int) -> LinearBound:
+def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: int) -> LinearBound:
     """Bound a mean, maximum or peak to peak over the samples of one operating point."""
-    own = np.flatnonzero(lines.points == p)
-    value, slopes, rest, bends = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own], answer.bends[:, own]
-    turns = lines.turns(own)
-    boxes, samples, mounts = len(value), len(turns), value.shape[-1] // 3
+    indices = np.flatnonzero(lines.points == p)
+    value, slopes = answer.value[:, indices], answer.slopes[:, indices]
+    rest, bends = answer.rest[:, indices], answer.bends[:, indices]
+    factors = lines.phases(indices)
+    boxes, samples, mounts = len(value), len(factors), value.shape[-1] // 3
     # rows by direction, then mount; real and imaginary parts count as separate orders
-    waves = np.hstack([turns.real, -turns.imag])
-    parts = value.reshape(boxes, len(own), mounts, 3).swapaxes(2, 3).reshape(boxes, len(own), -1)
+    waves = np.hstack([factors.real, -factors.imag])
+    parts = value.reshape(boxes, len(indices), mounts, 3).swapaxes(2, 3).reshape(boxes, len(indices), -1)
     rows = np.matmul(waves, np.concatenate([parts.real, parts.imag], axis=1)).reshape(boxes, samples, 3, mounts)
-    if quantity.norm.sums_lengths or quantity.norm.is_largest_mean:
+    if measure.norm.sums_lengths or measure.norm.is_largest_mean:
         size = _lengths(rows)
         # a mean of lengths is at most their root mean square
-        squares = np.where(lines.orders[own] > 0.0, 0.5, 1.0) / mounts
+        squares = np.where(lines.orders[indices] > 0.0, 0.5, 1.0) / mounts
         rests = root_of(squares, rest), root_of(squares, bends)
         by_mount, share = slopes.reshape(*slopes.shape[:3], mounts, 3), 1.0 / (samples * mounts)
 
         def pair_with(length: Array) -> LinearBound:
             dual = rows / np.where(length > 0.0, length, 1.0)[:, :, None]
-            duals = np.matmul(waves.T, dual.reshape(boxes, samples, -1)).reshape(boxes, 2, len(own), 3, mounts)
+            duals = np.matmul(waves.T, dual.reshape(boxes, samples, -1)).reshape(boxes, 2, len(indices), 3, mounts)
             slope = np.einsum("bkxm,bknmx->bn", duals[:, 0], by_mount.real)
             slope = share * (slope + np.einsum("bkxm,bknmx->bn", duals[:, 1], by_mount.imag))
             value = share * (size**2 / np.where(length > 0.0, length, 1.0)).sum(axis=(1, 2))
@@ -145,7 +146,7 @@ def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: 
         return pair_with(size).or_else(pair_with(maximum))
     # a maximum is the length of a row, and a peak to peak the distance of two rows
     box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
-    if quantity.norm.is_diameter:
+    if measure.norm.is_diameter:
         start = _lengths(rows - rows.mean(axis=1, keepdims=True)).argmax(axis=1)
         first = rows[box[:, None], start, :, np.arange(mounts)].swapaxes(1, 2)
         times = 2.0
@@ -153,9 +154,9 @@ def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: 
     t, mount = np.divmod(distance.reshape(boxes, -1).argmax(axis=1), mounts)
     length = distance[box, t, mount]
     along = (rows[box, t, :, mount] - first[box, :, mount]) / np.where(length > 0.0, length, 1.0)[:, None]
-    own_slopes = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
-    phases = turns[t] if times == 1.0 else turns[t] - turns[start[box, mount]]
-    slope = np.einsum("bk,bkna,ba->bn", phases, own_slopes, along).real
+    mount_slopes = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
+    phases = factors[t] if times == 1.0 else factors[t] - factors[start[box, mount]]
+    slope = np.einsum("bk,bkna,ba->bn", phases, mount_slopes, along).real
     return LinearBound(length, slope, times * rest.sum(axis=1), times * bends.sum(axis=1))
 
 
@@ -167,11 +168,14 @@ def _lengths(rows: Array) -> Array:
 
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
     """Bound the root of a weighted sum of squares; orders whose series may diverge count as zero."""
-    known = np.isfinite(answer.rest)
-    value, slopes = np.where(known[..., None], answer.value, 0.0), np.where(known[..., None, None], answer.slopes, 0.0)
+    is_finite = np.isfinite(answer.rest)
+    value, slopes = (
+        np.where(is_finite[..., None], answer.value, 0.0),
+        np.where(is_finite[..., None, None], answer.slopes, 0.0),
+    )
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
-    rest = root_of(weights, np.where(known, answer.rest, 0.0))
+    rest = root_of(weights, np.where(is_finite, answer.rest, 0.0))
     return LinearBound(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest, root_of(weights, answer.bends))
 
 

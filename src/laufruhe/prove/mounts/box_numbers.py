@@ -40,10 +40,10 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
     return LinearBound(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
 
 
-def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
+def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Bound the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
-    assert asked.channel.axis_residual is not None
-    axis = asked.channel.axis_residual(model.mounting(model.lower).block, asked.frequency)
+    assert measure.channel.axis_residual is not None
+    axis = measure.channel.axis_residual(model.mounting(model.lower).block, measure.frequency)
     bounds = np.zeros(len(lower))
     slopes = axis.left @ model.stiffness_slopes @ axis.right
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
@@ -73,36 +73,36 @@ RANGES: Mapping[Channel, Ranges] = {
     channels.TOTAL_STIFFNESS: lambda model, _, lower, upper: (
         stiffness_in_all(model, lower), stiffness_in_all(model, upper)
     ),
-    channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
-    channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
-    channels.DECOUPLING: lambda *at: (-math.inf, maximum_shares(*at).min(axis=0)),
-    channels.STATIC_TRAVEL: lambda *at: (static_loads(*at).minimum, math.inf),
-    channels.STATIC_FORCE: lambda *at: (static_loads(*at).minimum, math.inf),
-    channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),
+    channels.TORQUE_ROLL: lambda *box: (axis_residual(*box), math.inf),
+    channels.RAW_TORQUE_ROLL: lambda *box: (axis_residual(*box), math.inf),
+    channels.DECOUPLING: lambda *box: (-math.inf, maximum_shares(*box).min(axis=0)),
+    channels.STATIC_TRAVEL: lambda *box: (static_loads(*box).minimum, math.inf),
+    channels.STATIC_FORCE: lambda *box: (static_loads(*box).minimum, math.inf),
+    channels.DECOUPLING_SHORTFALL: lambda *box: (shortfall(*box), math.inf),
     channels.FREQUENCIES: lambda model, _, lower, upper: (
         _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
     ),
 }  # fmt: skip
 """Lower and upper bounds of mount numbers on boxes: more stiffness lowers sag and raises every frequency (E39).
 
-Of several numbers the lower bound is that of the largest, and the upper bound that of the least.
+If a measure has several numbers, the lower bound is that of the largest and the upper bound that of the smallest.
 """
-UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], LinearBound]] = {
+LINEAR_BOUNDS: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], LinearBound]] = {
     channels.SAG: sag_under,
     channels.STATIC_TRAVEL: static_loads,
     channels.STATIC_FORCE: static_loads,
 }
 """Linear lower bounds of mount numbers, which give limits a multiplier on a box (E38)."""
-SAID = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
+BOUNDED_LINEARLY = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
 """Channels whose range is no better than the linear bound."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
-    """Return whether a limit is violated all over a box, shape (boxes,) (E39)."""
+    """Return True for boxes in which every design violates a limit, shape (boxes,) (E39)."""
     minimum, maximum = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
-    out = np.zeros(len(lower), dtype=bool) | (minimum > limit.maximum * (1.0 + SLACK))
-    out |= maximum < limit.minimum * (1.0 - SLACK)
+    violated = np.zeros(len(lower), dtype=bool) | (minimum > limit.maximum * (1.0 + SLACK))
+    violated |= maximum < limit.minimum * (1.0 - SLACK)
     if limit.outside is not None:
         a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
-        out |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)
-    return np.asarray(out)
+        violated |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)
+    return np.asarray(violated)

@@ -26,7 +26,8 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, directions_of, inverses, mapped, series
 
-NOTHING = 1e-13
+# relative size of a load that counts as zero
+NEGLIGIBLE = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +58,8 @@ class LoadedOrders:
         indices, numbers = (self.points[which], self.places[which]), (self.orders[which], self.omegas[which])
         return LoadedOrders(*indices, *numbers, self.loads[which], self.samples)
 
-    def still(self) -> LoadedOrders:
-        """Return the same loads at zero frequency, for forces on rigid mounts (E11)."""
+    def at_rest(self) -> LoadedOrders:
+        """Return the loads with zero frequency, which give the forces on rigid mounts (E11)."""
         return replace(self, omegas=np.zeros_like(self.omegas))
 
     @property
@@ -66,8 +67,8 @@ class LoadedOrders:
         """Return True if sums over samples equal those over the period: every order has more than two samples."""
         return bool(2 * self.places.max(initial=0) < self.samples)
 
-    def turns(self, which: Indices) -> ComplexArray:
-        """Return phases of samples and some orders, shape (samples, orders), without repeated samples."""
+    def phases(self, which: Indices) -> ComplexArray:
+        """Return factors e^{i h phi} over one period of selected orders, shape (samples, orders)."""
         factor = int(np.gcd.reduce(self.places[which])) or 1
         factor = factor if self.samples % factor == 0 else 1
         places, samples = self.places[which] // factor, self.samples // factor
@@ -76,7 +77,7 @@ class LoadedOrders:
 
 @dataclass(frozen=True, eq=False)
 class MountMatrices:
-    """MountMatrices of a mounting in coordinates with unit mass.
+    """Matrices of a mounting in coordinates with unit mass.
 
     Attributes
     ----------
@@ -100,7 +101,7 @@ def is_travel(channel: Channel) -> bool:
 
 
 class BoxModel:
-    """MountMatrices of a problem with open stiffnesses alone.
+    """Matrices of a problem whose only open numbers are stiffnesses.
 
     Parameters
     ----------
@@ -126,17 +127,17 @@ class BoxModel:
         self.travels = (base.motions @ self.root.T).reshape(-1, 6)
         self._base, self._dynamic = self._parts(base), base.dynamic
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
-        moved = [self._parts(self.mounting(end)) for end in ends]
+        end_matrices = [self._parts(self.mounting(end)) for end in ends]
         self.slopes = {
             name: np.array(
                 [
-                    (getattr(other, name) - getattr(self._base, name)) / width
-                    for other, width in zip(moved, self.upper - self.lower, strict=True)
+                    (getattr(matrices, name) - getattr(self._base, name)) / width
+                    for matrices, width in zip(end_matrices, self.upper - self.lower, strict=True)
                 ]
             )
             for name in ("stiffness", "loss", "damping", "springs", "losses", "dampers")
         }
-        self.sides = directions_of([[each[j] for each in self.slopes.values()] for j in range(len(decisions))])
+        self.sides = directions_of([[slopes[j] for slopes in self.slopes.values()] for j in range(len(decisions))])
         self._inside = [self.sides.inside(self.slopes[name]) for name in ("stiffness", "loss", "damping")]
         self._along = [self.sides.along(self.slopes[name]) for name in ("springs", "losses", "dampers")]
         self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
@@ -151,8 +152,8 @@ class BoxModel:
         maps = ((part @ motions).reshape(-1, 6) for part in parts)
         return MountMatrices(*totals, *maps)
 
-    def lines(self, quantity: Measure | None = None) -> LoadedOrders:
-        """Return all loaded orders, or those that a quantity counts."""
+    def lines(self, measure: Measure | None = None) -> LoadedOrders:
+        """Return all loaded orders, or those that a measure counts."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         base, samples = self.problem.engine.cycle.base_order, self.evaluation.samples
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
@@ -160,7 +161,7 @@ class BoxModel:
             step = loads.wrench.base / base
             samples = samples if step.denominator == 1 else 0
             size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
-            for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
+            for k in np.flatnonzero(size > NEGLIGIBLE * size.max(initial=0.0)):
                 order = float(loads.wrench.orders[k])
                 rows.append(
                     (p, int(int(k) * step), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k])
@@ -170,10 +171,10 @@ class BoxModel:
             np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
             np.array(omegas, dtype=float), np.array(wrenches, dtype=complex).reshape(-1, 6), samples,
         )  # fmt: skip
-        if quantity is None:
+        if measure is None:
             return lines
-        keep = np.isin(lines.points, self.counted(quantity.points))
-        return lines.subset(keep & quantity.counted(lines.orders))
+        keep = np.isin(lines.points, self.counted(measure.points))
+        return lines.subset(keep & measure.counted(lines.orders))
 
     def counted(self, names: tuple[str, ...] | None) -> list[int]:
         """Return the indices of operating points by name; all for None."""
@@ -218,43 +219,43 @@ class BoxModel:
         return series(centres, halves, inverse, self.sides, _dynamic(lines, *self._inside), motion)
 
     def answer(
-        self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices, factors: Array
+        self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices, factors: Array
     ) -> LinearResponse:
         """Return selected rows of forces or travel, times factors, as linear functions over boxes (E37)."""
-        value, turned = self.maps(lines, at, channel, rows)
-        return mapped(at, value * factors[:, None], None if turned is None else turned * factors[:, None])
+        value, slopes = self.maps(lines, expansion, channel, rows)
+        return mapped(expansion, value * factors[:, None], None if slopes is None else slopes * factors[:, None])
 
     def maps(
-        self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices
+        self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices
     ) -> tuple[ComplexArray, ComplexArray | None]:
         """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m)."""
         if is_travel(channel):
             flat = self.travels[rows].astype(complex)
-            return np.broadcast_to(flat, (len(at.centres), len(lines.omegas), *flat.shape)), None
+            return np.broadcast_to(flat, (len(expansion.centres), len(lines.omegas), *flat.shape)), None
         springs, losses, dampers = (
-            self.at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
+            self.at(name, expansion.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
         )
         value = _dynamic(lines, springs, losses, dampers) + self.added_forces(lines.omegas)[:, rows]
-        by_side = _dynamic(lines, *(each[rows] for each in self._along))
-        return value, by_side * at.halves[:, None, None, self.sides.own]
+        slopes = _dynamic(lines, *(matrix[rows] for matrix in self._along))
+        return value, slopes * expansion.halves[:, None, None, self.sides.number_of_column]
 
     def largest_response(self, lines: LoadedOrders, channel: Channel) -> Array:
         """Return upper bounds of the response of all mounts within all bounds, shape (lines,) (E41).
 
         Orders that are not above all natural frequencies have an infinite bound.
         """
-        room = lines.omegas**2 - self.highest - self.rise(lines.omegas)
-        motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
-        motion = np.where(room > 0.0, motion, np.inf)
+        margin = lines.omegas**2 - self.highest - self.rise(lines.omegas)
+        motion = np.linalg.norm(lines.loads, axis=1) / np.where(margin > 0.0, margin, 1.0)
+        motion = np.where(margin > 0.0, motion, np.inf)
         if is_travel(channel):
             return motion * float(np.linalg.norm(self.travels))
         stiffest = self.mounting(self.upper)
         # springs that share a mount count one by one, since their sum may be smaller
         separate = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
         maximum, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
-        still = math.sqrt(maximum) * float(np.linalg.norm(top.springs + 1j * top.losses))
-        still = still + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
-        return np.asarray(motion * (still + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top.dampers))))
+        static = math.sqrt(maximum) * float(np.linalg.norm(top.springs + 1j * top.losses))
+        static = static + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
+        return np.asarray(motion * (static + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top.dampers))))
 
 
 def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:

@@ -28,7 +28,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 
 # share of the largest singular value under which a direction counts as none
-NOTHING = 1e-12
+NEGLIGIBLE = 1e-12
 # squarings for the norm of a matrix, which exceeds it by at most the sixteenth root of the rank
 SQUARED = 3
 # factor of branching scores of a series that may diverge
@@ -43,32 +43,39 @@ class Sides:
     ----------
     columns
         All B_j side by side, orthonormal for each number, shape (d, m).
-    own
-        Index of the number of each column, rising, shape (m,).
+    number_of_column
+        Index of the open number of each column, rising, shape (m,).
     count
         Number of open numbers n.
     """
 
     columns: Array
-    own: Indices
+    number_of_column: Indices
     count: int
 
     def inside(self, slopes: Any) -> Any:
         """Return C from slopes of D by each number, (..., n, d, d) to (..., m, m)."""
-        same = self.own[:, None] == self.own
+        same = self.number_of_column[:, None] == self.number_of_column
         return np.where(same, np.swapaxes(self.columns, 0, 1) @ self.along(slopes), 0.0)
 
     def along(self, slopes: Any) -> Any:
         """Return E from slopes of maps by each number, (..., n, r, d) to (..., r, m)."""
-        return np.einsum("...mrd,dm->...rm", np.take(slopes, self.own, axis=-3), self.columns)
+        return np.einsum("...mrd,dm->...rm", np.take(slopes, self.number_of_column, axis=-3), self.columns)
 
-    def apart(self, turned: Any) -> list[Any]:
+    def maps_by_number(self, turned: Any) -> list[Any]:
         """Return the maps E_j B_j' of each number, (..., r, d), from E, (..., r, m)."""
-        return [turned[..., self.own == j] @ self.columns[:, self.own == j].T for j in range(self.count)]
+        return [
+            turned[..., self.number_of_column == j] @ self.columns[:, self.number_of_column == j].T
+            for j in range(self.count)
+        ]
 
-    def summed(self, values: Any) -> Any:
+    def sum_by_number(self, values: Any) -> Any:
         """Sum over the columns of each number, (..., m) to (..., n)."""
-        return values if len(self.own) == self.count else values @ (self.own[:, None] == np.arange(self.count))
+        return (
+            values
+            if len(self.number_of_column) == self.count
+            else values @ (self.number_of_column[:, None] == np.arange(self.count))
+        )
 
 
 def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
@@ -77,7 +84,7 @@ def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
     for slopes in matrices:
         rows = np.vstack([slope / max(float(np.abs(slope).max(initial=0.0)), 1e-300) for slope in slopes])
         _, size, directions = np.linalg.svd(rows, full_matrices=False)
-        bases.append(directions[size > NOTHING * size.max(initial=0.0)].T)
+        bases.append(directions[size > NEGLIGIBLE * size.max(initial=0.0)].T)
     numbers = np.repeat(np.arange(len(bases)), [basis.shape[1] for basis in bases])
     return Sides(np.hstack(bases), numbers, len(bases))
 
@@ -94,7 +101,7 @@ class Expansion:
         Directions of the open numbers.
     motion
         y0, (..., d).
-    moved, gain, met
+    column_motions, gain, column_travels
         L, G and z0: (..., d, m), (..., m, m) and (..., m).
     balance
         Diagonal of T, (..., m).
@@ -106,9 +113,9 @@ class Expansion:
     halves: Array
     sides: Sides
     motion: ComplexArray
-    moved: ComplexArray
+    column_motions: ComplexArray
     gain: ComplexArray
-    met: ComplexArray
+    column_travels: ComplexArray
     balance: Array
     rest: Array
 
@@ -117,7 +124,7 @@ class Expansion:
         """Branching scores: share of each side in the gain of the series, (..., n)."""
         even = self.gain * (self.balance[..., None] / self.balance[..., None, :])
         size = np.linalg.norm(even, axis=-2) + np.linalg.norm(even, axis=-1)
-        return np.asarray(np.nan_to_num(self.sides.summed(size), nan=1.0, posinf=1.0))
+        return np.asarray(np.nan_to_num(self.sides.sum_by_number(size), nan=1.0, posinf=1.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,13 +167,13 @@ def series(
     sides, inside
         B, and C, (lines, m, m).
     """
-    columns = sides.columns * np.sqrt(halves[:, sides.own])[:, None]
-    moved = np.matmul(inverse, np.matmul(columns[:, None], inside))
-    gain = np.matmul(np.swapaxes(columns, -2, -1)[:, None], moved)
-    met = np.matmul(motion[..., None, :], columns[:, None])[..., 0, :]
+    columns = sides.columns * np.sqrt(halves[:, sides.number_of_column])[:, None]
+    column_motions = np.matmul(inverse, np.matmul(columns[:, None], inside))
+    gain = np.matmul(np.swapaxes(columns, -2, -1)[:, None], column_motions)
+    column_travels = np.matmul(motion[..., None, :], columns[:, None])[..., 0, :]
     balance, even, maximum = balanced(gain)
-    rest = rest_of(even, maximum, np.abs(met) * balance)
-    return Expansion(centres, halves, sides, motion, moved, gain, met, balance, rest)
+    rest = rest_of(even, maximum, np.abs(column_travels) * balance)
+    return Expansion(centres, halves, sides, motion, column_motions, gain, column_travels, balance, rest)
 
 
 def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
@@ -179,41 +186,55 @@ def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
 
 
 def rest_of(even: ComplexArray, maximum: Array, hit: Array) -> Array:
-    """Bound g / (1 - g) |T G S z0| by |T z0|, (..., m) to (...); infinite if the series may diverge."""
+    """Return an upper bound of g / (1 - g) |T G S z0|, (...), infinite if the series may diverge.
+
+    Parameters
+    ----------
+    even
+        Balanced gain T G T^-1, (..., m, m).
+    maximum
+        Upper bound of its norm g, (...).
+    hit
+        Upper bounds of |T z0|, (..., m).
+    """
     second = np.minimum((np.linalg.norm(even, axis=-2) * hit).sum(axis=-1), maximum * np.linalg.norm(hit, axis=-1))
     share = np.where(maximum < 1.0, maximum / np.where(maximum < 1.0, 1.0 - maximum, 1.0), np.inf)
     rest = share * np.where(second > 0.0, second, 1.0)
     return np.asarray(np.where(second > 0.0, rest, np.where(maximum < 1.0, 0.0, np.inf)))
 
 
-def mapped(at: Expansion, value: Any, turned: Any = None) -> LinearResponse:
-    """Return forces or travel of a motion (E37).
+def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearResponse:
+    """Return the forces or travel of a motion as linear functions over boxes (E37).
 
     Parameters
     ----------
+    expansion
+        Series of the motion.
     value
         V, (boxes, lines, r, d).
     turned
         E times half the width of the box of each number, (..., r, m); None for constant maps.
     """
-    pulls = -np.matmul(value, at.moved)
+    pulls = -np.matmul(value, expansion.column_motions)
     if turned is not None:
-        root = np.sqrt(at.halves[:, at.sides.own])[:, None, None]
+        root = np.sqrt(expansion.halves[:, expansion.sides.number_of_column])[:, None, None]
         pulls = pulls + np.where(root > 0.0, turned / np.where(root > 0.0, root, 1.0), 0.0)
-    summed = at.sides.summed
-    first = np.swapaxes(summed(pulls * at.met[:, :, None]), -2, -1)
-    pairs = pulls[..., None] * (at.gain * at.met[..., None, :])[:, :, None]
-    second = -np.swapaxes(summed(np.swapaxes(summed(pairs), -2, -1)), -2, -1)
-    k = np.arange(at.sides.count)
+    sum_by_number = expansion.sides.sum_by_number
+    first = np.swapaxes(sum_by_number(pulls * expansion.column_travels[:, :, None]), -2, -1)
+    pairs = pulls[..., None] * (expansion.gain * expansion.column_travels[..., None, :])[:, :, None]
+    second = -np.swapaxes(sum_by_number(np.swapaxes(sum_by_number(pairs), -2, -1)), -2, -1)
+    k = np.arange(expansion.sides.count)
     squares, sizes = second[..., k, k], np.linalg.norm(0.5 * (second + np.swapaxes(second, -2, -1)), axis=2)
     sizes[..., k, k] *= 0.5
     # a zero map has no remainder, even of a series that diverges
-    size = norm_over(pulls / at.balance[:, :, None])
-    beyond = np.where(size > 0.0, size * np.where(size > 0.0, at.rest, 0.0), 0.0)
+    size = norm_over(pulls / expansion.balance[:, :, None])
+    beyond = np.where(size > 0.0, size * np.where(size > 0.0, expansion.rest, 0.0), 0.0)
     bends = sizes.sum(axis=-1)
-    whole = np.linalg.norm(value, axis=(-2, -1)) * np.linalg.norm(at.motion, axis=-1)
-    scores = np.where(np.isfinite(at.rest)[..., None], bends, DIVERGENT * whole[..., None] * at.pull)
-    middle = np.matmul(value, at.motion[..., None])[..., 0] + 0.5 * squares.sum(axis=-1)
+    size_at_centre = np.linalg.norm(value, axis=(-2, -1)) * np.linalg.norm(expansion.motion, axis=-1)
+    scores = np.where(
+        np.isfinite(expansion.rest)[..., None], bends, DIVERGENT * size_at_centre[..., None] * expansion.pull
+    )
+    middle = np.matmul(value, expansion.motion[..., None])[..., 0] + 0.5 * squares.sum(axis=-1)
     return LinearResponse(middle, first, bends.sum(axis=-1) + beyond, scores)
 
 

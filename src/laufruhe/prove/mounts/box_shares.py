@@ -41,9 +41,9 @@ class BoxModes:
         Slopes of the stiffness in these modes over half a box, shape (boxes, n, 6, 6).
     parts
         Upper bounds of parts |v_j| of mode i, shape (boxes, i, j).
-    lacks
+    deficits
         Upper bounds of 1 - |v_i|, shape (boxes, i).
-    moved
+    square_changes
         Upper bounds of the change of the square of mode i, shape (boxes, i).
     """
 
@@ -51,8 +51,8 @@ class BoxModes:
     squares: Array
     slopes: Array
     parts: Array
-    lacks: Array
-    moved: Array
+    deficits: Array
+    square_changes: Array
 
     @property
     def change(self) -> Array:
@@ -75,7 +75,12 @@ class BoxModes:
         """Upper bounds of the difference of v_j and its first order, shape (boxes, i, j)."""
         change = self.change
         others = np.einsum("bjk,bik->bij", change, np.where(_EYE, 0.0, self.parts))
-        rest = change * self.lacks[:, :, None] + others + self.moved[:, :, None] * self.parts + _rounding(self.squares)
+        rest = (
+            change * self.deficits[:, :, None]
+            + others
+            + self.square_changes[:, :, None] * self.parts
+            + _rounding(self.squares)
+        )
         equal = self.squares[:, :, None] == self.squares[:, None, :]
         return np.where(_EYE, 0.0, np.where(equal, np.inf, rest / np.abs(self.differences)))
 
@@ -88,8 +93,11 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
     change, rounding = _change(slopes, squares), _rounding(squares)[:, :, 0]
     low, high = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
     low, high = np.minimum(low, squares) - rounding, np.maximum(high, squares) + rounding
-    own = np.einsum("bjj->bj", change)
-    over, under = low[:, :, None] - (squares + own)[:, None, :], (squares - own)[:, None, :] - high[:, :, None]
+    diagonal = np.einsum("bjj->bj", change)
+    over, under = (
+        low[:, :, None] - (squares + diagonal)[:, None, :],
+        (squares - diagonal)[:, None, :] - high[:, :, None],
+    )
     gaps = np.maximum(np.maximum(over, under), 0.0)
     across = np.where(_EYE, 0.0, change)
     parts, maximum = np.ones_like(across), np.linalg.norm(across, axis=2)[:, None, :]
@@ -98,8 +106,8 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
         bound = np.where(gaps > 0.0, coupling / np.where(gaps > 0.0, gaps, 1.0), 1.0)
         parts = np.where(_EYE, 1.0, np.minimum(parts, bound))
     others = np.sum(np.where(_EYE, 0.0, parts) ** 2, axis=2)
-    lacks = 1.0 - np.sqrt(np.maximum(1.0 - others, 0.0))
-    return BoxModes(modes, squares, slopes, parts, lacks, np.maximum(high - squares, squares - low))
+    deficits = 1.0 - np.sqrt(np.maximum(1.0 - others, 0.0))
+    return BoxModes(modes, squares, slopes, parts, deficits, np.maximum(high - squares, squares - low))
 
 
 def _change(slopes: Array, squares: Array) -> Array:
@@ -112,17 +120,17 @@ def _rounding(squares: Array) -> Array:
 
 def maximum_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return upper bounds of the largest share of each motion in a mode, shape (motions, boxes) (E7, E39)."""
-    at = box_modes(model, lower, upper)
-    return np.array([_shares(model, at, motion).maximum.max(axis=1) for motion in motion_indices(measure)])
+    box = box_modes(model, lower, upper)
+    return np.array([_shares(model, box, motion).maximum.max(axis=1) for motion in motion_indices(measure)])
 
 
 def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return lower bounds of the decoupling shortfall, shape (boxes,) (E47, E64)."""
-    at = box_modes(model, lower, upper)
+    box = box_modes(model, lower, upper)
     total, slopes = np.zeros(len(lower)), np.zeros_like(lower)
     alone = np.zeros(len(lower))
     for motion in motion_indices(measure):
-        value, slope, maximum = _of_the_largest(_shares(model, at, motion))
+        value, slope, maximum = _largest_share(_shares(model, box, motion))
         alone += np.maximum(measure.wanted - maximum, 0.0)
         # a shortfall is at least zero, and at least its linear bound
         linear = measure.wanted - value
@@ -149,17 +157,17 @@ class _Shares:
     maximum: Array
 
 
-def _shares(model: BoxModel, at: BoxModes, motion: int) -> _Shares:
+def _shares(model: BoxModel, box: BoxModes, motion: int) -> _Shares:
     shape, momentum = model.root[:, motion], np.linalg.inv(model.root)[motion]
-    a, b = shape @ at.modes, momentum @ at.modes
-    near = _most_along(a, at.parts) * _most_along(b, at.parts)
+    a, b = shape @ box.modes, momentum @ box.modes
+    near = _projection_bounds(a, box.parts) * _projection_bounds(b, box.parts)
     both = a[:, :, None] * b[:, None, :] + a[:, None, :] * b[:, :, None]
-    slopes = np.einsum("bij,bnij->bin", np.where(_EYE, 0.0, both), at.first)
-    others = np.where(_EYE, 0.0, at.parts)
-    far = [np.abs(c) * at.lacks + np.einsum("bij,bj->bi", others, np.abs(c)) for c in (a, b)]
+    slopes = np.einsum("bij,bnij->bin", np.where(_EYE, 0.0, both), box.first)
+    others = np.where(_EYE, 0.0, box.parts)
+    far = [np.abs(c) * box.deficits + np.einsum("bij,bj->bi", others, np.abs(c)) for c in (a, b)]
     with np.errstate(invalid="ignore"):
-        rest = np.where(both == 0.0, 0.0, np.abs(both) * at.rests).sum(axis=2)
-    rest = rest + np.maximum(-2.0 * a * b, 0.0) * at.lacks + far[0] * far[1]
+        rest = np.where(both == 0.0, 0.0, np.abs(both) * box.rests).sum(axis=2)
+    rest = rest + np.maximum(-2.0 * a * b, 0.0) * box.deficits + far[0] * far[1]
     value = a * b + rest
     reach = np.abs(slopes).sum(axis=2)
     # use constants where the linear function is no better
@@ -168,7 +176,7 @@ def _shares(model: BoxModel, at: BoxModes, motion: int) -> _Shares:
     return _Shares(value, slopes, np.minimum(near, value + np.abs(slopes).sum(axis=2)))
 
 
-def _of_the_largest(shares: _Shares) -> tuple[Array, Array, Array]:
+def _largest_share(shares: _Shares) -> tuple[Array, Array, Array]:
     # upper bounds of the largest share: linear (value, slopes), and constant
     boxes = np.arange(len(shares.value))
     best = np.argmax(shares.value, axis=1)
@@ -178,10 +186,10 @@ def _of_the_largest(shares: _Shares) -> tuple[Array, Array, Array]:
     return value + np.maximum(above, 0.0).max(axis=1), slope, shares.maximum.max(axis=1)
 
 
-def _most_along(along: Array, parts: Array) -> Array:
+def _projection_bounds(components: Array, parts: Array) -> Array:
     # upper bounds of |vector' v| by the parts of the vector in middle modes, shape (boxes, modes)
-    sizes = np.abs(along)[:, None]
+    sizes = np.abs(components)[:, None]
     near = parts > NEAR
-    together = np.sqrt(np.sum(np.where(near, sizes, 0.0) ** 2, axis=2))
-    together += np.sum(np.where(near, 0.0, sizes * parts), axis=2)
-    return np.asarray(np.minimum(together, np.sum(sizes * parts, axis=2)))
+    total = np.sqrt(np.sum(np.where(near, sizes, 0.0) ** 2, axis=2))
+    total += np.sum(np.where(near, 0.0, sizes * parts), axis=2)
+    return np.asarray(np.minimum(total, np.sum(sizes * parts, axis=2)))

@@ -16,7 +16,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
-from laufruhe.prove.mounts.subdivision import divided_bounds, divides
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem, stiffness_bounds
 from laufruhe.prove.witness import Witness
 
 EARLY = 0.2
@@ -27,7 +27,7 @@ LEAST_SECONDS = 0.5
 
 @dataclass(eq=False)
 class Question:
-    """The question whether a design is more than `room` better than the incumbent.
+    """Question to provers, if any design is better than the incumbent by more than the gap tolerance.
 
     Attributes
     ----------
@@ -35,27 +35,27 @@ class Question:
         Problem on elastic mounts with open numbers.
     value
         Objective of the incumbent [SI], infinite without one; provers lower it when they find a better design.
-    room
-        Absolute gap tolerance [SI].
-    near
+    gap_tolerance
+        Improvement that counts as none [SI].
+    good_values
         Values of the decisions of a good design.
-    known
-        Incumbent by its numbers of the mounts, to check bounds.
-    of_many
+    witness
+        Incumbent by its numbers of the mounts, to check bounds; None without one.
+    in_batch
         Whether many problems are bounded, so that cheap bounds come first.
-    moves
-        Phasing and candidate of throws between bounds; None for a fixed crank.
+    open_throws
+        Phasing and candidate, if throws are open between bounds; None for a fixed crank.
     bound
-        Best lower bound so far [SI], raised by `proven`.
+        Best lower bound so far [SI], raised by `run_provers`.
     """
 
     problem: Problem
     value: float
-    room: float
-    near: Sequence[Value] = ()
-    known: Witness | None = None
-    of_many: bool = False
-    moves: tuple[Phasing, Candidate] | None = None
+    gap_tolerance: float
+    good_values: Sequence[Value] = ()
+    witness: Witness | None = None
+    in_batch: bool = False
+    open_throws: tuple[Phasing, Candidate] | None = None
     bound: float = 0.0
 
 
@@ -68,28 +68,30 @@ class Prover:
     name
         Name of its boxes.
     applies
-        Return whether the prover bounds a problem.
+        Function that returns True if the prover bounds a problem.
     bounds
-        Yield increasing bounds, each after more work, with the number of all boxes so far. Places are start points for
-        a search: numbers of mounts, then columns of unbalances.
+        Function that yields increasing bounds, each after more work, with the number of all boxes so far. Places are
+        start points for a search: numbers of the mounts, then columns of the unbalances.
     before
         Name of the prover that this one precedes.
-    of_moves
-        Whether it bounds only designs with throws between bounds.
+    for_open_throws
+        Whether it bounds only problems with throws open between bounds.
     """
 
     name: str
     applies: Callable[[Problem], bool]
     bounds: Callable[[Question], Iterator[BoxResult]]
     before: str = ""
-    of_moves: bool = False
+    for_open_throws: bool = False
 
 
 def _stiffness_bounds(question: Question) -> Iterator[BoxResult]:
-    yield from divided_bounds(question.problem, question.value, question.room, (EARLY, 1.0), question.known)
+    yield from stiffness_bounds(
+        question.problem, question.value, question.gap_tolerance, (EARLY, 1.0), question.witness
+    )
 
 
-PROVERS = (Prover("boxes of stiffness", divides, _stiffness_bounds),)
+PROVERS = (Prover("boxes of stiffness", is_stiffness_problem, _stiffness_bounds),)
 """Provers of the core."""
 
 
@@ -100,14 +102,25 @@ def provers() -> tuple[Prover, ...]:
     return ordered
 
 
-def proven(question: Question) -> BoxResult:
-    """Run all provers that apply in rounds of growing work, until one closes the gap or time is over."""
-    eligible = [prover for prover in provers() if prover.of_moves is (question.moves is not None)]
+def run_provers(question: Question) -> BoxResult:
+    """Run all provers that apply in rounds of growing work, until one closes the gap or time is over.
+
+    Parameters
+    ----------
+    question
+        Problem and incumbent; its bound is raised to the best one found.
+
+    Returns
+    -------
+    BoxResult
+        Best bound, number of all boxes, and the start points of the last prover that has any.
+    """
+    eligible = [prover for prover in provers() if prover.for_open_throws is (question.open_throws is not None)]
     running = [prover.bounds(question) for prover in eligible if prover.applies(question.problem)]
     results: dict[Iterator[BoxResult], BoxResult] = {}
 
     def is_over() -> bool:
-        return bool(results) and (is_time_over() or not question.bound < question.value - question.room)
+        return bool(results) and (is_time_over() or not question.bound < question.value - question.gap_tolerance)
 
     while running and not is_over():
         for bounds in tuple(running):

@@ -18,7 +18,7 @@ from laufruhe.prove.mounts.box_series import LinearResponse
 
 HALVINGS = 45
 RATIOS = frozenset({channels.TRANSMISSIBILITY})
-"""Channels of such a ratio."""
+"""Channels of transmissibility."""
 
 
 def is_ratio(measure: Measure) -> bool:
@@ -26,35 +26,35 @@ def is_ratio(measure: Measure) -> bool:
     return measure.channel in RATIOS
 
 
-def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: LoadedOrders) -> list[Mask]:
+def groups_of(measure: Measure, points: Sequence[OperatingPoint], lines: LoadedOrders) -> list[Mask]:
     """Return masks of the lines of each ratio: one per operating point and named order, or all orders above zero."""
-    out = []
-    for p in (p for p in np.unique(lines.points) if quantity.includes_point(points[p])):
+    groups = []
+    for p in (p for p in np.unique(lines.points) if measure.includes_point(points[p])):
         moving = (lines.points == p) & (lines.orders > 0.0)
-        orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
-        out += [moving if order is None else moving & orders_equal(lines.orders, order) for order in orders]
-    return [group for group in out if group.any()]
+        orders: Sequence[float | None] = (None,) if measure.orders is None else measure.orders
+        groups += [moving if order is None else moving & orders_equal(lines.orders, order) for order in orders]
+    return [group for group in groups if group.any()]
 
 
-def ratio_under(over: LinearResponse, firm: LinearResponse, groups: Sequence[Mask]) -> tuple[Array, Array]:
+def ratio_under(elastic: LinearResponse, rigid: LinearResponse, groups: Sequence[Mask]) -> tuple[Array, Array]:
     """Return lower bounds of the largest ratio, shape (boxes,), and branching scores, shape (boxes, n).
 
     Parameters
     ----------
-    over, firm
-        Forces of orders, and static forces under the same loads.
+    elastic, rigid
+        Mount forces by order on elastic mounts, and on rigid mounts under the same loads.
     groups
         Orders of each ratio, from `groups_of`.
     """
-    best, scores = np.zeros(len(over.value)), np.zeros(over.bends[:, 0].shape)
+    best, scores = np.zeros(len(elastic.value)), np.zeros(elastic.bends[:, 0].shape)
     for group in groups:
         weights = group.astype(float)
-        top, bottom = root_under(over, weights), root_under(firm, weights)
-        square = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
-        known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
-        curvature = square / (2.0 * np.where(known, bottom.value, 1.0))
+        top, bottom = root_under(elastic, weights), root_under(rigid, weights)
+        square = np.einsum("k,bk->b", weights, np.linalg.norm(rigid.slopes, axis=-1).sum(axis=-1) ** 2)
+        is_bounded = np.all(np.isfinite(rigid.rest[:, group]), axis=1) & (bottom.value > 0.0)
+        curvature = square / (2.0 * np.where(is_bounded, bottom.value, 1.0))
         minimum = _least_ratio(top, replace(bottom, rest=bottom.rest + curvature))
-        best = np.maximum(best, np.where(known, minimum, 0.0))
+        best = np.maximum(best, np.where(is_bounded, minimum, 0.0))
         scores = np.maximum(scores, (top.bends + minimum[:, None] * bottom.bends) / bottom.value[:, None])
     return best, scores
 

@@ -1,6 +1,6 @@
 """Lower bounds of mount forces, travel and transmissibility by branch and bound over stiffnesses (E38-E40).
 
-On a box every quantity has a linear lower bound, with an error of second order in the size of the box. Boxes whose
+On a box every measure has a linear lower bound, with an error of second order in the size of the box. Boxes whose
 bound is not under the incumbent, or that violate a limit, are dropped, and the others are halved. The least bound of
 the remaining boxes is a lower bound of the objective of every feasible design.
 """
@@ -26,8 +26,8 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import LinearBound, under
-from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
+from laufruhe.prove.mounts.box_norms import LinearBound, lower_bound_of_norm
+from laufruhe.prove.mounts.box_numbers import BOUNDED_LINEARLY, LINEAR_BOUNDS, RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
@@ -48,35 +48,41 @@ LEFT_OUT = 0.05
 EVEN = 1e-12
 
 
-def divides(problem: Problem) -> bool:
+def is_stiffness_problem(problem: Problem) -> bool:
     """Return whether only stiffnesses are open, and every spring is monotone in them."""
     stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
     return bool(problem.decisions) and stiffness
 
 
-def divided_bounds(
-    problem: Problem, value: float, room: float, shares: Sequence[float], known: Witness | None = None
+def stiffness_bounds(
+    problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes of stiffness, until no design is more than `room` better than `value`.
+    """Yield bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance.
 
     Parameters
     ----------
     problem
-        Problem that `divides`.
+        Problem for which `is_stiffness_problem` returns True.
     value
         Objective of the incumbent [SI]. Without one it is infinite, and an infinite bound proves infeasibility.
-    room
-        Absolute gap tolerance [SI].
+    gap_tolerance
+        Improvement that counts as none [SI].
     shares
         Shares of the box budget, one bound after each.
-    known
-        Incumbent, to check bounds.
+    witness
+        Incumbent by its stiffnesses, to check bounds; None without one.
     """
-    search = StiffnessBoxes(problem, LEFT_OUT * room, value - GAP_SAFETY * room if value < math.inf else math.inf)
+    search = StiffnessBoxes(
+        problem,
+        LEFT_OUT * gap_tolerance,
+        value - GAP_SAFETY * gap_tolerance if value < math.inf else math.inf,
+    )
     maximum = search.max_boxes
     if maximum and search.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
-        yield from bisect_in_stages(search, search.model.lower, search.model.upper, value, room, counts, known)
+        yield from bisect_in_stages(
+            search, search.model.lower, search.model.upper, value, gap_tolerance, counts, witness
+        )
 
 
 class SimulatedBoxes(Protocol):
@@ -88,8 +94,8 @@ class SimulatedBoxes(Protocol):
     def cost(self) -> int:
         """Work of one box, in numbers."""
 
-    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None, /) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on some of them."""
+    def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None, /) -> LinearBound:
+        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or only on those of a mask."""
 
 
 def simulated_boxes(model: BoxModel) -> SimulatedBoxes | None:
@@ -142,7 +148,7 @@ class StiffnessBoxes:
             if limit.measure.on_mounts
         ]
         numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
-        self._priced = [limit for limit in numbers if limit.measure.channel in UNDER]
+        self._priced = [limit for limit in numbers if limit.measure.channel in LINEAR_BOUNDS]
         self.simulated = simulated_boxes(self.model)
 
     @property
@@ -167,8 +173,8 @@ class StiffnessBoxes:
     @property
     def max_boxes(self) -> int:
         """Box budget: as requested, or for a few seconds."""
-        few = len(self.problem.mount_decisions) <= MOST_OPEN
-        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if few else 0)
+        is_tractable = len(self.problem.mount_decisions) <= MOST_OPEN
+        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if is_tractable else 0)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes, infinite without a feasible design, and the sides to halve.
@@ -183,9 +189,9 @@ class StiffnessBoxes:
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         boxes, scores, size = LinearRelaxation.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
-        for weight, quantity, lines, left_out in self._terms:
-            at = self.model.expanded(lines, lower, upper)
-            minimum = under(self.model, quantity, lines, at)
+        for weight, measure, lines, left_out in self._terms:
+            expansion = self.model.expanded(lines, lower, upper)
+            minimum = lower_bound_of_norm(self.model, measure, lines, expansion)
             boxes.add(weight, minimum, left_out)
             scores, size = scores + weight * minimum.bends, size + weight * minimum.value
         self._add_limits(boxes, lower, upper)
@@ -194,13 +200,14 @@ class StiffnessBoxes:
         bounds = self.constant + numbers + boxes.minimum
         scores = (scores + score) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
         # simulations cost most, and come last
-        left = np.flatnonzero(~violated & (bounds < self.cutoff))
-        if self.simulated is not None and len(left):
-            rest = boxes.subset(left)
-            scores[left] = np.maximum(scores[left], self._add_simulated(rest, lower[left], upper[left]))
-            bounds[left] = self.constant + numbers[left] + rest.minimum
+        remaining = np.flatnonzero(~violated & (bounds < self.cutoff))
+        if self.simulated is not None and len(remaining):
+            subset = boxes.subset(remaining)
+            simulated_scores = self._add_simulated(subset, lower[remaining], upper[remaining])
+            scores[remaining] = np.maximum(scores[remaining], simulated_scores)
+            bounds[remaining] = self.constant + numbers[remaining] + subset.minimum
             boxes.pulls.append(np.zeros_like(scores))
-            boxes.pulls[-1][left] = rest.pull
+            boxes.pulls[-1][remaining] = subset.pull
         if math.isinf(self.cutoff):
             # without an incumbent the question is whether the limits can be kept
             scores = boxes.pull
@@ -208,11 +215,11 @@ class StiffnessBoxes:
         return np.where(violated, np.inf, bounds), np.asarray(sides)
 
     def _add_limits(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> None:
-        for maximum, quantity, lines, left_out in self._limits:
-            minimum = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
+        for maximum, measure, lines, left_out in self._limits:
+            minimum = lower_bound_of_norm(self.model, measure, lines, self.model.expanded(lines, lower, upper))
             boxes.add_limit(minimum, left_out, maximum)
         for limit in self._priced:
-            minimum = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
+            minimum = LINEAR_BOUNDS[limit.measure.channel](self.model, limit.measure, lower, upper)
             boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
 
     def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
@@ -244,39 +251,40 @@ class StiffnessBoxes:
 
     def _violated(self, lower: Array, upper: Array) -> Mask:
         # boxes that violate a limit of a mount number everywhere, shape (boxes,)
-        out = np.zeros(len(lower), dtype=bool)
+        violated = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
             if is_ratio(limit.measure):
-                out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
-            elif limit.measure.channel not in SAID:
-                out |= breaks(self.model, limit, lower, upper)
-        return out
+                violated |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
+            elif limit.measure.channel not in BOUNDED_LINEARLY:
+                violated |= breaks(self.model, limit, lower, upper)
+        return violated
 
-    def _ratio_lines(self, quantity: Measure) -> LoadedOrders:
-        counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=quantity.points, orders=quantity.orders)
+    def _ratio_lines(self, measure: Measure) -> LoadedOrders:
+        counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=measure.points, orders=measure.orders)
         lines = self.model.lines(counted)
         return lines.subset(lines.omegas > 0.0)
 
-    def _ratio(self, quantity: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
+    def _ratio(self, measure: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
         # lower bounds of a transmissibility, and branching scores (E40)
-        lines = self._ratio_lines(quantity)
+        lines = self._ratio_lines(measure)
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
-        at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
-        over, firm = (
-            self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
-            for each, expansion in ((lines, at), (lines.still(), still))
+        loads = (lines, lines.at_rest())
+        expansions = [self.model.expanded(orders, lower, upper) for orders in loads]
+        elastic, rigid = (
+            self.model.answer(orders, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
+            for orders, expansion in zip(loads, expansions, strict=True)
         )
-        return ratio_under(over, firm, groups_of(quantity, self.problem.points, lines))
+        return ratio_under(elastic, rigid, groups_of(measure, self.problem.points, lines))
 
 
-def _relevant_lines(model: BoxModel, quantity: Measure, budget: float) -> tuple[LoadedOrders, float]:
+def _relevant_lines(model: BoxModel, measure: Measure, budget: float) -> tuple[LoadedOrders, float]:
     # E41; leaves out small lines that sum to less than the budget, and returns their effect on the norm
-    lines = model.lines(quantity)
-    size = max(quantity.direction_weights or (1.0,)) * model.largest_response(lines, quantity.channel)
+    lines = model.lines(measure)
+    size = max(measure.direction_weights or (1.0,)) * model.largest_response(lines, measure.channel)
     order = np.argsort(size, kind="stable")
     # the sum is over any root of squares, so it serves every norm
     ignored = order[np.cumsum(size[order]) <= budget]
     relevant = np.ones(len(size), dtype=bool)
     relevant[ignored] = False
     # a peak to peak is at most twice the largest length
-    return lines.subset(relevant), (2.0 if quantity.norm.is_diameter else 1.0) * float(size[ignored].sum())
+    return lines.subset(relevant), (2.0 if measure.norm.is_diameter else 1.0) * float(size[ignored].sum())

@@ -40,8 +40,10 @@ class ArcBox:
         # between angles a function leaves its chord by no more than the sum of a'' step^2 / 8 over them, and no wave
         # by more than twice its size
         steps = np.square((upper - lower) / (grid - 1)) / 8.0
-        bends = np.square(orders[:, 0]) * steps[: self.throws, None] + np.square(orders[:, 1:]) @ steps[self.throws :]
-        self._bends = np.minimum(bends, 2.0)
+        curvatures = (
+            np.square(orders[:, 0]) * steps[: self.throws, None] + np.square(orders[:, 1:]) @ steps[self.throws :]
+        )
+        self._chord_errors = np.minimum(curvatures, 2.0)
 
     def functions(self, waves: ComplexArray, slopes: Array, shared: Array) -> Arcs:
         """Evaluate the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
@@ -53,18 +55,18 @@ class ArcBox:
         shared
             sigma of every shared angle.
         """
-        count, size = self._bends.shape[1], np.abs(waves)
-        turned = waves[:, None, :count] * self._by_shared
-        values = np.matmul(turned, self._by_throw.swapaxes(1, 2)).real
+        count, size = self._chord_errors.shape[1], np.abs(waves)
+        shifted = waves[:, None, :count] * self._by_shared
+        values = np.matmul(shifted, self._by_throw.swapaxes(1, 2)).real
         values += slopes[:, None, None] * self.angles[: self.throws, None, :]
-        bend = float((size[:, :count] * self._bends).sum() + size[:, count:].sum())
+        bend = float((size[:, :count] * self._chord_errors).sum() + size[:, count:].sum())
         # minimum over each throw by itself where shared angles are fixed, and what that leaves of the sum
         minima = values.min(axis=2)
         total = minima.sum(axis=0) + self._shared @ shared
-        by_throw = (values + (total - minima)[:, :, None]).min(axis=1)
+        throw_minima = (values + (total - minima)[:, :, None]).min(axis=1)
         cells = total.reshape((self.angles.shape[1],) * len(shared))
-        by_shared = [cells.min(axis=tuple(j for j in range(cells.ndim) if j != k))[None] for k in range(cells.ndim)]
-        return Arcs(self.angles, np.concatenate([by_throw, *by_shared]), bend)
+        shared_minima = [cells.min(axis=tuple(j for j in range(cells.ndim) if j != k))[None] for k in range(cells.ndim)]
+        return Arcs(self.angles, np.concatenate([throw_minima, *shared_minima]), bend)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class Arcs:
     angles, values
         Grid of every throw and shared angle, and the minimum of the sum with that angle fixed, shape (angles, grid).
     bend
-        Most that the sum may fall between the angles of the grid.
+        Largest fall of the sum between two angles of the grid.
     """
 
     angles: Array

@@ -24,8 +24,8 @@ from laufruhe.problem.problem import Phasing, Problem
 
 POINTS = 97
 MOST_STARS = 50_000
-FEW = 32
-"""Directions that bound all stars before the next ones bound those that are left."""
+BATCH = 32
+"""Number of directions that bound all remaining stars at a time."""
 
 
 def uneven_bound(
@@ -46,7 +46,8 @@ def uneven_bound(
 
     Returns
     -------
-    Zero, which always holds, where there are too many stars to look at.
+    float
+        Lower bound; zero, which is always valid, if there are more than `MOST_STARS` stars.
     """
     if phasing.bank is not None or space.size > MOST_STARS:
         return 0.0
@@ -69,20 +70,29 @@ def steady_bound(problem: Problem) -> float:
     return total
 
 
-def minimum_bound(costs: Array, stars: Stars, known: float) -> float:
-    """Return the least of `star_bounds`, or what is known where that is less.
+def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
+    """Return the minimum of `star_bounds` over stars and of the minimum `incumbent` of earlier stars.
 
-    Directions come a few at a time: a star that they hold over what another one has needs no further ones.
+    Directions are evaluated in batches. A star whose bound exceeds the minimum needs no further directions.
+
+    Parameters
+    ----------
+    costs
+        Bounds by direction, throw and step, from `throw_costs`.
+    stars
+        Step of every throw, shape (stars, throws).
+    incumbent
+        Minimum over stars evaluated before, or infinity.
     """
     bounds = np.full(len(stars), -math.inf)
-    for first in range(0, len(costs), FEW):
+    for first in range(0, len(costs), BATCH):
         if not len(stars):
-            return known
-        bounds = np.maximum(bounds, star_bounds(costs[first : first + FEW], stars))
-        known = min(known, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))
-        under = bounds < known
-        stars, bounds = stars[under], bounds[under]
-    return min(known, float(bounds.min(initial=math.inf)))
+            return incumbent
+        bounds = np.maximum(bounds, star_bounds(costs[first : first + BATCH], stars))
+        incumbent = min(incumbent, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))
+        is_open = bounds < incumbent
+        stars, bounds = stars[is_open], bounds[is_open]
+    return min(incumbent, float(bounds.min(initial=math.inf)))
 
 
 def star_bounds(costs: Array, stars: Stars) -> Array:
@@ -98,7 +108,7 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
     lower, upper = windows(phasing, intervals)
     v = dual_directions(objective)
     orders = np.array(objective.orders, dtype=float)
-    out = np.empty((len(v), space.throws, space.phases))
+    minima = np.empty((len(v), space.throws, space.phases))
     places = np.array(space.places)
     for p in range(space.phases):
         angles = math.tau * p / space.phases + np.linspace(lower[p], upper[p], POINTS)
@@ -107,8 +117,8 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
         step = (upper[p] - lower[p]) / (POINTS - 1)
         bend = (np.abs(v) @ orders**2) * step**2 / 8.0
         low, high = values.min(axis=1) - bend, values.max(axis=1) + bend
-        out[:, :, p] = np.where(places > 0.0, places * low[:, None], places * high[:, None])
-    return out
+        minima[:, :, p] = np.where(places > 0.0, places * low[:, None], places * high[:, None])
+    return minima
 
 
 def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.uneven_speed import moving_inertia
 
 SAMPLED = 1e-4
-"""Share by which a degree at angles may lie under the true one."""
+"""Largest relative error by which a degree from samples is too small."""
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class StoredWorkBound:
     def from_engine(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float) -> StoredWorkBound:
         """Return the relation for cylinders that fire at any angles, beside an inertia of all that turns [kg m2]."""
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
-        alone = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
-        inertias = [moving_inertia(one, fidelity, angles)[0] for one in alone]
+        cylinders = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
+        inertias = [moving_inertia(cylinder, fidelity, angles)[0] for cylinder in cylinders]
         largest, smallest = (float(sum(map(end, inertias))) for end in (np.max, np.min))
         return cls((0.5 * (inertia + largest) + 0.25 * (largest - smallest)) * point.speed**2)
 

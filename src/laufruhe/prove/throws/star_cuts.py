@@ -16,41 +16,45 @@ from laufruhe.prove.certificate import ROUNDING, Multipliers
 
 @dataclass(frozen=True, eq=False)
 class Cut:
-    """c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x, below every objective (S14).
+    """Lower bound of the objective of every star from the dual rows of one star (S14).
+
+    With throw k on step p_k it is c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x.
 
     Attributes
     ----------
     constant, moves
         c and A, shape (throws, steps).
-    gradient, turns
-        g and G, shapes (n,) and (throws, steps, n); G is None where g is the same for every star.
+    gradient, gradient_moves
+        g and G, shapes (n,) and (throws, steps, n); G is None if the gradient is the same for every star.
     domains
         Sets of the decisions.
     rounding
-        Error that its sums may have.
+        Largest rounding error of the bound.
     """
 
     constant: float
     moves: Array
     gradient: Array
-    turns: Array | None
+    gradient_moves: Array | None
     domains: tuple[Domain, ...]
     rounding: float
 
     def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
-        """Return lower bounds of stars with sets of shafts, shape (stars, sets); never under zero.
+        """Return lower bounds of stars with sets of shafts, shape (stars, sets), at least zero.
 
         Parameters
         ----------
+        stars
+            Step of every throw, shape (stars, throws).
         sets
-            Numbers of the optional shafts that are built, in each set.
+            Indices of the optional shafts that are built, for each set.
         owners
-            Optional shaft that every decision belongs to, -1 for none.
+            Index of the optional shaft of every decision, -1 for none.
         """
         return np.maximum(self._sums(stars, sets, owners), 0.0)
 
     def excludes(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Mask:
-        """Return where no design keeps the limits, by dual rows of these alone (S45), shape (stars, sets)."""
+        """Return True for infeasible stars, shape (stars, sets), by the dual rows of limits alone (S45)."""
         return np.asarray(self._sums(stars, sets, owners) > self.rounding)
 
     def _sums(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
@@ -58,26 +62,26 @@ class Cut:
         for k in range(stars.shape[1]):
             total += self.moves[k, stars[:, k]]
         # min g . x of every decision, shape (stars, decisions)
-        if self.turns is None:
+        if self.gradient_moves is None:
             minima = np.tile([domain.minimum(self.gradient) for domain in self.domains], (len(stars), 1))
         else:
             gradients = np.tile(self.gradient, (len(stars), 1))
             for k in range(stars.shape[1]):
-                gradients += self.turns[k, stars[:, k]]
+                gradients += self.gradient_moves[k, stars[:, k]]
             minima = np.array([[domain.minimum(g) for domain in self.domains] for g in gradients])
-        out = np.empty((len(stars), len(sets)))
+        sums = np.empty((len(stars), len(sets)))
         for column, built in enumerate(sets):
             chosen = [d for d, owner in enumerate(owners) if owner < 0 or owner in built]
-            out[:, column] = total + (minima[:, chosen].sum(axis=1) if chosen else 0.0)
-        return out
+            sums[:, column] = total + (minima[:, chosen].sum(axis=1) if chosen else 0.0)
+        return sums
 
     def minimum(self, space: StarSpace) -> float:
-        """Return a bound of every star of a space, by the best assignment of throws to steps; never under zero."""
+        """Return a lower bound over all stars of a space, at least zero, by the best assignment of throws to steps."""
         from scipy.optimize import linear_sum_assignment
 
-        if self.turns is not None:
+        if self.gradient_moves is not None:
             return 0.0
-        rest = sum(domain.minimum(self.gradient) for domain in self.domains)
+        decided = sum(domain.minimum(self.gradient) for domain in self.domains)
         values = []
         for pattern in space.patterns:
             # the first throw stands on step 0
@@ -85,31 +89,39 @@ class Cut:
             cost = self.moves[1:][:, places]
             rows, columns = linear_sum_assignment(cost)
             values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
-        return float(max(0.0, self.constant + rest + min(values)))
+        return float(max(0.0, self.constant + decided + min(values)))
 
 
 def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
-    """Return the cut that dual rows of one star give (S14)."""
+    """Return the cut that the dual rows of one star give (S14).
+
+    Parameters
+    ----------
+    fine
+        Problem of all stars on the grid of the dual rows.
+    multipliers
+        Dual rows of one star.
+    """
     throws, steps = fine.terms[0][1].moves.shape[:2]
     size = fine.terms[0][1].slope.shape[-1]
     constant, moves, scale = 0.0, np.zeros((throws, steps)), 0.0
-    gradient, turns, is_turning = np.zeros(size), np.zeros((throws, steps, size)), False
+    gradient, gradient_moves, has_moves = np.zeros(size), np.zeros((throws, steps, size)), False
     parts = []
     for (weight, norm), rows in zip(fine.terms, multipliers.terms, strict=True):
         parts.append((weight * norm.norm.dual_feasible(norm.grid, rows), norm))
     for (maximum, norm), rows in zip(fine.limits, multipliers.limits, strict=True):
         z = norm.norm.balanced_dual(norm.grid, rows)
-        reach = norm.norm.dual_norm(norm.grid, z) * maximum
-        constant -= reach
-        scale += reach
+        price = norm.norm.dual_norm(norm.grid, z) * maximum
+        constant -= price
+        scale += price
         parts.append((z, norm))
     for z, norm in parts:
-        reach = np.abs(norm.constant) + np.abs(norm.moves).max(axis=1).sum(axis=0)
-        scale += float(np.vdot(np.abs(z), reach))
+        sizes = np.abs(norm.constant) + np.abs(norm.moves).max(axis=1).sum(axis=0)
+        scale += float(np.vdot(np.abs(z), sizes))
         constant += float(np.vdot(z, norm.constant))
         moves += np.einsum("kd,tpkd->tp", z, norm.moves)
         gradient += np.einsum("kd,kdn->n", z, norm.slope)
         if norm.slope_moves is not None:
-            is_turning = True
-            turns += np.einsum("kd,tpkdn->tpn", z, norm.slope_moves)
-    return Cut(constant, moves, gradient, turns if is_turning else None, fine.domains, ROUNDING * scale)
+            has_moves = True
+            gradient_moves += np.einsum("kd,tpkdn->tpn", z, norm.slope_moves)
+    return Cut(constant, moves, gradient, gradient_moves if has_moves else None, fine.domains, ROUNDING * scale)

@@ -17,7 +17,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, divided
+from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, bisect_monotone
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, witness_of
@@ -168,14 +168,14 @@ def solve_flywheel(problem: Problem) -> Result:
 
     def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
         witness = None if math.isinf(value) else witness_of(design, coordinates.place(design.values), violation=0.0)
-        result = divided(
-            functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, known=witness
+        result = bisect_monotone(
+            functions, value, (MONOTONE_SHARE if functions.is_monotone else 1.0) * gap_tolerance, witness=witness
         )
         return replace(result, places=tuple(coordinates.decisions(x) for x in result.places))
 
     def is_infeasible(limits: Sequence[Limit]) -> bool:
         feasibility = replace(coordinates.monotone_problem(initial, limits), terms=())
-        return divided(feasibility, math.inf, 0.0, FEW_BOXES).bound == math.inf
+        return bisect_monotone(feasibility, math.inf, 0.0, FEW_BOXES).bound == math.inf
 
     outcome = prove_design(program, best, bounded)
     timing = {"solve": time.perf_counter() - started}

@@ -15,8 +15,8 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
-from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.prove.mounts.subdivision import divided_bounds, divides
+from laufruhe.prove.mounts.provers import Question, run_provers
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem, stiffness_bounds
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, values_of, witness_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.search import MountSearch
@@ -47,7 +47,7 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
         True to leave bounds to `with_mount_bounds`, unless only stiffness is open.
     """
     division = BoxResult(0.0, 0)
-    if search.moves is not None or not problem.search.proves or (defer_bounds and not divides(problem)):
+    if search.moves is not None or not problem.search.proves or (defer_bounds and not is_stiffness_problem(problem)):
         return division
     for _ in until_time_limit(range(MOST_DIVISIONS)):
         design = search.best_or_baseline.design if search.best_or_baseline is not None else None
@@ -61,7 +61,7 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
         )
         values = design.values if design is not None else ()
         question, count = Question(problem, value, gap_tolerance, values, witness), len(problem.mount_decisions)
-        division = proven(question)
+        division = run_provers(question)
         starts = [(start[:count].tolist(), start[count:] if len(start) > count else None) for start in division.places]
         if not starts or is_time_over() or not search.search_from(starts):
             break
@@ -86,14 +86,14 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
         True if many results are bounded, so that cheap bounds come first.
     """
     problem, certificate = result.problem, result.certificate
-    if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
+    if certificate is None or result.objective is None or is_stiffness_problem(problem) or problem.phasing is not None:
         return result
     zero_level = numerical_zero(problem, result.final.engine)
     gap_tolerance = max(
         gap_tolerance_of(value, problem.tolerance, zero_level), (value - min(cutoff, value)) / GAP_SAFETY
     )
-    question = Question(problem, value, gap_tolerance, values_of(problem, result), of_many=in_batch)
-    division = proven(question)
+    question = Question(problem, value, gap_tolerance, values_of(problem, result), in_batch=in_batch)
+    division = run_provers(question)
     if division.bound <= certificate.lower_bound:
         return result
     text = f"{certificate.method}; bounds of mounts from {division.boxes} box{'es' if division.boxes > 1 else ''}"
@@ -115,12 +115,12 @@ def are_contradictory(problem: Problem, limits: Sequence[Limit]) -> bool:
     Parameters
     ----------
     problem
-        Problem that `divides` accepts.
+        Problem that `is_stiffness_problem` accepts.
     limits
         Limits of the problem.
     """
     without_terms = replace(problem, objective=(), limits=tuple(limits))
-    divisions = divided_bounds(without_terms, math.inf, 0.0, (CONFLICT_SHARE,))
+    divisions = stiffness_bounds(without_terms, math.inf, 0.0, (CONFLICT_SHARE,))
     return bool(limits) and any(division.bound == math.inf for division in divisions)
 
 
@@ -130,6 +130,6 @@ def minimal_conflict(problem: Problem) -> tuple[str, ...]:
     Parameters
     ----------
     problem
-        Problem that `divides` accepts, proven to be infeasible.
+        Problem that `is_stiffness_problem` accepts, proven to be infeasible.
     """
     return smallest_conflict(problem.limits, lambda limits: are_contradictory(problem, limits))

@@ -25,8 +25,8 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_of, gap_tolerance_of
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.mounts.provers import Question, proven, provers
-from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.mounts.provers import Question, provers, run_provers
+from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     Design,
@@ -211,7 +211,11 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     # measures without loads do not depend on unbalances
     limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.depends_on_loads)
     mounts_only = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
-    return minimal_conflict(mounts_only) if divides(mounts_only) and are_contradictory(mounts_only, limits) else ()
+    return (
+        minimal_conflict(mounts_only)
+        if is_stiffness_problem(mounts_only) and are_contradictory(mounts_only, limits)
+        else ()
+    )
 
 
 def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
@@ -235,7 +239,7 @@ def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
         part = replace(problem, objective=on_mounts)
         evaluation = evaluate(part, part.design(list(values)))
         value = objective_value(part, evaluation)
-        total += proven(
+        total += run_provers(
             Question(part, value, gap_tolerance_of(value, part.tolerance, numerical_zero(part)), values)
         ).bound
     if block:

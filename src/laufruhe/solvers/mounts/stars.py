@@ -29,7 +29,7 @@ from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Proof, ProofStrength, gap_tolerance_of, make_certificate
-from laufruhe.prove.mounts.provers import Question, proven
+from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.solvers.conclusion import conflict_message, evaluate_design, refine_result, values_of, witness_of
 from laufruhe.solvers.mounts.bounds import mount_numbers, with_mount_bounds
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
@@ -267,7 +267,9 @@ def _divide_boxes(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxRe
     witness = witness_of(design, mount_numbers(design))
     value = design.value - sampling_overestimate(realised, design.evaluation)
     gap_tolerance = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
-    return proven(Question(realised, value, gap_tolerance, design.values, witness, moves=(phasing, best.candidate)))
+    return run_provers(
+        Question(realised, value, gap_tolerance, design.values, witness, open_throws=(phasing, best.candidate))
+    )
 
 
 def _method(designs: list[StarDesign], design_count: int) -> str:
