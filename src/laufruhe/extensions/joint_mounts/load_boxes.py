@@ -377,7 +377,10 @@ class _Boxes:
 
     def affine_under(self, measure: Measure, points: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
-        norm, columns = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self._unbalances)
+        norm, columns = (
+            self._loads.norm_without_mounts(measure, averaged),
+            slice(self._numbers, self._numbers + self._unbalances),
+        )
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]
         value, slopes = np.zeros(len(points)), np.zeros((len(points), self.count))
         for k, t in enumerate(points[:, columns]):

@@ -70,7 +70,7 @@ class MountedLoads:
             self._model = AffineModel(bounded_problem, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
         self.root = mass_root(mounting_in(problem.engine).block)
-        self._still: dict[tuple[Measure, bool], AffineNorm] = {}
+        self._norms: dict[tuple[Measure, bool], AffineNorm] = {}
 
     @cached_property
     def orders(self) -> LoadedOrders:
@@ -92,11 +92,11 @@ class MountedLoads:
         points, places, numbers, omegas, wrenches = (np.array(column) for column in zip(*rows, strict=True))
         return LoadedOrders(points, places, numbers, omegas, wrenches, self.samples)
 
-    def still(self, measure: Measure, averaged: bool) -> AffineNorm:
+    def norm_without_mounts(self, measure: Measure, averaged: bool) -> AffineNorm:
         """Return the norm of a measure that does not depend on mounts."""
-        if (measure, averaged) not in self._still:
-            self._still[measure, averaged] = self._model.norm(measure, self.samples, averaged)
-        return self._still[measure, averaged]
+        if (measure, averaged) not in self._norms:
+            self._norms[measure, averaged] = self._model.norm(measure, self.samples, averaged)
+        return self._norms[measure, averaged]
 
     @property
     def columns(self) -> int:
@@ -124,7 +124,7 @@ class MountedLoads:
 
         def norm(measure: Measure, averaged: bool) -> AffineNorm:
             if not measure.on_mounts:
-                return self.still(measure, averaged)
+                return self.norm_without_mounts(measure, averaged)
             return self._norm(measure, averaged, responses[is_travel(measure.channel)])
 
         terms = tuple((term.weight, norm(term.measure, False)) for term in self.problem.load_terms)

@@ -121,12 +121,12 @@ def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: C
     size = float(np.abs(y).max()) or 1.0
     parts = [(part(y) / size, part(image) / size) for part in (np.real, np.imag)]
     moments = np.zeros((p + 2, p + 2, d, d))
-    for k, (first, first_pressed) in enumerate(parts):
-        moments[:p, p + k, 0] += 0.5 * first_pressed
-        moments[:p, p + k, :, 0] += 0.5 * first_pressed
+    for k, (first, first_image) in enumerate(parts):
+        moments[:p, p + k, 0] += 0.5 * first_image
+        moments[:p, p + k, :, 0] += 0.5 * first_image
         moments[p + k, :p] = moments[:p, p + k]
-        for column, (second, second_pressed) in enumerate(parts):
-            products = first.T @ second_pressed + second.T @ first_pressed
+        for column, (second, second_image) in enumerate(parts):
+            products = first.T @ second_image + second.T @ first_image
             moments[p + k, p + column] = 0.25 * (products + products.T)
     return MomentConstraint(0, _padded(constant, 2), _padded(slopes, 2), moments)
 

@@ -124,7 +124,7 @@ class Limits:
         )
         all_responses = list(responses)
 
-        def number(order: Order, bound: ResponseBound) -> int:
+        def order_number(order: Order, bound: ResponseBound) -> int:
             if _key(order) not in numbers_of_orders:
                 response, constraints = state(order, bound)
                 numbers_of_orders[_key(order)] = len(all_responses)
@@ -135,15 +135,17 @@ class Limits:
 
         for limit in self.norms:
             for variable in limit.variables:
-                numbers = [number(order, limit.query.bound(order, variable, limit.upper)) for order in variable.orders]
+                numbers = [
+                    order_number(order, limit.query.bound(order, variable, limit.upper)) for order in variable.orders
+                ]
                 norm_responses = [all_responses[k] for k in numbers]
                 terms.quadratics += variable.quadratic_bounds(
                     len(variables) + len(terms.uppers), limit.query, norm_responses, numbers
                 )
                 terms.uppers.append((variable.root_bound(limit.upper / variable.share) / variable.unit) ** 2)
         for ratio in self.ratios:
-            moving = [number(order, UNBOUNDED) for order in ratio.orders]
-            resting = [number(replace(order, omega=0.0), UNBOUNDED) for order in ratio.orders]
+            moving = [order_number(order, UNBOUNDED) for order in ratio.orders]
+            resting = [order_number(replace(order, omega=0.0), UNBOUNDED) for order in ratio.orders]
             forces = {k: all_responses[k].forces * all_responses[k].unit for k in (*moving, *resting)}
             size = max(float(np.linalg.norm(force[..., 0])) for force in forces.values()) or 1.0
             matrices = [(k, squared(forces[k] / size)) for k in moving]

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.open_mounts import ALIKE, OpenMounts
+from laufruhe.extensions.mount_relaxation.open_mounts import ZERO_LEVEL, OpenMounts
 from laufruhe.extensions.mount_relaxation.orders import COSINE, EpigraphVariable
 from laufruhe.extensions.mount_relaxation.program import ObjectiveLimit
 from laufruhe.numerics.arrays import Array, ComplexArray
@@ -204,7 +204,7 @@ def work_weight(mounts: OpenMounts, number: int, load: ComplexArray) -> Array:
         return np.asarray(weight)
     place_part = sum(float(np.linalg.norm(part)) for part in place_deflections)
     scale = float(np.linalg.norm(mounts.motions[number])) * float(np.linalg.norm(load))
-    stretch = max(place_part, ALIKE * scale) / max(float(np.linalg.norm(deflection)), 1e-300)
+    stretch = max(place_part, ZERO_LEVEL * scale) / max(float(np.linalg.norm(deflection)), 1e-300)
     return np.asarray((1.0 + stretch) * weight + (1.0 + 1.0 / stretch) * place_part**2 * np.eye(3))
 
 

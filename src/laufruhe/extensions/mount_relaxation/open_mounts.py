@@ -34,7 +34,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK, limited_stiffness, number_ranges
 
 # relative size of a turn that counts as zero
-ALIKE = 1e-12
+ZERO_LEVEL = 1e-12
 # weight in the bound |a + b|^2 <= (1 + STRETCH) |a|^2 + (1 + 1 / STRETCH) |b|^2, b the shift of an open place
 STRETCH = 0.2
 
@@ -142,7 +142,7 @@ class OpenMounts:
         """Motions that move all mounts alike at any of their open places, as columns, shape (k, n)."""
         turns = np.concatenate([np.zeros((1, self.size)), *(place.turn_axes @ self.turns for place in self.places)])
         _, sizes, directions = np.linalg.svd(turns)
-        return np.asarray(directions[np.count_nonzero(sizes > ALIKE * max(float(sizes[0]), ALIKE)) :].T)
+        return np.asarray(directions[np.count_nonzero(sizes > ZERO_LEVEL * max(float(sizes[0]), ZERO_LEVEL)) :].T)
 
     @cached_property
     def middle(self) -> Array:

@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.elastic_mounts import DynamicSprings
 
 # relative difference that counts as none
-SAME = 1e-12
+REL_TOL = 1e-12
 ACROSS = np.diag([1.0, -1.0, 1.0])
 MOTION = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
@@ -73,14 +73,14 @@ def _images(mounts: OpenMounts, mirror: Array) -> list[int] | None:
             return None
     for place in mounts.places:
         side, reach_of = float((ACROSS @ place.axis) @ place.axis), dict(place.mounts)
-        if any(abs(reach_of.get(images[m], 0.0) - side * h) > SAME * abs(h) for m, h in place.mounts):
+        if any(abs(reach_of.get(images[m], 0.0) - side * h) > REL_TOL * abs(h) for m, h in place.mounts):
             return None
     return images
 
 
 def _is_same(first: Array, second: Array, scale: float | None = None) -> bool:
     scale = float(np.abs(first).max(initial=0.0)) if scale is None else scale
-    return bool(np.abs(first - second).max(initial=0.0) <= SAME * scale)
+    return bool(np.abs(first - second).max(initial=0.0) <= REL_TOL * scale)
 
 
 def _part(mounts: OpenMounts, images: list[int], basis: Array) -> OpenMounts:
@@ -93,7 +93,7 @@ def _part(mounts: OpenMounts, images: list[int], basis: Array) -> OpenMounts:
     places = []
     for place in mounts.places:
         turns = np.linalg.norm(place.turn_axes @ root.T[3:], axis=1)
-        is_moved = turns > SAME * float(np.linalg.norm(root[:, 3:]))
+        is_moved = turns > REL_TOL * float(np.linalg.norm(root[:, 3:]))
         reaches = tuple((index[m], float(reach * lengths[index[m]])) for m, reach in place.mounts if m in index)
         places.append(replace(place, mounts=reaches, turn_axes=place.turn_axes[is_moved]))
     springs = [replace(spring, mount=index[spring.mount]) for spring in mounts.springs if spring.mount in index]
@@ -121,6 +121,6 @@ def _acts(spring: SpringTerm, motions: Array, places: Sequence[PlaceTerm]) -> bo
     scale, own_motion = float(np.abs(motions).max()), motions[spring.mount]
     place_motions = [reach * place.arms for place in places for m, reach in place.mounts if m == spring.mount]
     return any(
-        np.abs(directions @ spring.axes).max(initial=0.0) > SAME * scale
+        np.abs(directions @ spring.axes).max(initial=0.0) > REL_TOL * scale
         for directions in (own_motion.T, *place_motions)
     )

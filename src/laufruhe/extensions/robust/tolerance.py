@@ -233,7 +233,7 @@ class Population:
     engines: int = 1000
     seed: int = 0
 
-    def named(self, measure: str, is_affine: bool) -> str:
+    def objective_name(self, measure: str, is_affine: bool) -> str:
         """Return the name of the objective, with the engines that it covers."""
         if self.share is not None:
             return f"{measure}, {100.0 * self.share:g} % of engines below"
@@ -341,7 +341,7 @@ class Robust(Extra):
 
     def objective_name(self, name: str) -> str:
         """Return the name of the objective, with the engines that it covers."""
-        return self.population.named(name, self.tolerances.is_affine)
+        return self.population.objective_name(name, self.tolerances.is_affine)
 
 
 def robust_of(problem: Problem) -> Robust:

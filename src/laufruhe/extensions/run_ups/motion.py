@@ -152,7 +152,7 @@ class Steps:
     """Matrices of long steps on boxes: from motion, and from moments of the load, to the motion after a step."""
 
     def __init__(self, box_equations: MotionEquations, step: float, orders: bool = True) -> None:
-        self.of, self.step = box_equations, step
+        self.equations, self.step = box_equations, step
         self.pairs = pairs_of(box_equations.halves.shape[1]) if orders else []
         first, second = (
             (box_equations.first, box_equations.second)
@@ -174,9 +174,9 @@ class Steps:
 
     def _next(self, powers: list[Array], first: Array, second: Array) -> list[Array]:
         power, first_power, second_power = powers
-        a = self.of.matrix[:, None]
+        a = self.equations.matrix[:, None]
         next_powers = [
-            self.of.matrix @ power,
+            self.equations.matrix @ power,
             a @ first_power + first @ power[:, None],
             a @ second_power + second @ power[:, None],
         ]
@@ -223,7 +223,7 @@ def motion_of(steps: Steps, moments: Array, impulses: Array, peak_loads: Array) 
     """
     middle = steps.middle(moments)
     first, second = steps.orders(moments, middle)
-    box_equations, step = steps.of, steps.step
+    box_equations, step = steps.equations, steps.step
     at_ends = _force(box_equations, middle, first, second)
     between_ends = _between(box_equations, step, middle, first, second, impulses, peak_loads)
     increments = step * (0.5 * (at_ends[:, 1:] + at_ends[:, :-1]) + between_ends)
