@@ -125,7 +125,7 @@ def joint(problem: Problem) -> list[str]:
     search = MountSearch(problem, evaluate_start(problem), 1)
     search.run()
     ended_early, tried = processor_seconds() - started, sum(optimum.starts for optimum in search.optima)
-    assert search.best_or_baseline is not None
+    assert search.best_or_initial is not None
     started = processor_seconds()
     optima = solve_nonlinear(*_program(problem), max_iterations=ITERATIONS)
     alone = processor_seconds() - started
@@ -143,7 +143,7 @@ def joint(problem: Problem) -> list[str]:
         f"| SLSQP, finite differences | {STARTS} | {sum(t for _, t, _ in found):.1f} | {len(values)} | {reached} | "
         f"{min(values, default=math.nan):.4f} |",
         f"| search of `laufruhe solve`, ended when nothing better is to be expected (N5) | {tried} | "
-        f"{ended_early:.1f} | | | {search.best_or_baseline.design.value:.4f} |",
+        f"{ended_early:.1f} | | | {search.best_or_initial.design.value:.4f} |",
         f"| `laufruhe solve`: with balance anew and bounds by boxes | {tried} | {ours:.1f} | | | "
         f"{result.objective.value:.4f} |",
         "",

@@ -181,13 +181,13 @@ class ScriptedSearch:
 
     def __init__(self, problem, stiffness):
         self.problem = problem
-        self.best = self.best_or_baseline = SearchResult(evaluate_design(problem, stiffness), None)
+        self.best = self.best_or_initial = SearchResult(evaluate_design(problem, stiffness), None)
 
     def search_from(self, places):
         found = SearchResult(evaluate_design(self.problem, places[0][0]), None)
         is_better = found.rank < self.best.rank
         if is_better:
-            self.best = self.best_or_baseline = found
+            self.best = self.best_or_initial = found
         return is_better
 
 

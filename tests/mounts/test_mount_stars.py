@@ -85,7 +85,7 @@ def test_a_search_of_all_stars_is_bounded_by_the_least_of_their_bounds(decided):
 def test_stars_left_out_leave_no_bound(tmp_path):
     result = solve(problem_of(tmp_path, *parts(), "[phasing]\nbest = 1\n"))
     assert result.certificate.lower_bound == 0.0
-    assert "the best of 3 on the baseline mounts" in result.certificate.method
+    assert "the best of 3 on the initial mounts" in result.certificate.method
 
 
 @pytest.mark.parametrize("best", [1, 2, 50])
@@ -97,7 +97,7 @@ def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path)
     throws = [tuple(round(math.degrees(angle)) for angle in star.throws) for star, _ in ranked]
     assert len(throws) == len(set(throws)) == min(best, designs)
     assert set(throws) <= {tuple(star) for star in STARS}
-    # on the baseline mounts the star of the four-cylinder engine leaves no couple
+    # on the initial mounts the star of the four-cylinder engine leaves no couple
     assert throws[0] == (0, 180, 180, 0)
 
 
@@ -107,7 +107,7 @@ def test_how_stars_were_decided_is_counted(tmp_path):
     moved = replace(still, has_moved_throws=True)
     each = "mounts and balance optimised for each of"
     assert _method([still], 1) == f"{each} 1 star"
-    assert _method([still] * 2, 7) == f"{each} 2 stars, the best of 7 on the baseline mounts"
+    assert _method([still] * 2, 7) == f"{each} 2 stars, the best of 7 on the initial mounts"
     assert _method([still, moved, still, moved, moved], 2) == f"{each} 2 stars; throws moved from 3 starts"
     assert _method([moved], 1) == "mounts, balance and throws optimised; throws moved from 1 start"
 

@@ -45,7 +45,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     is_single_start = starts == 1
     first = None if relaxed is None or is_single_start else start_of_result(problem, relaxed)
     search = MountSearch(
-        search_problem, initial, first=first, keep_baseline=True, coarser=1 if is_single_start else COARSE_STEP
+        search_problem, initial, first=first, keep_initial=True, coarser=1 if is_single_start else COARSE_STEP
     )
     has_bound = is_stiffness_problem(problem) and bounds_runs(problem)
     search.run()
@@ -54,7 +54,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
         search.refine()
     box_result = bound_search(problem, search, False) if has_bound else BoxResult(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
-    best = search.best_or_baseline
+    best = search.best_or_initial
     if best is None or best.design.violation > FEASIBILITY_TOL:
         conflict = minimal_conflict(problem) if box_result.bound == math.inf else ()
         result = infeasible_result(problem, initial, conflict, timing)

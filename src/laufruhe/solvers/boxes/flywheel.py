@@ -52,7 +52,7 @@ class _Coordinates:
     problem
         Problem whose decisions are flywheel sizes.
     initial
-        Flywheel of the baseline design.
+        Flywheel of the initial design.
     width
         Index of the width among the decisions; None if the coordinates are the decisions themselves.
     """
@@ -105,7 +105,7 @@ class _Coordinates:
         Parameters
         ----------
         initial
-            Evaluation of the baseline design.
+            Evaluation of the initial design.
         limits
             Limits of the problem to include.
         """

@@ -183,7 +183,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         return np.array([*norms, *self.boxes.numbers(leads)])
 
     def first(self) -> RebalancedDesign:
-        """Return the best of the baseline design, designs with optimal unbalances, and ends of simplex searches."""
+        """Return the best of the initial design, designs with optimal unbalances, and ends of simplex searches."""
         designs = [RebalancedDesign(evaluate_design(self.problem, self.problem.start))]
         if self.model.domains:
             designs += [

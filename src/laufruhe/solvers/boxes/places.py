@@ -193,6 +193,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return result
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
+        # limits on distances, with the smallest and largest distance in a box
         if not self._envelope:
             return
         low = self.problem.design(lower.tolist(), self.places)

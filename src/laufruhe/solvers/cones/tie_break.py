@@ -138,9 +138,10 @@ def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
 
 
 def _cancel_exactly(affine: AffineProblem, x: Array) -> Array:
+    # if the loads cancel, least squares reduce the solver's residual to rounding
     norms = [norm for _, norm in affine.terms]
-    parts = sum(weight * replace(norm, constant=0.0 * norm.constant).value(x) for weight, norm in affine.terms)
-    if not 0.0 < affine.objective(x) <= NEGLIGIBLE * parts:
+    loads = sum(weight * replace(norm, constant=0.0 * norm.constant).value(x) for weight, norm in affine.terms)
+    if not 0.0 < affine.objective(x) <= NEGLIGIBLE * loads:
         return x
     slope = np.concatenate([norm.slope.reshape(-1, affine.size) * affine.units for norm in norms])
     residual = np.concatenate([norm.rows(x).reshape(-1) for norm in norms])

@@ -50,7 +50,7 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
     if search.moves is not None or not problem.search.proves or (defer_bounds and not is_stiffness_problem(problem)):
         return division
     for _ in until_time_limit(range(MOST_DIVISIONS)):
-        design = search.best_or_baseline.design if search.best_or_baseline is not None else None
+        design = search.best_or_initial.design if search.best_or_initial is not None else None
         value, witness = math.inf, None
         if design is not None and design.violation <= FEASIBILITY_TOL:
             # bounds exclude errors of coarse sampling

@@ -138,15 +138,15 @@ def _search_and_bound(
     initial = evaluate_start(problem)
     uses_workers = evaluation_count(problem) >= MANY_EVALUATIONS and workers != 1 and not defer_bounds
     with worker_pool(run, *(prover.bounds for prover in provers())) if uses_workers else nullcontext():
-        search = MountSearch(problem, initial, workers, moves, first, keep_baseline=moves is None)
+        search = MountSearch(problem, initial, workers, moves, first, keep_initial=moves is None)
         model_time = time.perf_counter()
         search.run()
         with speculation(_balance, math.inf) as ahead:
             # optimise the unbalances again while provers bound; a prover may still find a better design
-            results = [search.best_or_baseline]
+            results = [search.best_or_initial]
             ahead.prefetch((x.design.values, _share(x.design)) for x in results if x is not None)
             division = bound_search(problem, search, defer_bounds)
-            best = search.best_or_baseline
+            best = search.best_or_initial
             timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
             if best is None or best.design.violation > FEASIBILITY_TOL:
                 return _without_design(problem, search, initial, division, timing), search.turns

@@ -47,7 +47,7 @@ CHECKED_STARTS = 6
 # relative distance to a limit from which the program leaves it out, and below which the program includes it again
 FAR_FROM_LIMIT, NEAR_LIMIT = 0.5, 0.05
 # deviation of start throws from their star [rad]
-NUDGE = 0.02
+THROW_DEVIATION = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +88,9 @@ class MountSearch:
     moves
         Moves of the throws from their star; None if throws are fixed.
     first
-        First start. Without columns, it has the unbalances that are optimal on the baseline mounts.
-    keep_baseline
-        True to keep the baseline as a start if there is another first start.
+        First start. Without columns, it has the unbalances that are optimal on the initial mounts.
+    keep_initial
+        True to keep the initial design as a start if there is another first start.
     coarser
         Factor of the time step of simulations over the final evaluation.
 
@@ -104,7 +104,7 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: StartPoint | None = None, keep_baseline: bool = False, coarser: int = COARSE_STEP,
+        first: StartPoint | None = None, keep_initial: bool = False, coarser: int = COARSE_STEP,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         report_progress("starts of the mounts")
@@ -112,11 +112,11 @@ class MountSearch:
         if first is not None:
             mounts, columns = first
             columns = self._points[0][1] if columns is None else columns
-            self._points = [(mounts, columns), *self._points[0 if keep_baseline else 1 :]]
+            self._points = [(mounts, columns), *self._points[0 if keep_initial else 1 :]]
         self._ignored = self._inactive_limits()
         report_progress("smooth program of all decisions")
         self.joint = self._program()
-        self._baseline = initial_design(problem, initial) if moves is None else None
+        self._initial = initial_design(problem, initial) if moves is None else None
         self.best: SearchResult | None = None
         self._nearly_feasible: list[SearchResult] = []
         self._active_again: set[Limit] = set()
@@ -176,13 +176,13 @@ class MountSearch:
         return self.best is not None and (previous is None or self.best.rank < previous.rank)
 
     @property
-    def best_or_baseline(self) -> SearchResult | None:
-        """Best of the results and the baseline; the baseline takes the prices of an equally good local optimum."""
-        best, baseline = self.best, self._baseline
-        if baseline is None or (best is not None and best.rank <= SearchResult(baseline, self.joint).rank):
+    def best_or_initial(self) -> SearchResult | None:
+        """Best of the results and the initial design, which takes the prices of an equally good local optimum."""
+        best, initial = self.best, self._initial
+        if initial is None or (best is not None and best.rank <= SearchResult(initial, self.joint).rank):
             return best
-        is_equal = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.violation <= SLACK
-        return SearchResult(baseline, self.joint, best.optimum if best is not None and is_equal else None)
+        is_equal = best is not None and best.rank[1] <= initial.value * (1.0 + SAME) and best.design.violation <= SLACK
+        return SearchResult(initial, self.joint, best.optimum if best is not None and is_equal else None)
 
     @property
     def turns(self) -> Array:
@@ -199,7 +199,8 @@ class MountSearch:
         problem, joint = self.problem, self.joint
         generator = np.random.default_rng(problem.search.seed)
         starts = [
-            joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
+            joint.start(mounts, columns, self._perturbed_throws(generator, k))
+            for k, (mounts, columns) in enumerate(points)
         ]
         optima = self._solve(starts, self._is_explored)
         centres = distinct_optima(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
@@ -296,12 +297,12 @@ class MountSearch:
         values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
         return evaluate_design_at(problem, values)
 
-    def _nudged(self, generator: np.random.Generator, k: int) -> Array:
+    def _perturbed_throws(self, generator: np.random.Generator, k: int) -> Array:
         # a symmetric star may be a saddle point, so later starts are random
         if self.moves is None or k == 0:
             return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()))
-        nudge = NUDGE * generator.normal(size=self.moves.size)
-        return np.clip(nudge, self.moves.lower, self.moves.upper)
+        deviations = THROW_DEVIATION * generator.normal(size=self.moves.size)
+        return np.clip(deviations, self.moves.lower, self.moves.upper)
 
     def _tighten(self) -> None:
         """Search with tighter limits from good local optima that a peak between samples makes infeasible."""

@@ -1,6 +1,6 @@
 """Solve for crank stars together with mounts and unbalances (E35).
 
-There are finitely many even stars. A cone program balances each star on the baseline mounts, and its dual rows bound
+There are finitely many even stars. A cone program balances each star on the initial mounts, and its dual rows bound
 every other star (S14). This ranks the stars. The best of them are solved with open mounts and unbalances, one by one.
 The ranking proves nothing about the joint problem, so the result states how many stars were not solved. If firing may
 be uneven, throws then leave the best stars as variables of the same smooth program (E36). If throws have bounds, branch
@@ -96,7 +96,7 @@ def solve_star_mounts(problem: Problem) -> Result:
 
 
 def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
-    """Return stars in ascending order of the objective on the baseline mounts, and the number of all stars."""
+    """Return stars in ascending order of the objective on the initial mounts, and the number of all stars."""
     if phasing.throws is not None:
         star = Candidate(phasing.throws, None, *phasing.minimum_geometry)
         sets = phasing.shafts.allowed
@@ -108,19 +108,19 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MOST_LISTED:
         raise ModelError(f"more than {MOST_LISTED} stars cannot be open together with mounts; fix the firing order")
-    on_baseline = replace(phasing, realise=lambda candidate: _on_baseline_mounts(phasing.realise(candidate)))
+    on_initial = replace(phasing, realise=lambda candidate: _on_initial_mounts(phasing.realise(candidate)))
     lists_all = phasing.method is Method.ENUMERATION
     scored: list[tuple[float, Star]] = []
     designs = 0
     for family in families:
-        family_stars, count = _ranked(problem, on_baseline, family, 10**9 if lists_all else phasing.best)
+        family_stars, count = _ranked(problem, on_initial, family, 10**9 if lists_all else phasing.best)
         scored, designs = scored + family_stars, designs + count
     scored.sort(key=lambda pair: pair[0])
     return [star for _, star in scored][: designs if lists_all else phasing.best], designs
 
 
 def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> tuple[list[tuple[float, Star]], int]:
-    """Return stars of one geometry with their objective on the baseline mounts, and the number of all (S15)."""
+    """Return stars of one geometry with their objective on the initial mounts, and the number of all (S15)."""
     model = family.model(phasing)
     designs = search_designs(
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(model.problem)
@@ -135,7 +135,7 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
     return stars, designs.designs
 
 
-def _on_baseline_mounts(problem: Problem) -> Problem:
+def _on_initial_mounts(problem: Problem) -> Problem:
     # loads rank stars, or the RMS mount force if the objective has no loads
     terms = problem.load_terms or (Term(Measure(channels.MOUNT_FORCE, RMS)),)
     masses = tuple(limit for limit in problem.limits if limit.measure.is_mass)
@@ -226,13 +226,13 @@ def _solve_moved_throws(problem: Problem, phasing: Phasing, designs: list[StarDe
 
 
 def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], design_count: int) -> Result:
-    baseline = evaluate(problem)
+    initial = evaluate(problem)
     if not designs:
         reason, is_proven = why_none_fires(phasing)
         return no_star(problem, reason, Status.INFEASIBLE if is_proven else Status.FAILED)
     best = designs[0]
     if _rank(best)[0]:
-        return _without_design(problem, designs, baseline, design_count)
+        return _without_design(problem, designs, initial, design_count)
     complete = len(designs) == design_count and not phasing.continuous
     ranking = [_ranking_entry(phasing, x, complete and x is best) for x in designs if not _rank(x)[0]]
     details = ranking_result(
@@ -281,7 +281,7 @@ def _method(designs: list[StarDesign], design_count: int) -> str:
         else "mounts, balance and throws optimised"
     )
     if even_count and design_count > even_count:
-        text += f", the best of {design_count} on the baseline mounts"
+        text += f", the best of {design_count} on the initial mounts"
     return f"{text}; throws moved from {counted(moved_count, 'start')}" if moved_count else text
 
 
@@ -304,7 +304,7 @@ def _fix_firing_order(phasing: Phasing, star: Candidate, steps: tuple[int, ...] 
     return phasing if steps else replace(phasing, firing_order=star.firing_order or phasing.firing_order)
 
 
-def _without_design(problem: Problem, designs: list[StarDesign], baseline: Evaluation, design_count: int) -> Result:
+def _without_design(problem: Problem, designs: list[StarDesign], initial: Evaluation, design_count: int) -> Result:
     """Return a result without a design: infeasible if that is proven for every star, else failed."""
     is_proven = len(designs) == design_count and all(f.result.status is Status.INFEASIBLE for f in designs)
     first = designs[0].result
@@ -315,6 +315,6 @@ def _without_design(problem: Problem, designs: list[StarDesign], baseline: Evalu
     reason = conflict_message(conflict) if is_proven else first.message
     message = f"{reason} (best of {len(designs)} of {counted(design_count, 'star')})"
     return replace(
-        first, problem=problem, status=status, objective=None, certificate=None, initial=baseline, final=baseline,
+        first, problem=problem, status=status, objective=None, certificate=None, initial=initial, final=initial,
         message=message, conflict=conflict,
     )  # fmt: skip

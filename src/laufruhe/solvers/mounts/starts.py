@@ -74,7 +74,7 @@ def start_of_result(problem: Problem, result: Result) -> tuple[list[float], Arra
     return mounts, projected_vector(domains_of(problem.unbalances), unbalance_values(problem, result))
 
 
-def _baseline_balance(problem: Problem) -> list[complex] | None:
+def _initial_balance(problem: Problem) -> list[complex] | None:
     if not problem.unbalances or not problem.load_terms:
         return None
     result = solve_unbalances(
@@ -86,7 +86,7 @@ def _baseline_balance(problem: Problem) -> list[complex] | None:
 def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
     """Return mounts and columns of unbalances of all starts, and a unit of the objective [SI].
 
-    The first start is the baseline design. The other starts cover all bounds, with stiffnesses on a logarithmic scale.
+    The first start is the initial design. The other starts cover all bounds, with stiffnesses on a logarithmic scale.
     The unit is the smallest positive objective of all candidates: the solver's tolerance is relative to it.
     """
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
@@ -95,7 +95,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     count = _most_starts(problem) - (not initial.resonance)
     pool = _spread_over(problem) if count else np.zeros((0, len(decisions)))
     with _evaluating(problem, initial, pool) as scores:
-        unbalances = _baseline_balance(problem)
+        unbalances = _initial_balance(problem)
         scored = scores()
     best = projected_vector(domains, [d.start for d in problem.unbalances] if unbalances is None else unbalances)
     starts = [] if initial.resonance else [([d.real_start for d in decisions], best)]
@@ -132,8 +132,8 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     best = np.argsort(violations + values / (middle or 1.0), kind="stable")
     indices = list(best[: count - count // 3])
     indices += [k for k in range(len(pool)) if k not in set(indices)][: count - len(indices)]
-    baseline_value = math.inf if initial.resonance else objective_value(problem, initial)
-    minimum = min((float(v) for v in (*finite, baseline_value) if 0.0 < v < math.inf), default=1.0)
+    initial_value = math.inf if initial.resonance else objective_value(problem, initial)
+    minimum = min((float(v) for v in (*finite, initial_value) if 0.0 < v < math.inf), default=1.0)
     return pool[indices], minimum
 
 

@@ -90,12 +90,12 @@ def with_star(
     details
         Ranking of the search.
     """
-    baseline = evaluate(problem)
+    evaluation = evaluate(problem)
     is_proven = certificate is not None and certificate.kind is Proof.GLOBAL
     status = best.status
     if status.has_design:
         status = Status.OPTIMAL if is_proven else Status.FEASIBLE
-    initial = replace(baseline, samples=best.final.samples)
+    initial = replace(evaluation, samples=best.final.samples)
     value = best.objective.value if best.objective else objective_value(problem, best.final)
     return replace(
         best,
@@ -127,7 +127,7 @@ def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) ->
         for k, (angle, start) in enumerate(zip(candidate.throws, start_angles, strict=True)):
             low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
             decisions.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, start % math.tau, False))
-    # bank and split pin angle of the baseline engine
+    # bank and split pin angle of the initial engine
     bank = split = 0.0
     for left, right in itertools.permutations(range(len(layout.sides)), 2):
         if layout.side(left) > layout.side(right):
@@ -165,5 +165,7 @@ def no_star(
     conflict
         Names of the limits that contradict each other.
     """
-    baseline = evaluate(problem)
-    return Result(problem=problem, status=status, initial=baseline, final=baseline, message=reason, conflict=conflict)
+    evaluation = evaluate(problem)
+    return Result(
+        problem=problem, status=status, initial=evaluation, final=evaluation, message=reason, conflict=conflict
+    )

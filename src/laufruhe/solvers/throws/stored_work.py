@@ -33,7 +33,7 @@ def with_problem(phasing: Phasing, change: Callable[[Problem], Problem]) -> Phas
 
 
 def with_work_for_search(problem: Problem) -> Problem:
-    """Replace the degree of irregularity by work, with weights that keep its value in the baseline design."""
+    """Replace the degree of irregularity by work, with weights that keep its value in the initial design."""
     if not _has_degree(problem):
         return problem
     initial, bounds = evaluate(problem), _bounds(problem)

@@ -2,7 +2,8 @@
 
 In a box, the waves e^{i h theta} of every throw are a mixture of those at a few angles, in a second-order cone program.
 With its dual rows, the bound is a sum of one function of the angle per throw. The minimum of this sum over the box is
-a lower bound. The functions also cut off angles that cannot be better than the best design.
+a lower bound. The functions also cut off angles that cannot be better than the best design. Open bank and split pin
+angles, which all throws have in common, are called shared angles.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ _NEGLIGIBLE = 0.02
 
 @dataclass(frozen=True, eq=False)
 class ThrowProgram:
-    """Norms of one firing window, with rows affine in unbalances, waves of the throws, and throws.
+    """Norms of one firing window, with rows affine in unbalances, waves e^{i h theta} of the throws, and throws.
 
     Attributes
     ----------
@@ -80,7 +81,7 @@ class ThrowBox:
     program
         Norms of the firing window.
     lower, upper
-        Bounds of throws, then of shared angles [rad].
+        Bounds of throws, then of shared angles (open bank and split pin angle) [rad].
     bound
         Lower bound of the objective in the box [SI].
     middle
@@ -144,7 +145,7 @@ class ThrowPrograms:
         for norm in norms:
             by_order = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
             sizes += by_order / (float(by_order.max()) or 1.0)
-        self._followed = int(np.flatnonzero(sizes > waves.min_arc_share * sizes.max()).max(initial=0)) + 1
+        self._order_count = int(np.flatnonzero(sizes > waves.min_arc_share * sizes.max()).max(initial=0)) + 1
         self._by_laps: dict[tuple[int, ...], ThrowProgram] = {}
         self._proofs: list[Multipliers] = []
         self.conflict: set[str] = set()
@@ -164,7 +165,7 @@ class ThrowPrograms:
         intervals = self._intervals(window)
         rows = replace(program.rows, limits=(*program.rows.limits, (1.0, intervals)))
         reduced_limits = replace(
-            program.reduced, limits=(*program.reduced.limits, (1.0, self._without_faint_orders(intervals)))
+            program.reduced, limits=(*program.reduced.limits, (1.0, self._without_negligible_orders(intervals)))
         )
         return replace(program, window=window, rows=rows, reduced=reduced_limits, names=(*program.names, ""))
 
@@ -181,14 +182,14 @@ class ThrowPrograms:
             order_sizes += by_order / (float(by_order.max()) or 1.0)
             unbalance_sizes += size[: self._riders.size] / (float(by_order.max()) or 1.0)
         reduced = AffineProblem(
-            tuple((weight, self._without_faint_orders(norm)) for weight, norm in terms),
-            tuple((maximum, self._without_faint_orders(norm)) for maximum, norm in limits), (), 1,
+            tuple((weight, self._without_negligible_orders(norm)) for weight, norm in terms),
+            tuple((maximum, self._without_negligible_orders(norm)) for maximum, norm in limits), (), 1,
         )  # fmt: skip
         names = tuple(limit.name for limit, _ in self._limits)
         return ThrowProgram(window, AffineProblem(terms, limits, (), 1), reduced, names, order_sizes, unbalance_sizes)
 
-    def _without_faint_orders(self, norm: AffineNorm) -> AffineNorm:
-        count, followed = len(self.waves.orders), np.arange(self._followed)
+    def _without_negligible_orders(self, norm: AffineNorm) -> AffineNorm:
+        count, followed = len(self.waves.orders), np.arange(self._order_count)
         of_throw = np.concatenate([followed, count + followed, [2 * count]])
         throws = self._riders.size + (2 * count + 1) * np.arange(self.waves.throws)
         shared = np.arange(throws[-1] + 2 * count + 1, norm.slope.shape[-1])
@@ -230,7 +231,13 @@ class ThrowPrograms:
         )  # fmt: skip
 
     def box(
-        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, is_new: bool = False
+        self,
+        program: ThrowProgram,
+        lower: Array,
+        upper: Array,
+        floor: float,
+        cutoff: float,
+        reuse_multipliers: bool = False,
     ) -> ThrowBox | FathomedPart:
         """Shrink a box to the angles where a design may be better than `cutoff`, and bound it.
 
@@ -244,8 +251,8 @@ class ThrowPrograms:
             Known lower bound of the objective in the box [SI].
         cutoff
             Objective that a design must be below [SI].
-        is_new
-            True to try multipliers of other boxes first.
+        reuse_multipliers
+            True to try multipliers of earlier boxes before a new program.
 
         Returns
         -------
@@ -257,7 +264,7 @@ class ThrowPrograms:
             if window_bounds is None:
                 return INFEASIBLE_PART
             lower, upper = window_bounds
-            result = self._bound_box(program, lower, upper, floor, cutoff, is_new)
+            result = self._bound_box(program, lower, upper, floor, cutoff, reuse_multipliers)
             if isinstance(result, FathomedPart):
                 return result
             if float(np.sum(result.upper - result.lower)) > _SHRINKAGE * float(np.sum(upper - lower)):
@@ -274,17 +281,17 @@ class ThrowPrograms:
             yield self.box(box.program, *half, box.bound, cutoff)
 
     def _bound_box(
-        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, is_new: bool
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, reuse_multipliers: bool
     ) -> ThrowBox | FathomedPart:
         """Bound a box by multipliers of other boxes or by its cone program."""
         columns = self._riders.columns(*self.waves.throw_bounds(lower, upper))
-        arc_box = ArcBox(self.waves.orders[: self._followed], lower, upper)
-        for proof in self._proofs if is_new else ():
+        arc_box = ArcBox(self.waves.orders[: self._order_count], lower, upper)
+        for proof in self._proofs if reuse_multipliers else ():
             value, _ = self._bound(program.rows, columns, proof, arc_box)
             if value - self.truncation >= cutoff or self._prove_infeasible(program, columns, proof, arc_box):
                 self._store_proof(proof)
                 return FathomedPart(cutoff)
-        mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._followed])
+        mixture = Mixture(program, columns, lower, upper, self.waves.orders[: self._order_count])
         solution = solve_cones(mixture.problem)
         multipliers = solution.multipliers
         if solution.x is None:

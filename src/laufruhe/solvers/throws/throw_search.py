@@ -405,7 +405,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
             for first, window, left_out in self.roots:
                 cutoff = self.cut(min(value, self._best.value))
                 programs = first.programs
-                root = programs.box(programs.program(window), *window.box, part.bound, cutoff, is_new=True)
+                root = programs.box(programs.program(window), *window.box, part.bound, cutoff, reuse_multipliers=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
             # more samples improve the bound more than smaller boxes

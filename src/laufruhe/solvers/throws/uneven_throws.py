@@ -46,7 +46,7 @@ from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
 STARTS = 6
-# smallest unit of the objective in a search, relative to the baseline objective
+# smallest unit of the objective in a search, relative to the initial objective
 SMALLEST_UNIT = 1e-3
 # relative margin of limits in the smooth program, against rounding
 SOFT_LIMIT = 1e-7
@@ -139,7 +139,7 @@ def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, 
 
 def evaluate_crank(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
     """Return the design with these throws; None if it violates limits or firing intervals."""
-    return _if_allowed(phasing, phasing.intervals, _evaluate(phasing, candidate, 0.0, has_moved_throws=True))
+    return _if_feasible(phasing, phasing.intervals, _evaluate(phasing, candidate, 0.0, has_moved_throws=True))
 
 
 def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: StarDesign) -> TradePoint:
@@ -201,7 +201,7 @@ def local_optimum(
     with_perturbations
         True to start from perturbed stars too, because a star may be a saddle point (S20).
     """
-    best = _if_allowed(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
+    best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
     problem = with_work_for_search(replace(phasing.realise(start), phasing=None))
@@ -232,7 +232,7 @@ def local_optimum(
             if design is None or not intervals.holds(firing_intervals(phasing, candidate), 1e-7):
                 continue
             minimum_violation = min(minimum_violation, design.result.final.violation(design.result.problem.limits))
-            if _if_allowed(phasing, intervals, design) is None:
+            if _if_feasible(phasing, intervals, design) is None:
                 continue
             if best is None or design.value < best.value * (1.0 - 1e-9):
                 best, prices = design, smooth.prices(optimum)
@@ -256,9 +256,14 @@ def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]
     if best is not None and smooth.columns:
         columns = projected_vector(smooth.domains, unbalance_values(smooth.problem, best.result))
     turns = np.zeros(0 if smooth.moves is None else smooth.moves.size)
-    nudges = np.random.default_rng(1964).standard_normal((2, len(turns) + len(columns)))
-    nudges *= 0.02 * np.concatenate([np.full(len(turns), TURN), *(np.full(d.width, d.scale) for d in smooth.domains)])
-    return [smooth.start([], columns + n[len(turns) :], turns + n[: len(turns)]) for n in (0.0 * nudges[0], *nudges)]
+    perturbations = np.random.default_rng(1964).standard_normal((2, len(turns) + len(columns)))
+    perturbations *= 0.02 * np.concatenate(
+        [np.full(len(turns), TURN), *(np.full(d.width, d.scale) for d in smooth.domains)]
+    )
+    return [
+        smooth.start([], columns + perturbation[len(turns) :], turns + perturbation[: len(turns)])
+        for perturbation in (0.0 * perturbations[0], *perturbations)
+    ]
 
 
 def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, has_moved_throws: bool) -> StarDesign | None:
@@ -270,7 +275,7 @@ def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, has_moved
     return StarDesign(candidate, result, None, residual, has_moved_throws) if is_finite else None
 
 
-def _if_allowed(phasing: Phasing, intervals: Intervals, design: StarDesign | None) -> StarDesign | None:
+def _if_feasible(phasing: Phasing, intervals: Intervals, design: StarDesign | None) -> StarDesign | None:
     if design is None or not math.isfinite(design.value):
         return None
     if design.result.final.violation(design.result.problem.limits) > FEASIBLE:
