@@ -111,7 +111,7 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
 
     if time_limit is not None and not (isinstance(time_limit, Real) and time_limit > 0.0):
         raise wrong_call("time_limit", time_limit, "must be a number of seconds above zero", "try 60")
-    return decide(replace(_problem(problem), sharply=True), time_limit=time_limit, further=True)
+    return decide(replace(_problem(problem), sharply=True), time_limit=time_limit, diagnose=True)
 
 
 def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint] = ()) -> Result:

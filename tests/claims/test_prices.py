@@ -243,12 +243,12 @@ def test_a_limit_at_its_kink_beside_a_bound() -> None:
     limit, bound = found
     assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 2.0), abs=1e-4)
     assert (bound.relaxed, bound.tightened) == pytest.approx((0.0, 1.0), abs=1e-4)
-    assert not limit.is_one
+    assert not limit.is_equal
     assert limit.other == limit.tightened
 
 
 def test_sides_within_two_percent_are_one_price() -> None:
-    assert Price.both(3.0).is_one
+    assert Price.both(3.0).is_equal
     assert Price(3.0, 3.05).other is None
     assert Price(3.0, 3.1).other == 3.1
     assert (Price(1.0, 2.0) + Price.both(3.0)) == Price(4.0, 5.0)

@@ -84,7 +84,7 @@ def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
         mounts = [generator.uniform(d.lower, d.upper) for d in problem.mount_decisions]
         columns = generator.uniform(-0.01, 0.01, joint.columns)
         start = joint.start(mounts, columns)
-        given, unbalances = joint.split(start)
+        given, unbalances = joint.decision_values(start)
         assert given == pytest.approx(mounts)
         exact = evaluate(problem, problem.design([*unbalances, *given]))
         value, constraints = at(joint, start)
@@ -427,7 +427,7 @@ def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypat
 
     monkeypatch.setattr(search, "_solve", ended)
     search.refine()
-    assert [search.joint.split(start)[0] for start in begun] == [pytest.approx(places[chosen])]
+    assert [search.joint.decision_values(start)[0] for start in begun] == [pytest.approx(places[chosen])]
 
 
 def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):

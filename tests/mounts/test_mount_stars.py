@@ -243,7 +243,7 @@ def test_a_limit_that_only_throws_move_has_the_price_of_a_looser_one(tmp_path):
     assert slope > 0.05
     assert limit.active
     assert limit.price.relaxed == pytest.approx(slope, rel=0.02)
-    assert limit.price.is_one
+    assert limit.price.is_equal
 
 
 @pytest.mark.slow
@@ -293,7 +293,7 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
         mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, generator.uniform(0.0, 1.0, 1), turns)
         moved = joint.problem_at(x)
-        given, unbalances = joint.split(x)
+        given, unbalances = joint.decision_values(x)
         # at as many angles as the program has: 32 a turn
         exact = evaluate(moved, moved.design([*unbalances, *given]), 64)
         assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=1e-3)
@@ -319,7 +319,7 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
         mounts = [generator.uniform(d.lower, d.upper) for d in own.mount_decisions]
         x = joint.start(mounts, np.array([0.5]), turns)
         moved = joint.problem_at(x)
-        given, unbalances = joint.split(x)
+        given, unbalances = joint.decision_values(x)
         exact = evaluate(moved, moved.design([*unbalances, *given]))
         assert max(abs(loads.wrench.at(0.5)[3]) for loads in exact.loads) > 0.5
         assert float(value(x, 1e-9)) == pytest.approx(objective_value(moved, exact), rel=2e-3)

@@ -53,7 +53,7 @@ def test_only_what_stands_on_the_resonance_is_infinite(tmp_path: Path) -> None:
 
 
 def test_a_result_that_stays_on_the_resonance_shows_what_is_finite(tmp_path: Path) -> None:
-    result = replace(evaluate_only(resonant(tmp_path), to_start_from=True), status=Status.FAILED)
+    result = replace(evaluate_only(resonant(tmp_path), allow_resonance=True), status=Status.FAILED)
     drawn = draw(result, tmp_path)
     assert drawn == ("engine.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png")
     text = result_document(result, [name.removesuffix(".png") for name in drawn], "").as_markdown(".png")

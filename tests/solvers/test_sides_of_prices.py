@@ -40,9 +40,9 @@ def test_prices_are_what_the_optimum_moves_by(seed: int) -> None:
 
 
 def test_sides_are_one_where_they_differ_by_less_than_counts() -> None:
-    assert Price.both(3.0).is_one
+    assert Price.both(3.0).is_equal
     assert Price.both(3.0).other is None
     assert Price(0.99, 1.0).other is None
     assert Price(0.9, 1.0).other == 1.0
     assert Price(0.0, 1.0).other == 1.0
-    assert Price(0.0, 0.0).is_one
+    assert Price(0.0, 0.0).is_equal

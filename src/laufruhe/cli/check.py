@@ -34,7 +34,7 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
         from laufruhe.report.json_result import as_json
         from laufruhe.solvers import evaluate_only
 
-        return as_json(evaluate_only(problem, to_start_from=True))
+        return as_json(evaluate_only(problem, allow_resonance=True))
 
     return f"ok: {problem.summary}\n", initial_as_json
 

@@ -46,9 +46,9 @@ def solve(problem: Problem, listener: Listener) -> Result:
     import laufruhe.solvers as solvers
 
     try:
-        return solvers.solve(replace(problem, sharply=True), listener, further=True)
+        return solvers.solve(replace(problem, sharply=True), listener, diagnose=True)
     except SolverError as error:
-        return replace(solvers.evaluate_only(problem, to_start_from=True), status=Status.FAILED, message=str(error))
+        return replace(solvers.evaluate_only(problem, allow_resonance=True), status=Status.FAILED, message=str(error))
 
 
 def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Callable[[], None]]:

@@ -111,7 +111,7 @@ def _objective(result: Result) -> Record | None:
         part = static_part(result.problem, result.final)
         means = {} if part is None else asdict(part)
         return {**_attributes(result.objective, "name value unit initial reduction"), **means}
-    initial = ObjectiveValue.given(result.problem, result.initial)
+    initial = ObjectiveValue.of_initial(result.problem, result.initial)
     return (
         None
         if initial is None

@@ -290,24 +290,24 @@ def violation_message(problem: Problem, evaluation: Evaluation) -> str:
     return f"the best design found violates {names}; relax it, or open more numbers"
 
 
-def evaluate_only(problem: Problem, to_start_from: bool = False) -> Result:
+def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
     """Evaluate the initial design without a change; infeasible if its throws have no permitted firing order.
 
     Parameters
     ----------
-    to_start_from
+    allow_resonance
         True if a search starts from the design: it may then stand on an undamped resonance.
     """
     started = time.perf_counter()
     problem = problem.drawing
-    evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
+    evaluation = evaluate_start(problem) if allow_resonance else evaluate(problem)
     phasing = problem.phasing
     reason = why_no_order(phasing, phasing.throws) if phasing is not None and phasing.throws is not None else ""
     return Result(
         problem=problem,
         status=Status.INFEASIBLE if reason else Status.FEASIBLE,
         message=reason,
-        objective=ObjectiveValue.given(problem, evaluation),
+        objective=ObjectiveValue.of_initial(problem, evaluation),
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
         final=evaluation,

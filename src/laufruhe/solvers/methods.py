@@ -263,7 +263,7 @@ METHODS: tuple[Method, ...] = in_order("methods", Method, _CORE)
 
 
 def solve(
-    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, further: bool = False
+    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, diagnose: bool = False
 ) -> Result:
     """Optimise the open numbers of a problem.
 
@@ -275,7 +275,7 @@ def solve(
         Receives reports on the progress of searches.
     time_limit
         Time [s] after which searches end with their best design and its lower bound; None for no limit.
-    further
+    diagnose
         True to compute also the attainable values of limits in conflict, and the range of equally good designs.
 
     Raises
@@ -306,7 +306,7 @@ def solve(
         if reports:
             return without_proof(result, reports[0])
         result = check_by_walk(problem, result, time.thread_time() - spent)
-        if not further or result.status is Status.FEASIBLE:
+        if not diagnose or result.status is Status.FEASIBLE:
             return result
         if result.status is Status.OPTIMAL:
             return replace(result, free=free_decisions(result))

@@ -56,14 +56,14 @@ class Price:
         return Price(self.relaxed + other.relaxed, self.tightened + other.tightened)
 
     @property
-    def is_one(self) -> bool:
+    def is_equal(self) -> bool:
         """True if both prices are equal within `ALIKE`."""
         return self.relaxed >= (1.0 - ALIKE) * self.tightened
 
     @property
     def other(self) -> float | None:
         """Price of tightening; None if it is equal to that of relaxing."""
-        return None if self.is_one or math.isnan(self.relaxed) else self.tightened
+        return None if self.is_equal or math.isnan(self.relaxed) else self.tightened
 
     def floored(self, minimum: float) -> Price:
         """Return the price with values up to `minimum` set to zero."""
@@ -305,11 +305,11 @@ def affine_prices(
         for domain in problem.domains:
             left |= bounds_of(domain.decision, x[domain.columns], bound.gradient[domain.columns])
         one_sided = {
-            side: Price(price.relaxed, math.nan) for side, price in prices.items() if price.is_one and price.relaxed
+            side: Price(price.relaxed, math.nan) for side, price in prices.items() if price.is_equal and price.relaxed
         }
         return prices | one_sided, {name: Price(price.relaxed, math.nan) for name, price in left.items()}
     for k, price in zip(active, ranges, strict=False):
-        if not price.is_one:
+        if not price.is_equal:
             side = limits[k], "at most"
             prices[side] = Price(price.relaxed, math.inf if problem.limits[k][0] == 0.0 else price.tightened)
     return prices, dict(zip(edges, ranges[len(active) :], strict=False))

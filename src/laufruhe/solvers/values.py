@@ -207,7 +207,7 @@ class ObjectiveValue:
         return cls(problem.objective_name, value, problem.objective_unit or "", initial)
 
     @classmethod
-    def given(cls, problem: Problem, design: Evaluation) -> ObjectiveValue | None:
+    def of_initial(cls, problem: Problem, design: Evaluation) -> ObjectiveValue | None:
         """Return the objective value of the initial design; None without an objective."""
         value = objective_value(problem, design)
         return cls.of(problem, value, value) if problem.objective else None

@@ -43,9 +43,9 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
     try:
         result = solve(problem)
     except SolverError:
-        return evaluate_only(problem, to_start_from=True), FAILED, "none"
+        return evaluate_only(problem, allow_resonance=True), FAILED, "none"
     if result.objective is None:
-        return evaluate_only(problem, to_start_from=True), str(result.status), "none"
+        return evaluate_only(problem, allow_resonance=True), str(result.status), "none"
     is_closed = not problem.decisions and problem.phasing is None
     proof = str(result.certificate.kind) if result.certificate else NOTHING_OPEN if is_closed else "none"
     return result, str(result.status), proof

@@ -249,7 +249,7 @@ class MountSearch:
         self, starts: Sequence[Array], stop_when: StopWhen | None = None, known: int = 0
     ) -> tuple[LocalOptimum, ...]:
         return solve_nonlinear(
-            self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when, known=known
+            self.joint.program, starts, self._workers, self._iterations, stop_when=stop_when, previous_starts=known
         )
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
@@ -288,7 +288,7 @@ class MountSearch:
     def _evaluate_optimum(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
         if not np.all(np.isfinite(optimum.x)):
             return None
-        mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
+        mounts, unbalances = (iter(part) for part in joint.decision_values(optimum.x))
         try:
             problem = self.problem if self.moves is None else joint.problem_at(optimum.x)
         except ModelError:
@@ -334,7 +334,7 @@ class MountSearch:
 
 
 def _split(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:
-    mounts, _ = joint.split(x)
+    mounts, _ = joint.decision_values(x)
     return list(mounts), x[len(mounts) : len(mounts) + joint.columns]
 
 

@@ -94,7 +94,7 @@ class Task:
     max_seconds: float
     expand: bool
     external_model: SerializedExternal | None = None
-    deciding: int | None = None
+    leading_variables: int | None = None
 
 
 def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:

@@ -305,6 +305,6 @@ def _two_sided_prices(
     if prices_by_side is None:
         return bound_prices
     for (_, side, edge), price in zip(sides, prices_by_side, strict=False):
-        if not price.is_one:
+        if not price.is_equal:
             prices[side] = Price(price.relaxed / edge, price.tightened / edge)
     return dict(zip(bound_prices, prices_by_side[len(sides) :], strict=True))

@@ -56,7 +56,7 @@ SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class ExternalNumbers:
+class ExternalValues:
     """Values of an external model: their symbols, the arguments as an expression of the variables, and the model."""
 
     symbols: Any
@@ -93,7 +93,7 @@ class NonlinearProgram:
         as fast for short arrays, and compilation is slower.
     external
         Values in the expressions that an external model computes.
-    deciding
+    leading_variables
         Number of the leading variables that distinguish two optima; all if None. Shapes of modes follow from them,
         with either sign.
     """
@@ -111,8 +111,8 @@ class NonlinearProgram:
     parameters: Any = None
     stages: tuple[tuple[float, ...], ...] = ((),)
     expand: bool = False
-    external: ExternalNumbers | None = None
-    deciding: int | None = None
+    external: ExternalValues | None = None
+    leading_variables: int | None = None
 
     def __post_init__(self) -> None:
         n, m = self.x.numel(), 0 if self.constraints is None else self.constraints.numel()
@@ -139,7 +139,7 @@ def solve_nonlinear(
     max_iterations: int = 500,
     max_seconds: float = 60.0,
     stop_when: StopWhen | None = None,
-    known: int = 0,
+    previous_starts: int = 0,
 ) -> tuple[LocalOptimum, ...]:
     """Return the local optima of a multistart search, the best usable one first.
 
@@ -159,7 +159,7 @@ def solve_nonlinear(
         Limits of every start and stage.
     stop_when
         Return True if the ends of the first stage so far are sufficient; None runs all starts.
-    known
+    previous_starts
         Number of starts that the same program ran before.
 
     Raises
@@ -168,7 +168,7 @@ def solve_nonlinear(
         If worker processes die repeatedly.
     """
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
-    task = _task(program, max_iterations, max_seconds, known + len(points) >= WORTH_EXPANDING)
+    task = _task(program, max_iterations, max_seconds, previous_starts + len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
         if stop_when is None:
             optima = _run_first_stage(task, points, workers, None, stack)[0]
@@ -259,7 +259,9 @@ def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimu
 
 def _is_same(optimum: LocalOptimum, other: LocalOptimum, task: Task) -> bool:
     value_tolerance = SAME_END * max(abs(other.value), LEAST_SCALE * task.objective_scale)
-    is_apart = np.abs(optimum.x - other.x)[: task.deciding] > SAME_PLACE * task.scales[: task.deciding]
+    is_apart = (
+        np.abs(optimum.x - other.x)[: task.leading_variables] > SAME_PLACE * task.scales[: task.leading_variables]
+    )
     return optimum.value - other.value <= value_tolerance and not is_apart.any()
 
 
@@ -309,5 +311,5 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, is
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower,
         program.constraint_upper, scales, program.objective_scale, program.stages,
-        max_iterations, max_seconds, program.expand and is_shared, external_model, program.deciding,
+        max_iterations, max_seconds, program.expand and is_shared, external_model, program.leading_variables,
     )  # fmt: skip

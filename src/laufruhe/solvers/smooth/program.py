@@ -91,12 +91,14 @@ class SmoothProgram:
         self._decisions = problem.mount_decisions
         self._count = len(self._decisions)
         self.columns = sum(domain.width for domain in self.domains)
-        self._by_ratio = np.array([d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in self._decisions], bool)
+        self._is_logarithmic = np.array(
+            [d.is_stiffness and d.upper > WIDE * d.lower > 0.0 for d in self._decisions], bool
+        )
         self._mount_variables = ca.MX.sym("mounts", self._count)
         self._unbalance_columns = ca.MX.sym("unbalances", self.columns)
         numbers = [
             ca.exp(self._mount_variables[k]) if wide else self._mount_variables[k]
-            for k, wide in enumerate(self._by_ratio)
+            for k, wide in enumerate(self._is_logarithmic)
         ]
         self._mount_numbers = ca.vertcat(*numbers) if numbers else self._mount_variables
         self._throw_deviations = ca.MX.sym("throws", 0 if moves is None else moves.size)
@@ -156,7 +158,7 @@ class SmoothProgram:
             stages=self._stages,
             expand=True,
             external=self._simulated.external,
-            deciding=self._throw_columns.stop,
+            leading_variables=self._throw_columns.stop,
         )
 
     @property
@@ -322,12 +324,12 @@ class SmoothProgram:
     def _to_variables(self, mounts: Sequence[float]) -> Array:
         # logarithms for decisions with bounds far apart
         values = np.asarray(mounts, dtype=float)
-        return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
+        return np.where(self._is_logarithmic, np.log(np.where(self._is_logarithmic, values, 1.0)), values)
 
-    def split(self, x: Array) -> tuple[list[float], list[complex]]:
+    def decision_values(self, x: Array) -> tuple[list[float], list[complex]]:
         """Return decision values of mounts and of unbalances from the variables, shape (n,)."""
         inner = x[: self._count]
-        outer = np.where(self._by_ratio, np.exp(np.where(self._by_ratio, inner, 0.0)), inner)
+        outer = np.where(self._is_logarithmic, np.exp(np.where(self._is_logarithmic, inner, 0.0)), inner)
         mounts = [float(np.clip(v, d.lower, d.upper)) for v, d in zip(outer, self._decisions, strict=True)]
         columns = x[self._count : self._count + self.columns].copy()
         for domain in self.domains:
@@ -357,6 +359,8 @@ class SmoothProgram:
         if self._constraints.heads:
             inputs = [self._mount_variables, self._unbalance_columns, self._throw_deviations, self._simulated.symbols]
             values = ca.Function("tops", inputs, [ca.vertcat(*(value for _, value in self._constraints.heads))])
-            outputs = values(self._to_variables(mounts), columns, throw_deviations, self._simulated.at(mounts, columns))
+            outputs = values(
+                self._to_variables(mounts), columns, throw_deviations, self._simulated.peaks_at(mounts, columns)
+            )
             parts.append(1.05 * np.asarray(outputs, dtype=float).reshape(-1))
         return np.concatenate(parts)

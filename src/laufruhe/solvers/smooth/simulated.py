@@ -16,7 +16,7 @@ from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
-from laufruhe.solvers.smooth.nonlinear import ExternalNumbers
+from laufruhe.solvers.smooth.nonlinear import ExternalValues
 
 
 class SimulatedVariables:
@@ -43,18 +43,18 @@ class SimulatedVariables:
         self.symbols = ca.MX.sym("simulated", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
         columns = decision_vector(domains_of(problem.unbalances))
-        initial = self.at([d.real_start for d in problem.mount_decisions], columns)
+        initial = self.peaks_at([d.real_start for d in problem.mount_decisions], columns)
         for measure, end, count in zip(measures, ends.tolist(), self._peaks.counts, strict=True):
             self._symbols_of[measure] = self.symbols[end - count : end]
             maximum = float(np.max(initial[end - count : end]))
             self._sizes[measure] = maximum if 0.0 < maximum < math.inf else 1.0
 
     @property
-    def external(self) -> ExternalNumbers | None:
+    def external(self) -> ExternalValues | None:
         """External model of the peaks; None without simulated measures."""
-        return None if self._peaks is None else ExternalNumbers(self.symbols, self._arguments, self._peaks)
+        return None if self._peaks is None else ExternalValues(self.symbols, self._arguments, self._peaks)
 
-    def at(self, mounts: Sequence[float], columns: Array) -> Array:
+    def peaks_at(self, mounts: Sequence[float], columns: Array) -> Array:
         """Return the peaks of a design, shape (peaks,)."""
         return np.zeros(0) if self._peaks is None else self._peaks.values(np.concatenate([mounts, columns]))
 
