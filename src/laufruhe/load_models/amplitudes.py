@@ -156,10 +156,10 @@ def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
         return None
     if places[0] == 0.0 or any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
-    own = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
-    if any(type(part) is not SliderCrank for part in own):
+    cylinders = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
+    if any(type(part) is not SliderCrank for part in cylinders):
         return None
-    return Engine(engine.name, engine.cycle, own, tuple(rotor for rotor in engine.rotors if rotor.x == places[0]))
+    return Engine(engine.name, engine.cycle, cylinders, tuple(rotor for rotor in engine.rotors if rotor.x == places[0]))
 
 
 def _orders(problem: Problem, highest: int) -> list[int]:
@@ -216,11 +216,11 @@ def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Arra
         if any(_orders_of(t, heavy) > 1 for t in objective.terms)
         else [np.ones(len(heavy))]
     )
-    for raw in grid:
+    for shares in grid:
         sizes = np.zeros(len(heavy))
         for term in objective.terms:
             factors = np.array([term.couple[h] for h in heavy])
-            unit = np.where(factors > 0.0, raw, 0.0)
+            unit = np.where(factors > 0.0, shares, 0.0)
             length = float(np.sqrt((unit**2).sum()))
             sizes += term.weight * factors * (unit / length if length > 0.0 else unit)
         yield sizes

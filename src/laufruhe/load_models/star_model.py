@@ -175,23 +175,23 @@ class StarModel:
         return self._cache[key]
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
-        whole, motored = self._whole.at(samples, averaged), self._origin_motored.at(samples, averaged)
+        complete, motored = self._whole.at(samples, averaged), self._origin_motored.at(samples, averaged)
         moved = {place: model.at(samples, averaged) for place, model in self._one_moved.items()}
         return StarProblem(
-            self._norms(whole.terms, motored.terms, {place: problem.terms for place, problem in moved.items()}),
-            self._norms(whole.limits, motored.limits, {place: problem.limits for place, problem in moved.items()}),
+            self._norms(complete.terms, motored.terms, {place: problem.terms for place, problem in moved.items()}),
+            self._norms(complete.limits, motored.limits, {place: problem.limits for place, problem in moved.items()}),
             self.domains,
             samples,
         )
 
     def _norms(
         self,
-        whole: tuple[tuple[float, AffineNorm], ...],
+        complete: tuple[tuple[float, AffineNorm], ...],
         motored: tuple[tuple[float, AffineNorm], ...],
         moved: dict[tuple[int, int], tuple[tuple[float, AffineNorm], ...]],
     ) -> tuple[tuple[float, StarNorm], ...]:
         star_norms = []
-        for number, ((weight, norm), (_, origin)) in enumerate(zip(whole, motored, strict=True)):
+        for number, ((weight, norm), (_, origin)) in enumerate(zip(complete, motored, strict=True)):
             moved_norms = {place: norms[number][1] for place, norms in moved.items()}
             moves = self._changes({place: other.constant for place, other in moved_norms.items()}, origin.constant)
             # slopes mostly agree, which saves the memory for their changes

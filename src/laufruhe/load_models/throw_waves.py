@@ -84,7 +84,7 @@ class WaveNorm:
     waves
         W of every moving part with all open angles at zero, shape (parts, orders, k, d).
     left_out
-        What the orders that are left out amount to at most [SI].
+        Largest change of the norm by the omitted orders [SI].
     """
 
     fixed: AffineNorm
@@ -175,8 +175,8 @@ class ThrowWaves:
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
             problem, late = only_gas_of(self.problem, part.name), layout.late[k] if layout.late else 0.0
             banks = BANK_SAMPLES if self._is_geometry_open[0] else (layout.banks[k],)
-            turned = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
-            evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in turned)
+            copies = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
+            evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in copies)
             # fixed angles shift the cylinder in time
             ahead = 0.0 if self._is_geometry_open[0] else -layout.banks[k]
             yield MovingPart(
@@ -198,8 +198,8 @@ class ThrowWaves:
         side = Fraction(0 if part.cylinder is None else self.layout.side(part.cylinder))
         for j, step in enumerate((-1, 0, 1) if len(part.evaluations) > 1 else (0,)):
             for h, order in enumerate(self.times):
-                turned = order * Fraction(self._turns)
-                multiples = (turned - (order + step) * side, turned - order * side)
+                common_multiple = order * Fraction(self._turns)
+                multiples = (common_multiple - (order + step) * side, common_multiple - order * side)
                 yield (
                     (order, *(m for m, is_open in zip(multiples, self._is_geometry_open, strict=True) if is_open)),
                     h,
@@ -231,7 +231,7 @@ class ThrowWaves:
     def _kept_orders(self) -> tuple[Fraction, ...]:
         """Return the orders that each measure needs, so that higher ones have at most `share_left_out`."""
         # unbalances on the throws turn in order 1
-        kept = {Fraction(1)}
+        orders = {Fraction(1)}
         for measure in self._loads:
             squares: dict[Fraction, float] = {}
             evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
@@ -249,8 +249,8 @@ class ThrowWaves:
                 for k in range(len(ordered))
             ]
             remainders = zip(ordered, tail, shares, strict=True)
-            kept |= {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
-        return tuple(sorted(kept))
+            orders |= {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
+        return tuple(sorted(orders))
 
     def left_out(self, measure: Measure, samples: int) -> float:
         """Return the largest change of a measure by the omitted orders, for throws at any angles [SI]."""
@@ -273,11 +273,11 @@ class ThrowWaves:
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
         """Return the largest norm of the omitted orders of signals, orders beyond the last listed one included [SI]."""
-        total, kept = 0.0, np.array([float(order) for order in self.times])
+        total, kept_orders = 0.0, np.array([float(order) for order in self.times])
         for short in signals:
             # kinks have orders without end; those beyond the listed ones are negligible
             signal = short if short.kinks is None else short.padded(_LISTED)
-            is_omitted = ~orders_equal(signal.orders, kept)
+            is_omitted = ~orders_equal(signal.orders, kept_orders)
             omitted = signal.with_coefficients(np.where(is_omitted[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither norm exceeds the root mean square, and averages do not exceed the sum of amplitudes
@@ -311,15 +311,15 @@ class ThrowWaves:
 
     def _part_rows(self, measure: Measure, part: MovingPart, samples: int) -> list[ComplexArray]:
         times = np.array([float(order) for order in self.times])
-        turned = np.exp(1j * times * part.ahead)[:, None, None]
+        phases = np.exp(1j * times * part.ahead)[:, None, None]
         if measure.is_load:
             by_bank = [evaluation.signals(measure.load) for evaluation in part.evaluations]
             by_point = [
                 self._components([self._coefficients(signal) for signal in signals])
                 for signals in zip(*by_bank, strict=True)
             ]
-            return [self._rows_of(measure, component, samples) * turned for component in zip(*by_point, strict=True)]
-        return [np.asarray((times == 1.0)[:, None, None] * turned * self._weights(measure, part))]
+            return [self._rows_of(measure, component, samples) * phases for component in zip(*by_point, strict=True)]
+        return [np.asarray((times == 1.0)[:, None, None] * phases * self._weights(measure, part))]
 
     @staticmethod
     def _components(by_bank: list[ComplexArray]) -> list[ComplexArray]:

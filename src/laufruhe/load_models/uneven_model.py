@@ -153,10 +153,10 @@ class UnevenModel:
         selections: Sequence[OrderSelection], keep_places: bool,
     ) -> list[SymbolicSpectrum]:  # fmt: skip
         k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
-        turned = TurnedLoads(self.problem, k, signal, symbols.bank is not None, selections, keep_places)
+        loads = TurnedLoads(self.problem, k, signal, symbols.bank is not None, selections, keep_places)
         angles = [self._place(k, part, symbols) for k, part in enumerate(parts)]
         stars = [pin - bank - math.tau * _turns_of(part) for (pin, bank), part in zip(angles, parts, strict=True)]
-        return turned.spectra(stars, [bank for _, bank in angles], lambda rotor: self._unbalance(rotor, symbols))
+        return loads.spectra(stars, [bank for _, bank in angles], lambda rotor: self._unbalance(rotor, symbols))
 
     def _counted(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> SymbolicSpectrum:
         # only the lowest orders of gas move a block on soft mounts
@@ -171,8 +171,8 @@ class UnevenModel:
 
     def _maps(self, measure: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         weights = np.diag(measure.direction_weights or (1.0, 1.0, 1.0))
-        every = self._map(measure, order, point.speed)
-        return [weights @ every[k] for k in measure.places([mount.name for mount in self.problem.engine.mounts])]
+        maps = self._map(measure, order, point.speed)
+        return [weights @ maps[k] for k in measure.places([mount.name for mount in self.problem.engine.mounts])]
 
     def _map(self, measure: Measure, order: float, speed: float) -> NDArray[np.complex128]:
         if self._mounting is None:

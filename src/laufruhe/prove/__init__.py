@@ -1,1 +1,1 @@
-"""What no design can do better than: bounds and certificates. Nothing here solves."""
+"""Lower bounds of objectives, and certificates of designs; solvers are in `laufruhe.solvers`."""

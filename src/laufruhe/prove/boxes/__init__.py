@@ -1,1 +1,1 @@
-"""What no leads, sizes, flywheels and crankshafts in a box do better than."""
+"""Lower bounds over boxes of leads, sizes, flywheels and crankshafts."""

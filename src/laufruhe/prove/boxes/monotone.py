@@ -1,8 +1,8 @@
-"""Least weighted sum of functions that are monotone in each open number, under limits on such functions (T9).
+"""Minimum of a weighted sum of functions that are monotone in each open number, under limits on such functions (T9).
 
-On a box such a function is least at one corner. Boxes are dropped if their least sum is not under that of a known
-design, or if a limit is violated everywhere. Slices at the sides of other boxes are cut off by the same rule, and
-the rest is halved. The least sum over the remaining boxes bounds every feasible design.
+On a box such a function is minimal at one corner. A box is dropped if its minimum is not below the objective of the
+incumbent, or if a limit is violated everywhere in it. Slices at the sides of other boxes are cut off by the same rule,
+and the boxes are halved. The minimum over the remaining boxes is a lower bound of the objective.
 """
 
 from __future__ import annotations
@@ -32,11 +32,11 @@ class Monotone:
     signs: Array
 
     def lowest_corner(self, lower: Array, upper: Array) -> Array:
-        """Return the corner of a box at which the function is least, shape (n,)."""
+        """Return the corner of a box at which the function is minimal, shape (n,)."""
         return np.where(self.signs > 0.0, lower, upper)
 
     def minimum_over(self, lower: Array, upper: Array) -> float:
-        """Return the least value on a box."""
+        """Return the minimum on a box."""
         return self.value(self.lowest_corner(lower, upper))
 
 
@@ -67,7 +67,7 @@ class MonotoneProblem:
 
     @property
     def is_monotone(self) -> bool:
-        """Return whether the sum is monotone in each number."""
+        """Return True if the sum is monotone in each number."""
         return all(np.array_equal(term.signs, self.terms[0][1].signs) for _, term in self.terms)
 
     def with_cutoff(self, cutoff: float) -> MonotoneProblem:
@@ -90,11 +90,11 @@ class _MonotoneBoxes(BoxBisection):
 
     @property
     def level(self) -> float:
-        """Least objective of designs that cuts remove; infinite if cuts use limits alone."""
+        """Lower bound of the objective of designs that cuts remove [SI]; infinite if only limits cut."""
         return self.cutoff if self._problem is not self._uncut else math.inf
 
     def bound_box(self, lower: Array, upper: Array) -> tuple[float, Box] | FathomedPart:
-        """Return a box without slices that violate limits, and its least sum."""
+        """Return the lower bound of a box and the box without slices that violate limits."""
         contracted = _cut(self._problem, lower, upper)
         if contracted is None:
             return FathomedPart(self.level)
@@ -119,7 +119,7 @@ class _Around:
         return thin_box(place, self.problem.lower, self.problem.upper)
 
     def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the least sum of a box; infinite if limits cut off all of it."""
+        """Return the lower bound of a box; infinite if limits cut off all of it."""
         result = _MonotoneBoxes(self.problem, self.witness.value * (1.0 + EXCESS), 0.0).bound_box(*box)
         return math.inf if isinstance(result, FathomedPart) else result[0]
 

@@ -38,25 +38,47 @@ class LinearRelaxation:
         """Return zero objective without limits, for boxes of this shape."""
         return cls(np.zeros(len(lower)), np.zeros_like(lower))
 
-    def subset(self, which: NDArray[np.intp]) -> LinearRelaxation:
-        """Return some of the boxes."""
-        limits = [(over[which], by[which]) for over, by in self.limits]
-        return LinearRelaxation(self.value[which], self.slopes[which], limits, [pull[which] for pull in self.pulls])
+    def subset(self, indices: NDArray[np.intp]) -> LinearRelaxation:
+        """Return the relaxation on the boxes at these indices."""
+        limits = [(value[indices], slopes[indices]) for value, slopes in self.limits]
+        pulls = [pull[indices] for pull in self.pulls]
+        return LinearRelaxation(self.value[indices], self.slopes[indices], limits, pulls)
 
     def add(self, weight: float, minimum: LinearBound, left_out: float = 0.0) -> None:
-        """Add a term to the objective, or zero where its bound is not positive."""
+        """Add a weighted term to the objective, or zero on boxes where its bound is not positive.
+
+        Parameters
+        ----------
+        weight
+            Weight of the term.
+        minimum
+            Lower bound of the term.
+        left_out
+            Largest effect of omitted orders on the term [SI].
+        """
         value = minimum.value - minimum.rest - left_out
-        known = np.isfinite(value) & (value > 0.0)
-        self.value = self.value + weight * np.where(known, value, 0.0)
-        self.slopes = self.slopes + weight * np.where(known[:, None], minimum.slopes, 0.0)
+        is_positive = np.isfinite(value) & (value > 0.0)
+        self.value = self.value + weight * np.where(is_positive, value, 0.0)
+        self.slopes = self.slopes + weight * np.where(is_positive[:, None], minimum.slopes, 0.0)
 
     def add_limit(self, minimum: LinearBound, left_out: float, maximum: float) -> None:
-        """Add a limit."""
+        """Add the limit of a measure to at most `maximum`.
+
+        Parameters
+        ----------
+        minimum
+            Lower bound of the measure.
+        left_out
+            Largest effect of omitted orders on the measure [SI].
+        maximum
+            Limit [SI].
+        """
         unit = maximum or 1.0
-        over = (minimum.value - minimum.rest - left_out - maximum) / unit
-        known = np.isfinite(over) & np.all(np.isfinite(minimum.slopes), axis=1)
-        self.limits.append((np.where(known, over, -1.0), np.where(known[:, None], minimum.slopes / unit, 0.0)))
-        self.pulls.append(np.where(known[:, None], np.nan_to_num(minimum.bends) / unit, 0.0))
+        violation = (minimum.value - minimum.rest - left_out - maximum) / unit
+        is_finite = np.isfinite(violation) & np.all(np.isfinite(minimum.slopes), axis=1)
+        slopes = np.where(is_finite[:, None], minimum.slopes / unit, 0.0)
+        self.limits.append((np.where(is_finite, violation, -1.0), slopes))
+        self.pulls.append(np.where(is_finite[:, None], np.nan_to_num(minimum.bends) / unit, 0.0))
 
     @property
     def violation(self) -> Array:
@@ -67,23 +89,23 @@ class LinearRelaxation:
         kinks where a slope changes its sign: the best kink is taken.
         """
         none = (np.full(len(self.value), -1.0), np.zeros_like(self.slopes))
-        overs, by = (np.array(each) for each in zip(*(self.limits or [none]), strict=True))
+        values, gradients = (np.array(parts) for parts in zip(*(self.limits or [none]), strict=True))
         boxes = np.arange(len(self.value))
-        first = (overs - np.abs(by).sum(axis=2)).argmax(axis=0)
-        over, slope = overs[first, boxes], by[first, boxes]
-        bound = over - np.abs(slope).sum(axis=1)
-        for other, slopes in zip(overs, by, strict=True) if len(overs) > 1 else ():
+        first = (values - np.abs(gradients).sum(axis=2)).argmax(axis=0)
+        value, slope = values[first, boxes], gradients[first, boxes]
+        bound = value - np.abs(slope).sum(axis=1)
+        for limit, slopes in zip(values, gradients, strict=True) if len(values) > 1 else ():
             difference = slope - slopes
             shares = np.where(slope * slopes < 0.0, slope / np.where(difference != 0.0, difference, 1.0), 0.0)[
                 ..., None
             ]
             mixed = (1.0 - shares) * slope[:, None] + shares * slopes[:, None]
             bounds = (
-                (1.0 - shares[..., 0]) * over[:, None] + shares[..., 0] * other[:, None] - np.abs(mixed).sum(axis=2)
+                (1.0 - shares[..., 0]) * value[:, None] + shares[..., 0] * limit[:, None] - np.abs(mixed).sum(axis=2)
             )
             best = bounds.argmax(axis=1)
             share = np.where(bounds[boxes, best] > bound, shares[boxes, best, 0], 0.0)
-            over, slope = (1.0 - share) * over + share * other, slope - share[:, None] * difference
+            value, slope = (1.0 - share) * value + share * limit, slope - share[:, None] * difference
             bound = np.maximum(bound, bounds[boxes, best])
         return np.asarray(bound)
 
@@ -101,12 +123,16 @@ class LinearRelaxation:
         """
         value, slopes = self.value, self.slopes
         bound, broken = value - np.abs(slopes).sum(axis=1), self.violation > 0.0
-        for over, by in self.limits * (ROUNDS if len(self.limits) > 1 else 1):
-            prices = np.where(slopes * by < 0.0, -slopes / np.where(by != 0.0, by, 1.0), 0.0)
-            loss = np.abs(slopes[:, None] + prices[:, :, None] * by[:, None]).sum(axis=2)
-            bounds = value[:, None] + prices * over[:, None] - loss
+        for violation, gradient in self.limits * (ROUNDS if len(self.limits) > 1 else 1):
+            prices = np.where(slopes * gradient < 0.0, -slopes / np.where(gradient != 0.0, gradient, 1.0), 0.0)
+            loss = np.abs(slopes[:, None] + prices[:, :, None] * gradient[:, None]).sum(axis=2)
+            bounds = value[:, None] + prices * violation[:, None] - loss
             best = bounds.argmax(axis=1)[:, None]
             highest = np.take_along_axis(bounds, best, axis=1)[:, 0]
             price = np.where(highest > bound, np.take_along_axis(prices, best, axis=1)[:, 0], 0.0)
-            value, slopes, bound = value + price * over, slopes + price[:, None] * by, np.maximum(bound, highest)
+            value, slopes, bound = (
+                value + price * violation,
+                slopes + price[:, None] * gradient,
+                np.maximum(bound, highest),
+            )
         return np.asarray(np.maximum(np.where(broken, np.inf, bound), 0.0))

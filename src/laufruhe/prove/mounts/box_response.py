@@ -53,10 +53,11 @@ class LoadedOrders:
     loads: ComplexArray
     samples: int
 
-    def subset(self, which: NDArray[np.bool_] | Indices) -> LoadedOrders:
-        """Return some of the orders."""
-        indices, numbers = (self.points[which], self.places[which]), (self.orders[which], self.omegas[which])
-        return LoadedOrders(*indices, *numbers, self.loads[which], self.samples)
+    def subset(self, selection: NDArray[np.bool_] | Indices) -> LoadedOrders:
+        """Return the orders that a mask or indices select."""
+        indices = (self.points[selection], self.places[selection])
+        numbers = (self.orders[selection], self.omegas[selection])
+        return LoadedOrders(*indices, *numbers, self.loads[selection], self.samples)
 
     def at_rest(self) -> LoadedOrders:
         """Return the loads with zero frequency, which give the forces on rigid mounts (E11)."""
@@ -67,11 +68,11 @@ class LoadedOrders:
         """Return True if sums over samples equal those over the period: every order has more than two samples."""
         return bool(2 * self.places.max(initial=0) < self.samples)
 
-    def phases(self, which: Indices) -> ComplexArray:
+    def phases(self, selection: Indices) -> ComplexArray:
         """Return factors e^{i h phi} over one period of selected orders, shape (samples, orders)."""
-        factor = int(np.gcd.reduce(self.places[which])) or 1
+        factor = int(np.gcd.reduce(self.places[selection])) or 1
         factor = factor if self.samples % factor == 0 else 1
-        places, samples = self.places[which] // factor, self.samples // factor
+        places, samples = self.places[selection] // factor, self.samples // factor
         return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
 
 
@@ -96,7 +97,7 @@ class MountMatrices:
 
 
 def is_travel(channel: Channel) -> bool:
-    """Return whether a channel is the travel of mounts, not their forces."""
+    """Return True if a channel is the travel of mounts, not their forces."""
     return channel is channels.MOUNT_TRAVEL
 
 

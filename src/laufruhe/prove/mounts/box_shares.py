@@ -74,10 +74,10 @@ class BoxModes:
     def rests(self) -> Array:
         """Upper bounds of the difference of v_j and its first order, shape (boxes, i, j)."""
         change = self.change
-        others = np.einsum("bjk,bik->bij", change, np.where(_EYE, 0.0, self.parts))
+        coupling = np.einsum("bjk,bik->bij", change, np.where(_EYE, 0.0, self.parts))
         rest = (
             change * self.deficits[:, :, None]
-            + others
+            + coupling
             + self.square_changes[:, :, None] * self.parts
             + _rounding(self.squares)
         )
@@ -105,8 +105,8 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
         coupling = np.minimum(np.einsum("bjk,bik->bij", across, parts), maximum)
         bound = np.where(gaps > 0.0, coupling / np.where(gaps > 0.0, gaps, 1.0), 1.0)
         parts = np.where(_EYE, 1.0, np.minimum(parts, bound))
-    others = np.sum(np.where(_EYE, 0.0, parts) ** 2, axis=2)
-    deficits = 1.0 - np.sqrt(np.maximum(1.0 - others, 0.0))
+    square_sum = np.sum(np.where(_EYE, 0.0, parts) ** 2, axis=2)
+    deficits = 1.0 - np.sqrt(np.maximum(1.0 - square_sum, 0.0))
     return BoxModes(modes, squares, slopes, parts, deficits, np.maximum(high - squares, squares - low))
 
 
@@ -163,8 +163,8 @@ def _shares(model: BoxModel, box: BoxModes, motion: int) -> _Shares:
     near = _projection_bounds(a, box.parts) * _projection_bounds(b, box.parts)
     both = a[:, :, None] * b[:, None, :] + a[:, None, :] * b[:, :, None]
     slopes = np.einsum("bij,bnij->bin", np.where(_EYE, 0.0, both), box.first)
-    others = np.where(_EYE, 0.0, box.parts)
-    far = [np.abs(c) * box.deficits + np.einsum("bij,bj->bi", others, np.abs(c)) for c in (a, b)]
+    other_parts = np.where(_EYE, 0.0, box.parts)
+    far = [np.abs(c) * box.deficits + np.einsum("bij,bj->bi", other_parts, np.abs(c)) for c in (a, b)]
     with np.errstate(invalid="ignore"):
         rest = np.where(both == 0.0, 0.0, np.abs(both) * box.rests).sum(axis=2)
     rest = rest + np.maximum(-2.0 * a * b, 0.0) * box.deficits + far[0] * far[1]

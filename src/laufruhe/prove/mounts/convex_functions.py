@@ -56,7 +56,7 @@ class StiffnessMatrices:
 
 @dataclass(frozen=True, eq=False)
 class LinearFunction:
-    """LinearFunction function constant + gradient . x."""
+    """Linear function constant + gradient . x."""
 
     constant: float
     gradient: Array
@@ -190,7 +190,7 @@ def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[fl
 
 
 def excludes(program: ConvexProgram, x: Array, duals: ConvexDuals) -> bool:
-    """Return whether duals of the limits prove that no stiffness in the box keeps all limits."""
+    """Return True if duals of the limits prove that no stiffness in the box keeps all limits."""
     proof, _ = dual_bound(replace(program, terms=()), x, replace(duals, terms=()))
-    whole = sum(price * abs(limit.maximum) for limit, price in zip(program.limits, duals.prices, strict=True))
-    return proof > CONTRADICTION * whole
+    scale = sum(price * abs(limit.maximum) for limit, price in zip(program.limits, duals.prices, strict=True))
+    return proof > CONTRADICTION * scale

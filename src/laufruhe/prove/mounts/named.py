@@ -29,7 +29,7 @@ def named_part(problem: Problem) -> Problem:
 
 
 def is_named(measure: Measure, problem: Problem) -> bool:
-    """Return whether a measure is constant, affine in unbalances, or has a formula over boxes of mounts."""
+    """Return True if a measure is constant, affine in unbalances, or has a formula over boxes of mounts."""
     if measure.is_load and not (measure in problem.known_rows or _is_bounded(measure.norm)):
         return False
     for kind in {decision.kind for decision in problem.decisions}:

@@ -29,8 +29,8 @@ def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | N
     high = low.copy()
     decisions = problem.mount_decisions
     sides = [
-        [getattr(d, side) for d in decisions] if given is None else given.tolist()
-        for side, given in (("lower", lower), ("upper", upper))
+        [getattr(d, side) for d in decisions] if values is None else values.tolist()
+        for side, values in (("lower", lower), ("upper", upper))
     ]
     for decision, *edges in zip(decisions, *sides, strict=True):
         for drive in decision.mount_drives:

@@ -22,7 +22,7 @@ RATIOS = frozenset({channels.TRANSMISSIBILITY})
 
 
 def is_ratio(measure: Measure) -> bool:
-    """Return whether a measure is a transmissibility."""
+    """Return True if a measure is a transmissibility."""
     return measure.channel in RATIOS
 
 

@@ -49,7 +49,7 @@ EVEN = 1e-12
 
 
 def is_stiffness_problem(problem: Problem) -> bool:
-    """Return whether only stiffnesses are open, and every spring is monotone in them."""
+    """Return True if only stiffnesses are open, and every spring is monotone in them."""
     stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
     return bool(problem.decisions) and stiffness
 

@@ -30,14 +30,14 @@ class StoredWorkBound:
     Attributes
     ----------
     energy
-        (m_max / 2 + (J_max - J_min) / 4) w_0^2 of cylinders in any phase [J].
+        Energy (m_max / 2 + (J_max - J_min) / 4) w_0^2, valid for cylinders at any phases [J].
     """
 
     energy: float
 
     @classmethod
     def from_engine(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float) -> StoredWorkBound:
-        """Return the relation for cylinders that fire at any angles, beside an inertia of all that turns [kg m2]."""
+        """Return the relation for cylinders that fire at any angles, with the inertia of all rotating parts [kg m2]."""
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
         cylinders = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
         inertias = [moving_inertia(cylinder, fidelity, angles)[0] for cylinder in cylinders]
@@ -45,9 +45,9 @@ class StoredWorkBound:
         return cls((0.5 * (inertia + largest) + 0.25 * (largest - smallest)) * point.speed**2)
 
     def degree(self, work: float) -> float:
-        """Return the least degree of irregularity with so much work stored [J]."""
+        """Return a lower bound of the degree of irregularity from the stored work [J]."""
         return (1.0 - SAMPLED) * (math.sqrt(1.0 + work / self.energy) - 1.0)
 
     def work(self, degree: float) -> float:
-        """Return the most stored work [J] that allows a degree of irregularity."""
+        """Return the largest stored work [J] at which a degree of irregularity is possible."""
         return ((1.0 + degree / (1.0 - SAMPLED)) ** 2 - 1.0) * self.energy
