@@ -236,7 +236,7 @@ def test_the_line_is_drawn_down_to_no_fuel(tmp_path: Path) -> None:
         result = laufruhe.evaluate(loaded(tmp_path, changed(BRAKE, own, told)))
         (test,) = result.problem.friction
         intercept, slope = test.line
-        at = test.asked if test.is_motored else -test.friction.mean
+        at = test.target if test.is_motored else -test.friction.mean
         assert intercept + slope * at == pytest.approx(test.friction.mean if test.is_motored else 0.0, abs=1e-9)
         assert willans.applies(result)
         drawn = willans.figure(result)

@@ -163,7 +163,7 @@ class EngineTable(Table):
         """Firing order; None unless it is a list."""
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
-    def own(self, key: str) -> Any:
+    def value_of(self, key: str) -> Any:
         """Return the value of a key that a layout owns."""
         return getattr(self, key)
 
@@ -183,7 +183,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     """Return the slider-cranks of [engine], and the throws that they work on."""
     kind = table.kind
     for key in _OWNED:
-        if table.own(key) and not kind.takes(key):
+        if table.value_of(key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
     _check_pistons(table)
     drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
@@ -235,7 +235,7 @@ def layout_of(table: EngineTable) -> Layout:
 
 def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
     """Return the input of the layout."""
-    values = {key.name: table.own(key.name) for key in table.kind.keys}
+    values = {key.name: table.value_of(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
     own = {
         name: value if not isinstance(value, Open) else value.start if name in masses else None
@@ -404,7 +404,7 @@ def piston_masses(
 
 def leads_of(table: EngineTable) -> list[Decision]:
     """Return a decision for every shaft with an open phase lead."""
-    lead, ports = table.own("crank_lead"), table.own("port_arc")
+    lead, ports = table.value_of("crank_lead"), table.value_of("port_arc")
     # the layout knows the start only
     if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
         rule = f"goes beyond the ports, which are open for {units.quantity_text(ports, 'rad')}"

@@ -39,7 +39,7 @@ class FidelityTable(Table):
     )
     tolerance: f.Tolerance | None = f.optional("Relative error of the objective that auto may make.")
 
-    def own(self, key: str) -> Any:
+    def value_of(self, key: str) -> Any:
         """Return the value of a fidelity option."""
         return getattr(self, key)
 

@@ -72,7 +72,7 @@ class PhasingTable(Table):
 
 def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
     """Return True if throws, firing order, bank angles or shafts are open."""
-    return any(_has_open(engine.own(key)) for key in _OPENABLE) or any(shaft.optional for shaft in shafts)
+    return any(_has_open(engine.value_of(key)) for key in _OPENABLE) or any(shaft.optional for shaft in shafts)
 
 
 def open_phasing(
@@ -81,7 +81,7 @@ def open_phasing(
     """Return the problem with the first design that its phasing allows, and with the phasing."""
     table = table or PhasingTable()
     for key in _OPENABLE:
-        if key not in engine.kind.openable and _has_open(engine.own(key)):
+        if key not in engine.kind.openable and _has_open(engine.value_of(key)):
             others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
             raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
     counts = [count for _, count in cylinder_counts(engine)]
@@ -115,8 +115,8 @@ def open_phasing(
         throws=None if throws is None else tuple(throws),
         throw_bounds=bounds,
         firing_order=_order_of(engine, cycle, count),
-        bank=_bounds(engine.own("bank_angle")),
-        split=_bounds(engine.own("split_pin_angle")),
+        bank=_bounds(engine.value_of("bank_angle")),
+        split=_bounds(engine.value_of("split_pin_angle")),
         intervals=_intervals(table.intervals, engine, cycle, count, fixed.spread if fixed else 0.0),
         realise=realise,
         steps=table.phases,
@@ -156,9 +156,9 @@ def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] 
     if engine.listed_order is not None:
         return tuple(engine.listed_order)
     throws = engine.listed_throws
-    if throws is None or engine.firing_order == "open" or any(_has_open(engine.own(key)) for key in _OPENABLE):
+    if throws is None or engine.firing_order == "open" or any(_has_open(engine.value_of(key)) for key in _OPENABLE):
         return None
-    layout = layout_of(_closed(engine, count, engine.own("bank_angle"), engine.own("split_pin_angle")))
+    layout = layout_of(_closed(engine, count, engine.value_of("bank_angle"), engine.value_of("split_pin_angle")))
     order = next(lap_orders(cycle, layout, throws), None)
     # one of two cylinders at one angle fires in a later turn
     return order if order is not None and max(firing_turns(layout, throws, order)) < 1.0 else None
@@ -222,11 +222,11 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
         raise Refused(where, None, rule, 'write throws = "open", without intervals')
     for angle in ("bank_angle", "split_pin_angle"):
-        if phasing.throws is not None and Open.from_value(engine.own(angle)).is_open:
+        if phasing.throws is not None and Open.from_value(engine.value_of(angle)).is_open:
             rule = "is open beside throws that are given, and is decided with open ones only"
             remedy = f'write throws = "open" and cylinders = {count}, or fix the angle'
             raise Refused(f"engine.{angle}", None, rule, remedy)
-    both_open = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
+    both_open = all(isinstance(engine.value_of(key), Open) for key in ("bank_angle", "split_pin_angle"))
     if not phasing.continuous and both_open:
         rule = "is open beside bank_angle, and even firing binds only their sum"
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'

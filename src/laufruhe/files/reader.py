@@ -250,7 +250,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
     rotors, (wheel, wheel_decisions) = (
         tuple(collected.rotors),
-        flywheel_of(file.flywheel, file.fidelity.own("crank_inertia")),
+        flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia")),
     )
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)

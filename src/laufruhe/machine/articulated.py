@@ -96,8 +96,8 @@ class ArticulatedCrank(SliderCrank):
     def path(self) -> Hashable:
         """Numbers that determine the path of the piston over the angle of the crank."""
         master = self.knuckle.master
-        own = (self.knuckle.radius, self.knuckle.angle, self.bank - master.bank)
-        return (*super().path, *own, master.path)  # type: ignore[misc]
+        hinge = (self.knuckle.radius, self.knuckle.angle, self.bank - master.bank)
+        return (*super().path, *hinge, master.path)  # type: ignore[misc]
 
     @property
     def fires_at(self) -> float:

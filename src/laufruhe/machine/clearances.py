@@ -25,17 +25,17 @@ class _Swept:
 def _shafts(engine: Engine) -> dict[str, _Swept]:
     turning = [(part.shaft, part.crank_radius, False) for part in engine.slider_cranks]
     turning += [(rotor.shaft, rotor.radius or 0.0, rotor.role is Role.BALANCER) for rotor in engine.rotors]
-    found: dict[str, _Swept] = {}
+    swept: dict[str, _Swept] = {}
     for shaft, radius, balances in turning:
-        known = found.get(shaft.name, _Swept(shaft))
-        found[shaft.name] = _Swept(shaft, max(radius, known.radius), balances or known.balances)
-    return found
+        known = swept.get(shaft.name, _Swept(shaft))
+        swept[shaft.name] = _Swept(shaft, max(radius, known.radius), balances or known.balances)
+    return swept
 
 
 def shafts_of(engine: Engine) -> tuple[str, ...]:
     """Return the names of all shafts; none without a balancer shaft."""
     shafts = _shafts(engine)
-    return tuple(shafts) if any(each.balances for each in shafts.values()) else ()
+    return tuple(shafts) if any(shaft.balances for shaft in shafts.values()) else ()
 
 
 def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: bool) -> list[Span]:
@@ -55,7 +55,7 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
     for a, b in itertools.combinations((name for name in counted if name in low), 2):
         if low[a].balances or low[b].balances:
             taken = low[a].radius + low[b].radius if swept else 0.0
-            minimum, maximum = _apart((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
+            minimum, maximum = _separation((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
             out.append((minimum - taken, maximum - taken))
     return out
 
@@ -66,15 +66,15 @@ def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[S
     out = []
     for name in low if names is None else names:
         if name in low and low[name].balances:
-            minimum, maximum = _apart((low[name].shaft, origin), (high[name].shaft, origin))
+            minimum, maximum = _separation((low[name].shaft, origin), (high[name].shaft, origin))
             out.append((minimum + low[name].radius, maximum + low[name].radius))
     return out
 
 
-def _apart(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
+def _separation(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
     (a, b), (c, d) = lower, upper
     spans = []
-    for own, other in (((a.y, c.y), (b.y, d.y)), ((a.z, c.z), (b.z, d.z))):
-        minimum, maximum = min(own) - max(other), max(own) - min(other)
+    for first_pair, second_pair in (((a.y, c.y), (b.y, d.y)), ((a.z, c.z), (b.z, d.z))):
+        minimum, maximum = min(first_pair) - max(second_pair), max(first_pair) - min(second_pair)
         spans.append((max(minimum, -maximum, 0.0), max(abs(minimum), abs(maximum))))
     return math.hypot(spans[0][0], spans[1][0]), math.hypot(spans[0][1], spans[1][1])

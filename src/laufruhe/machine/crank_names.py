@@ -23,7 +23,7 @@ def name_of_crank(throws: Sequence[float]) -> str:
     """Return the name of a crank with these throws [rad], however turned or mirrored; empty if it has none."""
     for name, degrees in CRANKS.items():
         named = [math.radians(angle) for angle in degrees]
-        images = [[sign * angle for angle in own] for sign in (1.0, -1.0) for own in (named, named[::-1])]
+        images = [[sign * angle for angle in angles] for sign in (1.0, -1.0) for angles in (named, named[::-1])]
         if len(named) == len(throws) and any(_turned(throws, image) for image in images):
             return name
     return ""

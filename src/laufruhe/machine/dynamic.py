@@ -65,9 +65,9 @@ class FluidTrack:
     def at(self, omegas: Array) -> ComplexArray:
         """Return the stiffness of the bulge in series with fluid, track and lower chamber."""
         behind = self.stiffness - self.mass * omegas**2 + 1j * self.damping * omegas
-        whole = self.bulge + behind
+        total = self.bulge + behind
         # without damping the fluid resonates: the force of the mount has no size there
-        return np.asarray(self.bulge * behind / np.where(whole == 0.0, 1e-300, whole), dtype=complex)
+        return np.asarray(self.bulge * behind / np.where(total == 0.0, 1e-300, total), dtype=complex)
 
 
 @dataclass(frozen=True)

@@ -157,18 +157,18 @@ class Engine:
     @property
     def cylinders(self) -> tuple[SliderCrank, ...]:
         """Slider-cranks, one for each cylinder: the first of two pistons that face each other."""
-        found: list[SliderCrank] = []
+        pistons: list[SliderCrank] = []
         for part in self.slider_cranks:
-            if not any(part.faces(other) for other in found):
-                found.append(part)
-        return tuple(found)
+            if not any(part.faces(other) for other in pistons):
+                pistons.append(part)
+        return tuple(pistons)
 
     @property
     def firing_intervals(self) -> tuple[float, ...]:
         """Crank angles from each firing to the next over a cycle [rad]."""
-        whole = self.cycle.turns
-        turns = sorted(reduced_turn(as_turn(part.firing_angle), whole) for part in self.cylinders)
-        following = [*turns[1:], turns[0] + whole] if turns else []
+        cycle_turns = self.cycle.turns
+        turns = sorted(reduced_turn(as_turn(part.firing_angle), cycle_turns) for part in self.cylinders)
+        following = [*turns[1:], turns[0] + cycle_turns] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
 
 
@@ -185,5 +185,5 @@ def _pins(parts: tuple[SliderCrank, ...]) -> tuple[Rotor, ...]:
 
 @lru_cache(maxsize=256)
 def _returns(ratio: float, turns: int) -> bool:
-    own = as_order(ratio) * turns
-    return own.denominator == 1 and own != 0
+    shaft_turns = as_order(ratio) * turns
+    return shaft_turns.denominator == 1 and shaft_turns != 0

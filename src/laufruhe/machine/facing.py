@@ -115,12 +115,12 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
     ModelError
         If two pistons have no chamber between them that is modelled.
     """
-    found = list(parts)
+    pistons = list(parts)
     for k, part in enumerate(parts):
         for other in parts:
             if other is not part and part.faces(other):
-                found[k] = replace(part, facing=_facing(part, other, cycle_angle))
-    return tuple(found)
+                pistons[k] = replace(part, facing=_facing(part, other, cycle_angle))
+    return tuple(pistons)
 
 
 def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing:
@@ -132,7 +132,7 @@ def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing
             f"{math.degrees(abs(ahead)):.6g} deg apart; bring them within {math.degrees(MOST_AHEAD):g} deg"
         )
     plain = all(
-        type(each) is SliderCrank and abs(each.shaft.ratio) == 1.0 and not each.offset for each in (part, other)
+        type(piston) is SliderCrank and abs(piston.shaft.ratio) == 1.0 and not piston.offset for piston in (part, other)
     )
     if not plain:
         raise ModelError(
@@ -146,13 +146,13 @@ def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing
 
 def minimum_room(part: SliderCrank, other: SliderCrank) -> float:
     """Return the least distance between the pins of two facing pistons [m]; infinite for Scotch yokes."""
-    apart = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
+    distance = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
     reach = part.crank_radius + part.rod_length + other.crank_radius + other.rod_length
     if math.isinf(reach):
         return math.inf
     ahead = math.remainder(part.firing_angle - other.firing_angle, math.tau)
     sizes = (part.crank_radius, part.rod_ratio, part.offset_ratio, other.crank_radius, other.rod_ratio)
-    return apart - reach + _least_travel(*sizes, other.offset_ratio, round(ahead, 9))
+    return distance - reach + _least_travel(*sizes, other.offset_ratio, round(ahead, 9))
 
 
 @lru_cache(maxsize=256)

@@ -72,10 +72,10 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
     out = []
     for pin in range(len(layout.throw_positions)):
         steps = []
-        for k in (k for k, own in enumerate(layout.pins) if own == pin):
-            apart = (layout.dead_centre_turn(k) - first) * lattice.steps
-            nearest = round(float(apart))
-            if abs(float(apart) - nearest) > SAME_TURN * lattice.steps:
+        for k in (k for k, throw in enumerate(layout.pins) if throw == pin):
+            distance = (layout.dead_centre_turn(k) - first) * lattice.steps
+            nearest = round(float(distance))
+            if abs(float(distance) - nearest) > SAME_TURN * lattice.steps:
                 raise NoEvenStarError(
                     "even firing needs the angle between dead centres on one throw (bank angle plus split pins, or "
                     f"leads of cranks) to be a multiple of {360.0 / lattice.steps:g} deg, and they make "
@@ -103,19 +103,19 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     pins = pin_steps(layout, lattice)
     if len(set(pins)) > 1:
         raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
-    found = tuple(_patterns(lattice, pins[0], len(layout.throw_positions)))
-    if not found:
+    patterns = tuple(_patterns(lattice, pins[0], len(layout.throw_positions)))
+    if not patterns:
         raise NoEvenStarError(
             f"no star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one throw "
             f"{' and '.join(f'{360.0 * s / lattice.steps:g}' for s in pins[0])} deg apart"
         )
-    return found
+    return patterns
 
 
-def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
+def _patterns(lattice: FiringLattice, pin_steps: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
     steps, maximum = lattice.steps, lattice.capacity[0]
     # the last place that loads each step: what is not full then stays so
-    last = {(step - p) % steps: p for p in range(steps) for step in own}
+    last = {(step - p) % steps: p for p in range(steps) for step in pin_steps}
 
     def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
         if len(counts) == steps:
@@ -125,9 +125,9 @@ def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iter
         p = len(counts)
         for count in range(1 if p == 0 else 0, min(left, maximum) + 1):
             after = load.copy()
-            for step in own:
+            for step in pin_steps:
                 after[(step - p) % steps] += count
-            full = all(after[j] == maximum for j in {(step - p) % steps for step in own} if last[j] == p)
+            full = all(after[j] == maximum for j in {(step - p) % steps for step in pin_steps} if last[j] == p)
             if full and max(after) <= maximum:
                 yield from grow([*counts, count], after, left - count)
 
@@ -223,10 +223,10 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
     worth = np.array([min(cycle.turns**k, looked_at) for k in reversed(range(others))], dtype=np.intp)
     while start < looked_at:
         numbers = np.arange(start, min(start + size, looked_at))
-        whole = np.tile(relative, (len(numbers), 1))
-        whole[:, 1:] += numbers[:, None] // worth % cycle.turns
-        orders = np.argsort(whole, axis=1, kind="stable")
-        steps = np.diff(np.take_along_axis(whole, orders, axis=1), axis=1)
+        turns_of_laps = np.tile(relative, (len(numbers), 1))
+        turns_of_laps[:, 1:] += numbers[:, None] // worth % cycle.turns
+        orders = np.argsort(turns_of_laps, axis=1, kind="stable")
+        steps = np.diff(np.take_along_axis(turns_of_laps, orders, axis=1), axis=1)
         for order in orders[np.all((steps > SAME_TURN) & (steps <= 1.0 + SAME_TURN), axis=1)]:
             yield tuple((order + 1).tolist())
         start, size = start + size, min(2 * size, 4096)
@@ -248,8 +248,8 @@ def longest_bank_gap(cycle: Cycle, layout: Layout, order: Sequence[int], turns: 
     """Return the largest crank angle in which one bank does not fire [rad]."""
     gaps = []
     for bank in sorted(set(layout.banks)):
-        own = [t for number, t in zip(order, turns, strict=True) if layout.banks[number - 1] == bank]
-        gaps.append(max(intervals_of(cycle, own)))
+        bank_turns = [t for number, t in zip(order, turns, strict=True) if layout.banks[number - 1] == bank]
+        gaps.append(max(intervals_of(cycle, bank_turns)))
     return max(gaps)
 
 

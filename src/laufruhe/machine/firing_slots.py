@@ -93,40 +93,40 @@ class FiringSlots:
         """Firings of a cycle."""
         return self.throws * len(self.sides)
 
-    def patterns(self, given: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
+    def patterns(self, throw_slots: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
         """Return all ways to fire within the bounds, or the least broken ones, and True if none was left out.
 
         Parameters
         ----------
-        given
+        throw_slots
             Firings of the cylinders of every throw, where the firing order is given.
         """
         even, slack, complete = self.cycle.angle / self.count, 0.0, True
         while True:
-            covers, all_of = self._first_covers(slack, given)
+            covers, all_of = self._first_covers(slack, throw_slots)
             complete = complete and (slack > 0.0 or all_of)
-            found = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
-            found.sort(key=lambda pattern: (round(pattern.broken, 9), self._unevenness(pattern)))
-            minimum = found[0].broken if found else math.inf
+            patterns = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
+            patterns.sort(key=lambda pattern: (round(pattern.broken, 9), self._unevenness(pattern)))
+            minimum = patterns[0].broken if patterns else math.inf
             if minimum <= max(slack, 1e-7) or slack > self.cycle.angle:
-                kept = [pattern for pattern in found if pattern.broken <= minimum + 1e-7]
-                return kept, complete
+                least_broken = [pattern for pattern in patterns if pattern.broken <= minimum + 1e-7]
+                return least_broken, complete
             slack = max(0.05 * even, 1.3 * slack)
 
-    def _first_covers(self, slack: float, given: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
+    def _first_covers(self, slack: float, throw_slots: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
         """Return covers in order of unevenness, as many as pay for a program, and True if these are all."""
-        even, found = self.cycle.angle / self.count, dict[Cover, None]()
+        even, covers = self.cycle.angle / self.count, dict[Cover, None]()
         maximum = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
         complete = False
         for share in _SHARES:
             low, high = self.minimum - slack, self.maximum + slack
-            own = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
+            narrowed = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
             budget = _Budget(_MOST_LOOKED_AT)
-            found |= dict.fromkeys(itertools.islice(own._covers(given, budget), maximum + 1))
-            if len(found) > maximum or budget.left <= 0:
-                return list(found)[:maximum], False
+            covers |= dict.fromkeys(itertools.islice(narrowed._covers(throw_slots, budget), maximum + 1))
+            if len(covers) > maximum or budget.left <= 0:
+                return list(covers)[:maximum], False
             complete = share == 1.0
-        return list(found), complete
+        return list(covers), complete
 
     def _unevenness(self, pattern: FiringPattern) -> float:
         even = self.cycle.angle / self.count
@@ -134,39 +134,39 @@ class FiringSlots:
 
     def _shapes(self) -> list[Shape]:
         """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
-        whole, count = self.cycle.angle, self.count
+        cycle_angle, count = self.cycle.angle, self.count
         low, high = max(self.minimum, 0.0), self.maximum
         choices = []
         for side in self.sides[1:]:
-            apart = side - self.sides[0]
-            ends = sorted(apart * angle for angle in self.angle)
-            own = []
-            for turns in range(math.floor(-ends[1] / math.tau), math.ceil((whole - ends[0]) / math.tau) + 1):
+            offset = side - self.sides[0]
+            ends = sorted(offset * angle for angle in self.angle)
+            shapes = []
+            for turns in range(math.floor(-ends[1] / math.tau), math.ceil((cycle_angle - ends[0]) / math.tau) + 1):
                 first, last = ends[0] + math.tau * turns, ends[1] + math.tau * turns
-                own += [
-                    (d, math.tau * turns, apart)
+                shapes += [
+                    (d, math.tau * turns, offset)
                     for d in range(1, count)
-                    if max(d * low, whole - (count - d) * high) <= last + _SLACK
-                    and min(d * high, whole - (count - d) * low) >= first - _SLACK
+                    if max(d * low, cycle_angle - (count - d) * high) <= last + _SLACK
+                    and min(d * high, cycle_angle - (count - d) * low) >= first - _SLACK
                 ]
             # those that hardly bend the intervals come first
-            own.sort(key=lambda part: abs(0.5 * sum(ends) + part[1] - part[0] * whole / count))
-            choices.append(own)
+            shapes.sort(key=lambda part: abs(0.5 * sum(ends) + part[1] - part[0] * cycle_angle / count))
+            choices.append(shapes)
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
 
-    def _covers(self, given: Sequence[Sequence[int]] | None, budget: _Budget) -> Iterator[Cover]:
+    def _covers(self, throw_slots: Sequence[Sequence[int]] | None, budget: _Budget) -> Iterator[Cover]:
         """Yield the ways to cover every firing once by throws: slot of the first cylinder, and shape."""
         count, shapes = self.count, self._shapes()
-        if given is not None:
-            own = [
+        if throw_slots is not None:
+            offset_choices = [
                 [
                     (slots[0], shape)
                     for shape in shapes
                     if all((slots[0] + d) % count == s for (d, _, _), s in zip(shape, slots[1:], strict=True))
                 ]
-                for slots in given
+                for slots in throw_slots
             ]
-            yield from itertools.product(*own)
+            yield from itertools.product(*offset_choices)
             return
         offsets = [(0, *(d for d, _, _ in shape)) for shape in shapes]
 
@@ -178,10 +178,10 @@ class FiringSlots:
             budget.left -= 1
             if budget.left <= 0:
                 return
-            for number, own in enumerate(offsets):
-                for member in own:
+            for number, offset_choices in enumerate(offsets):
+                for member in offset_choices:
                     first = (free - member) % count
-                    slots = frozenset((first + d) % count for d in own)
+                    slots = frozenset((first + d) % count for d in offset_choices)
                     if not slots & taken:
                         yield from grow(taken | slots, (*placed, (first, number)))
 
@@ -196,8 +196,8 @@ class FiringSlots:
         """Return the firing moments that break the bounds least, and then are most even."""
         from scipy.optimize import linprog
 
-        count, whole = self.count, self.cycle.angle
-        even = whole / count
+        count, cycle_angle = self.count, self.cycle.angle
+        even = cycle_angle / count
         # moments of the firings, angle between the banks, unevenness, what is broken
         size = count + 3
         steps = np.zeros((count, size))
@@ -205,7 +205,7 @@ class FiringSlots:
             steps[k, k] -= 1.0
             steps[k, (k + 1) % count] += 1.0
         turn = np.zeros(count)
-        turn[-1] = whole
+        turn[-1] = cycle_angle
         uneven, broken = np.zeros((2, count, size))
         uneven[:, count + 1] = 1.0
         broken[:, count + 2] = 1.0
@@ -214,11 +214,11 @@ class FiringSlots:
         fixed, values, members = [], [], []
         for first, shape in cover:
             members.append((first, *((first + d) % count for d, _, _ in shape)))
-            for slot, (_, turns, apart) in zip(members[-1][1:], shape, strict=True):
+            for slot, (_, turns, offset) in zip(members[-1][1:], shape, strict=True):
                 row = np.zeros(size)
-                row[slot], row[first], row[count] = 1.0, -1.0, -apart
+                row[slot], row[first], row[count] = 1.0, -1.0, -offset
                 fixed.append(row)
-                values.append(turns - (whole if slot < first else 0.0))
+                values.append(turns - (cycle_angle if slot < first else 0.0))
         bounds = [(0.0, 0.0), *([(None, None)] * (count - 1)), self.angle, (0.0, None), (0.0, None)]
         cost = np.zeros(size)
         cost[count + 1 :] = 1.0, _BROKEN

@@ -103,7 +103,7 @@ class FiringWindow:
     paths
         Most by which own angle j stands ahead of own angle i [rad], shape (own angles + 1, own angles + 1); the last
         is none but the angle 0.
-    own
+    angles
         Own angles; those of the throws where neither bank nor split pins are open.
     root
         Bounds of throws and open angles.
@@ -112,7 +112,7 @@ class FiringWindow:
     order: tuple[int, ...]
     laps: tuple[int, ...]
     paths: Array
-    own: CylinderAngles
+    angles: CylinderAngles
     root: tuple[Array, Array]
 
     @cached_property
@@ -122,11 +122,11 @@ class FiringWindow:
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
         """Return the smallest box around the throws of a box that keep the window, or None if empty."""
-        for _ in range(_ROUNDS if self.own.shares.size else 1):
-            paths = self.own.shortened(self.paths, lower, upper)
+        for _ in range(_ROUNDS if self.angles.shares.size else 1):
+            paths = self.angles.shortened(self.paths, lower, upper)
             if paths is None:
                 return None
-            low, high = self.own.box(paths, lower, upper)
+            low, high = self.angles.box(paths, lower, upper)
             if np.any(low > high + _ROUNDING):
                 return None
             lower, upper = np.minimum(low, high), np.maximum(low, high)
@@ -166,9 +166,13 @@ class FiringBounds:
     @cached_property
     def late(self) -> tuple[float, ...]:
         """c_k of every cylinder, open angles at zero [rad]."""
-        found = lateness(self.layout)
+        lateness_of_cylinders = lateness(self.layout)
         minimum = sum(low for low, _ in self.open_angles)
-        return tuple(late + self.layout.side(k) * minimum for k, late in enumerate(found)) if minimum else found
+        return (
+            tuple(late + self.layout.side(k) * minimum for k, late in enumerate(lateness_of_cylinders))
+            if minimum
+            else lateness_of_cylinders
+        )
 
     def share(self, k: int) -> float:
         """Return the share of an open angle in the own angle of cylinder k, from cylinder 1 if throws are open."""
@@ -179,11 +183,11 @@ class FiringBounds:
         return sorted({(pin, self.share(k)) for k, pin in enumerate(self.layout.pins)})
 
     @cached_property
-    def _own_of(self) -> list[int]:
+    def _angle_index(self) -> list[int]:
         return [self._named.index((pin, self.share(k))) for k, pin in enumerate(self.layout.pins)]
 
     @cached_property
-    def own(self) -> CylinderAngles:
+    def angles(self) -> CylinderAngles:
         """Own angles of all cylinders."""
         shares = np.array([share for _, share in self._named])
         return CylinderAngles(
@@ -205,7 +209,7 @@ class FiringBounds:
         return self._window((), (0,) * len(self.layout.positions), self._start())
 
     def _window(self, order: tuple[int, ...], laps: tuple[int, ...], paths: Array) -> FiringWindow:
-        return FiringWindow(order, laps, paths, self.own, self._root)
+        return FiringWindow(order, laps, paths, self.angles, self._root)
 
     def windows(self) -> Iterator[FiringWindow]:
         """Yield the window of every order and choice of dead centres that some throws keep."""
@@ -229,31 +233,31 @@ class FiringBounds:
         return np.roll(moments, -1, axis=0) - moments, following - constants
 
     def _start(self) -> Array:
-        count = len(self.own.throws)
+        count = len(self.angles.throws)
         paths = np.full((count + 1, count + 1), math.inf)
         np.fill_diagonal(paths, 0.0)
-        found = self.own.shortened(paths, *self._root)
-        assert found is not None
-        return found
+        shortened = self.angles.shortened(paths, *self._root)
+        assert shortened is not None
+        return shortened
 
     def _grown(self, fired: tuple[int, ...], laps: dict[int, int], paths: Array) -> Iterator[FiringWindow]:
         count = len(self.layout.positions)
         if len(fired) == count:
-            closed = self._apart(paths, fired[-1], laps[fired[-1]], fired[0], laps[fired[0]], wrapped=True)
+            closed = self._with_interval(paths, fired[-1], laps[fired[-1]], fired[0], laps[fired[0]], wrapped=True)
             if closed is not None:
-                found = self._window(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
+                window = self._window(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
                 # own angles of different throws may still want other angles of banks and pins
-                if not self.open_angles or found.within(*self._root) is not None:
-                    yield found
+                if not self.open_angles or window.within(*self._root) is not None:
+                    yield window
             return
         before, pins = fired[-1], self.layout.pins
-        told = [self.order[len(fired)] - 1] if self.order else [k for k in range(count) if k not in laps]
-        used, last = {pins[j] for j in fired}, self._own_of[before]
+        candidates = [self.order[len(fired)] - 1] if self.order else [k for k in range(count) if k not in laps]
+        used, last = {pins[j] for j in fired}, self._angle_index[before]
         back, there = paths[:, last].tolist(), paths[last].tolist()
-        for k in told:
-            own, free = self._own_of[k], self.throws is None and pins[k] not in used
-            for lap in (0,) if free else self._laps(k, before, laps[before], back[own], there[own]):
-                longer = self._apart(paths, before, laps[before], k, lap)
+        for k in candidates:
+            angle_index, free = self._angle_index[k], self.throws is None and pins[k] not in used
+            for lap in (0,) if free else self._laps(k, before, laps[before], back[angle_index], there[angle_index]):
+                longer = self._with_interval(paths, before, laps[before], k, lap)
                 if longer is not None:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
 
@@ -264,7 +268,7 @@ class FiringBounds:
         high = min(self.maximum, math.tau) + still + there
         return range(math.ceil((low - SLACK) / math.tau), math.floor((high + SLACK) / math.tau) + 1)
 
-    def _apart(
+    def _with_interval(
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
         """Return the paths with the bounds of one more interval, or None if infeasible."""
@@ -274,7 +278,7 @@ class FiringBounds:
         maximum = self.maximum if wrapped else min(self.maximum, math.tau)
         # of orders that are one another turned on, the one with cylinder 1 first, unless only this one says it
         minimum = max(self.minimum, math.tau) if wrapped and after and self.order is None else self.minimum
-        p, q = self._own_of[before], self._own_of[after]
+        p, q = self._angle_index[before], self._angle_index[after]
         # least <= theta_p - theta_q + still <= most
         ahead, behind = maximum - still + SLACK, still - minimum + SLACK
         if p == q:

@@ -43,7 +43,7 @@ class Rim:
         To the middle of the section; along the shaft; along a radius [m].
     density
         [kg/m3].
-    whole
+    mass_ratio
         Mass of the whole flywheel over that of its rim; what is within the rim is not counted as inertia.
     arms
         That carry it; of a disc there are none.
@@ -53,7 +53,7 @@ class Rim:
     width: float
     height: float
     density: float
-    whole: float = 1.0
+    mass_ratio: float = 1.0
     arms: Arms | None = None
 
     @property

@@ -13,16 +13,16 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
     """Return the slider-cranks with phase leads [rad] by the names of their shafts."""
-    return tuple(_led(part, leads.get(part.shaft.name, 0.0)) for part in parts)
+    return tuple(_with_lead(part, leads.get(part.shaft.name, 0.0)) for part in parts)
 
 
-def _led(part: SliderCrank, lead: float) -> SliderCrank:
+def _with_lead(part: SliderCrank, lead: float) -> SliderCrank:
     if not lead:
         return part
     return replace(part, throw=part.throw + part.shaft.ratio * lead, firing_angle=part.firing_angle - lead)
 
 
-def led(engine: Engine, leads: Mapping[str, float]) -> Engine:
+def with_leads(engine: Engine, leads: Mapping[str, float]) -> Engine:
     """Return the engine with phase leads of its shafts [rad], and so of all loads on them."""
     parts = parts_with_leads(engine.slider_cranks, leads)
     if any(part.facing is not None for part in parts):

@@ -88,8 +88,8 @@ class Mount:
 
     def mapped(self, change: Callable[[Mount], Mount]) -> Mount:
         """Return the mount with a change of every spring."""
-        own = change(replace(self, joined=())) if self.joined else change(self)
-        return replace(own, joined=tuple(map(change, self.joined))) if self.joined else own
+        changed = change(replace(self, joined=())) if self.joined else change(self)
+        return replace(changed, joined=tuple(map(change, self.joined))) if self.joined else changed
 
     @property
     def stiffness_matrix(self) -> NDArray[np.float64]:

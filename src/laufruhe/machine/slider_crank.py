@@ -191,8 +191,8 @@ class SliderCrank:
 
     def only(self, masses: Mapping[str, float]) -> Self:
         """Return the mechanism with these masses alone, by field name."""
-        told: dict[str, Any] = {**self.weightless, **masses}
-        return replace(self, **told)
+        masses_of_parts: dict[str, Any] = {**self.weightless, **masses}
+        return replace(self, **masses_of_parts)
 
     def scaled(self, length: float, mass: float) -> Self:
         """Return the mechanism in another size."""
@@ -221,9 +221,9 @@ class SliderCrank:
         if self.x != other.x:
             return False
         axis, opposite = cis(as_turn(self.bank)), cis(as_turn(other.bank))
-        apart = complex(other.shaft.z - self.shaft.z, other.shaft.y - self.shaft.y) * axis.conjugate()
-        reach = _ON_ONE_AXIS * abs(apart)
-        return abs(axis + opposite) < _ON_ONE_AXIS and abs(apart.imag) <= reach < apart.real
+        between_axes = complex(other.shaft.z - self.shaft.z, other.shaft.y - self.shaft.y) * axis.conjugate()
+        reach = _ON_ONE_AXIS * abs(between_axes)
+        return abs(axis + opposite) < _ON_ONE_AXIS and abs(between_axes.imag) <= reach < between_axes.real
 
     @property
     def swept(self) -> Swept:

@@ -38,16 +38,16 @@ def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceF
     throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
     """
     shafts = dict.fromkeys(part.shaft for part in engine.slider_cranks)
-    return tuple(found for shaft in shafts for found in _on_shaft(engine, shaft, and_of_none))
+    return tuple(factor for shaft in shafts for factor in _on_shaft(engine, shaft, and_of_none))
 
 
 def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFactor]:
     throws = _throws([part for part in engine.slider_cranks if part.shaft == shaft])
     places = np.array([throw[0].x for throw in throws])
     opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
-    own = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
-    weights = [rotor for rotor in own if rotor.role is Role.COUNTERWEIGHT]
-    masses = [rotor for rotor in own if rotor.role is Role.THROW]
+    rotors = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
+    weights = [rotor for rotor in rotors if rotor.role is Role.COUNTERWEIGHT]
+    masses = [rotor for rotor in rotors if rotor.role is Role.THROW]
     masses += [pin for pin in engine.pins if pin.shaft == shaft]
     for rotor in (*weights, *masses):
         distance = np.abs(places - rotor.x)
@@ -56,16 +56,16 @@ def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFa
             along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
             opposite[j] -= along / len(near)
             counted[j] |= rotor in weights and (and_of_none or rotor.unbalance != 0.0)
-    found = []
+    factors = []
     for k, throw in enumerate(throws):
-        whole = sum(part.reciprocating_mass * part.crank_radius for part in throw)
-        if counted[k] and whole > 0.0:
-            found.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / whole)))
-    return found
+        unbalance = sum(part.reciprocating_mass * part.crank_radius for part in throw)
+        if counted[k] and unbalance > 0.0:
+            factors.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / unbalance)))
+    return factors
 
 
 def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:
-    found: dict[tuple[float, object], list[SliderCrank]] = {}
+    throws: dict[tuple[float, object], list[SliderCrank]] = {}
     for part in parts:
-        found.setdefault((round(part.x, 9), direction(part.throw)), []).append(part)
-    return list(found.values())
+        throws.setdefault((round(part.x, 9), direction(part.throw)), []).append(part)
+    return list(throws.values())

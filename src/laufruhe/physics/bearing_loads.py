@@ -38,7 +38,7 @@ from laufruhe.physics.shaking_loads import rotor_loads, rotor_wrench
 from laufruhe.physics.star_loads import order_index, spread
 
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
-Felt: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array, ...]]
+PinReaction: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array, ...]]
 """What is felt of the force at a piston pin, at some angles of the crank; whether masses at other pins count."""
 
 
@@ -59,10 +59,10 @@ def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
     ModelError
         If the crank turns unevenly, or a mechanism has no pin.
     """
-    own = _of_parts(_of_rod, engine, point, fidelity)
+    forces = _of_parts(_of_rod, engine, point, fidelity)
     if (carried := _carried(engine.slider_cranks)) is None:
-        return own
-    return own + crank_forces(engine, point, fidelity).mapped(partial(np.einsum, "mk,nkd->nmd", carried))
+        return forces
+    return forces + crank_forces(engine, point, fidelity).mapped(partial(np.einsum, "mk,nkd->nmd", carried))
 
 
 def crank_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -85,16 +85,16 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     for part in engine.slider_cranks:
         if not part.has_rod:
             raise ModelError(f"{part.name} has no rod that leans on a cylinder wall; ask for the crank-pin force")
-    own = _of_parts(_of_piston_pin, engine, point, fidelity)
+    forces = _of_parts(_of_piston_pin, engine, point, fidelity)
     if (carried := _carried(engine.slider_cranks)) is None:
-        return own
+        return forces
     across = np.multiply.outer(carried, np.array([[0.0, 1.0]]))
-    return own + _of_parts(_of_hinge, engine, point, fidelity).mapped(partial(np.einsum, "mkcd,nkc->nmd", across))
+    return forces + _of_parts(_of_hinge, engine, point, fidelity).mapped(partial(np.einsum, "mkcd,nkc->nmd", across))
 
 
 def _carried(parts: Sequence[SliderCrank]) -> Array | None:
-    found = np.array([[part.is_hinged_to(master) for part in parts] for master in parts], dtype=float)
-    return found if found.any() else None
+    hinges = np.array([[part.is_hinged_to(master) for part in parts] for master in parts], dtype=float)
+    return hinges if hinges.any() else None
 
 
 def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -185,33 +185,33 @@ def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
 
 
 def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    return _felt(cycle, part, speed, gas, fidelity, _at_piston)
+    return _pin_load(cycle, part, speed, gas, fidelity, _at_piston)
 
 
 def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    return _felt(cycle, part, speed, gas, fidelity, _at_master)
+    return _pin_load(cycle, part, speed, gas, fidelity, _at_master)
 
 
 @lru_cache(maxsize=256)
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    load = _felt(cycle, part, speed, gas, fidelity, _at_pin)
+    load = _pin_load(cycle, part, speed, gas, fidelity, _at_pin)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
-    turned = load.mapped(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
+    turned = load.mapped(lambda force: force @ np.array([[0.0, y, z], [0.0, z, -y]]))
     rod = Rotor("rod", part.x, part.crank_pin_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
-    found = turned + _of_rotor(rod, speed, cycle)
-    found.coefficients.setflags(write=False)
-    return found
+    series = turned + _of_rotor(rod, speed, cycle)
+    series.coefficients.setflags(write=False)
+    return series
 
 
 @lru_cache(maxsize=256)
 def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    found = _of_rod(cycle, part, speed, gas, fidelity)
+    series = _of_rod(cycle, part, speed, gas, fidelity)
     if part.master_bank is not None:
         wall = 1j * cis(as_turn(part.master_bank))
         leaning = _of_hinge(cycle, part, speed, gas, fidelity)
-        found = found + leaning.mapped(lambda own: own * np.array([0.0, wall.imag, wall.real]))
-        found.coefficients.setflags(write=False)
-    return found
+        series = series + leaning.mapped(lambda force: force * np.array([0.0, wall.imag, wall.real]))
+        series.coefficients.setflags(write=False)
+    return series
 
 
 def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tuple[Array, ...]:
@@ -219,35 +219,35 @@ def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tup
 
 
 def _at_pin(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    own = part.on_pin(np, alpha, force, with_masses)
-    return own.real, own.imag
+    pin_force = part.on_pin(np, alpha, force, with_masses)
+    return pin_force.real, pin_force.imag
 
 
 def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    own = part.on_pin(np, alpha, force, with_masses)
-    return (part.on_wall_of_master(np, alpha, own),)
+    pin_force = part.on_pin(np, alpha, force, with_masses)
+    return (part.on_wall_of_master(np, alpha, pin_force),)
 
 
 @lru_cache(maxsize=512)
-def _felt(
-    cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, felt: Felt
+def _pin_load(
+    cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, reaction: PinReaction
 ) -> Spectrum:
     """Return what `seen` takes of the masses and gas of one cylinder, shape (n, d) (B1, B2)."""
     if not part.has_pin_loads:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
-    series = _inertia_orders(part, fidelity, felt) * (ratio * speed) ** 2
+    series = _inertia_orders(part, fidelity, reaction) * (ratio * speed) ** 2
     moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
     moved = moved if ratio > 0.0 else moved.conj()
     load = fidelity.truncated(Spectrum(cycle.base_order, spread(moved, order_index(cycle, abs(ratio)))))
     if gas is not None:
-        load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity, felt))
+        load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity, reaction))
     load.coefficients.setflags(write=False)
     return load
 
 
 @lru_cache(maxsize=256)
-def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> ComplexArray:
+def _inertia_orders(part: SliderCrank, fidelity: Fidelity, reaction: PinReaction) -> ComplexArray:
     """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, d) (B1, B2)."""
     is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
 
@@ -261,7 +261,7 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> Comple
         across = -along * sine / cosine
         for inertia, (_, turning) in motion.swings if fidelity.rod == "rigid" and part.rod_ratio > 0.0 else ():
             across += inertia * turning / (part.rod_length * cosine)
-        return felt(part, alpha, along + 1j * across, True)
+        return reaction(part, alpha, along + 1j * across, True)
 
     width = len(loads(np.zeros(1)))
     table = resolved_orders(loads, np.ones((width, 1)), part.name).T
@@ -270,13 +270,13 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> Comple
 
 
 @lru_cache(maxsize=256)
-def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, felt: Felt) -> Spectrum:
+def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, reaction: PinReaction) -> Spectrum:
     # gas part over the crank angle of the engine, shape (n, d) (B1, B2)
     def loads(angles: Array) -> Array:
         total: Array | float = 0.0
         for since in (angles + lag for lag in part.swept.lags):
             thrust = thrust_at(gas, part, cycle, since) * part.lean(np, since)
-            total += np.stack(felt(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
+            total += np.stack(reaction(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
         return np.asarray(total)
 
     from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
@@ -304,8 +304,8 @@ def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], 
     for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
         rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
         columns = [k for k, (on, _) in enumerate(places) if on == shaft]
-        found = SHARES[crankshaft]([bearings[k].x for k in rows], [places[k][1] for k in columns])
-        shares[np.ix_(rows, columns)] = found
+        columns_of_shares = SHARES[crankshaft]([bearings[k].x for k in rows], [places[k][1] for k in columns])
+        shares[np.ix_(rows, columns)] = columns_of_shares
     shares.setflags(write=False)
     return shares
 
@@ -343,12 +343,12 @@ def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
         a, b, c = 12.0 / length**3, 6.0 / length**2, 2.0 / length
         element = [[a, b, -a, b], [b, 2 * c, -b, c], [-a, -b, a, -b], [b, c, -b, 2 * c]]
         stiffness[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += element
-    held, loaded = 2 * np.searchsorted(x, bearings), 2 * np.searchsorted(x, places)
-    free = np.setdiff1d(np.arange(2 * len(x)), held)
-    moved = np.zeros((2 * len(x), len(held)))
-    moved[held, np.arange(len(held))] = 1.0
+    supports, loaded = 2 * np.searchsorted(x, bearings), 2 * np.searchsorted(x, places)
+    free = np.setdiff1d(np.arange(2 * len(x)), supports)
+    moved = np.zeros((2 * len(x), len(supports)))
+    moved[supports, np.arange(len(supports))] = 1.0
     # what a support carries of a load is how far the beam comes down there as that support does (Maxwell, Betti)
-    moved[free] = -np.linalg.solve(stiffness[np.ix_(free, free)], stiffness[np.ix_(free, held)])
+    moved[free] = -np.linalg.solve(stiffness[np.ix_(free, free)], stiffness[np.ix_(free, supports)])
     return np.asarray(moved[loaded].T)
 
 
@@ -373,6 +373,6 @@ def wear_of(path: ComplexArray, angles: Array) -> Array:
     -------
     Shares from 0 to 1, shape (k,); zero where nothing loads the bearing.
     """
-    apart = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
-    total = (np.abs(path)[:, None] * (apart <= SIDES)).sum(axis=0)
+    distance = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
+    total = (np.abs(path)[:, None] * (distance <= SIDES)).sum(axis=0)
     return np.asarray(total / (total.max() or 1.0))

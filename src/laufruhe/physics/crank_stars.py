@@ -92,10 +92,10 @@ def images(stars: Stars, phases: int, mirror: bool, reflect: bool) -> list[Stars
 
     Every image is turned so that its first throw stands at step 0.
     """
-    whole = np.asarray(stars, dtype=np.int16)
-    out = [whole]
+    block = np.asarray(stars, dtype=np.int16)
+    out = [block]
     if mirror:
-        out.append(whole[:, ::-1])
+        out.append(block[:, ::-1])
     if reflect:
         out += [-image for image in out]
     return [((image - image[:, :1]) % phases).astype(np.uint8) for image in out]
@@ -167,19 +167,19 @@ class StarSpace:
         """Yield all stars, one of each set of images, in blocks (n, throws)."""
         for root in self.roots:
             for block in _grown(self, root):
-                own = np.all(self.canonical(block) == block, axis=1)
-                if own.any():
-                    yield block[own]
+                is_canonical = np.all(self.canonical(block) == block, axis=1)
+                if is_canonical.any():
+                    yield block[is_canonical]
 
     @property
     def roots(self) -> tuple[Partial, ...]:
         """The first throw alone, for every pattern."""
-        order, found = outside_in(self.throws), []
+        order, partials = outside_in(self.throws), []
         for pattern in self.patterns:
             left = np.array([pattern], dtype=np.uint8)
             left[0, 0] -= 1
-            found.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
-        return tuple(found)
+            partials.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
+        return tuple(partials)
 
 
 @dataclass(frozen=True, eq=False)

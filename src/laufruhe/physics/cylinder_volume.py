@@ -32,8 +32,8 @@ def swept_volume(part: SliderCrank, angles: Array) -> Array:
 
 def chamber_volume(part: SliderCrank, since: Array) -> Array:
     """Return the volume of a chamber above its least [m3], at crank angles after its firing [rad] (Y3)."""
-    own = part.swept.chamber
-    return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * (since - part.swept.late))
+    chamber = part.swept.chamber
+    return chamber.piston_area * chamber.stroke * swept_volume(chamber, part.swept.pace * (since - part.swept.late))
 
 
 def dead_centres(part: SliderCrank) -> tuple[float, float]:
@@ -83,12 +83,12 @@ class ChargedCylinder:
 
         There is none but at a dead centre: valves open and close there, and heat is added there at once.
         """
-        found = self._one_sided(closed, angles)
+        values = self._one_sided(closed, angles)
         ends = (np.mod(angles - centre + math.pi, math.tau) - math.pi for centre in dead_centres(self.part))
         jumps = np.any([np.abs(since) <= JUMP_WIDTH for since in ends], axis=0)
         before, after = (self._one_sided(closed, angles[jumps] + by) for by in (-JUMP_WIDTH, JUMP_WIDTH))
-        found[jumps] = 0.5 * (before + after)
-        return found
+        values[jumps] = 0.5 * (before + after)
+        return values
 
     def _one_sided(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         top, bottom = dead_centres(self.part)

@@ -81,9 +81,9 @@ class ElasticMounting:
         """Viscous damping in the axes of C2, shape (mounts, 3, 3) [N s/m] (E2)."""
         return np.array([mount.damping_matrix for mount in self.mounts]).reshape(-1, 3, 3)
 
-    def total(self, each: Array) -> Array:
+    def total(self, vectors: Array) -> Array:
         """Return the sum of G' k G over the mounts, shape (6, 6) (E3)."""
-        return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, each, strict=True)))
+        return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, vectors, strict=True)))
 
     @cached_property
     def stiffness(self) -> Array:
@@ -107,8 +107,8 @@ class ElasticMounting:
     @cached_property
     def _met(self) -> NDArray[np.bool_]:
         seen = np.abs(self.dynamic.rows @ self.modes.shapes)
-        felt = (seen > UNDRIVEN * seen.max(axis=1, keepdims=True, initial=0.0)).astype(int)
-        return np.asarray(felt.T @ felt > 0)
+        is_driven = (seen > UNDRIVEN * seen.max(axis=1, keepdims=True, initial=0.0)).astype(int)
+        return np.asarray(is_driven.T @ is_driven > 0)
 
     @cached_property
     def _damping(self) -> Array:
@@ -134,8 +134,8 @@ class ElasticMounting:
 
     @cached_property
     def _answers(self) -> NDArray[np.bool_]:
-        kept = range(1, 7) if self.answering is None else self.answering
-        return np.isin(np.arange(1, 7), list(kept))
+        modes = range(1, 7) if self.answering is None else self.answering
+        return np.isin(np.arange(1, 7), list(modes))
 
     def excited(self, wrench: Spectrum) -> tuple[int, ...]:
         """Return the modes that a wrench drives, directly or through damping (E12)."""
@@ -175,28 +175,28 @@ class ElasticMounting:
 
     def driven(self, omegas: Array, drive: ComplexArray) -> ComplexArray:
         """Return the modal amplitudes of known drives of the modes, shape (n, 6), as `responses` (E4)."""
-        kept = list(self._reached(drive))
+        modes = list(self._reached(drive))
         out = np.zeros(drive.shape, dtype=complex)
-        if not kept:
+        if not modes:
             return out
         self._refuse_resonance(omegas, drive)
-        squares, damped = self.modes.squares[kept], (omegas > 0.0)
-        loss, damping = self._loss[np.ix_(kept, kept)], self._damping[np.ix_(kept, kept)]
+        squares, damped = self.modes.squares[modes], (omegas > 0.0)
+        loss, damping = self._loss[np.ix_(modes, modes)], self._damping[np.ix_(modes, modes)]
         reactance = squares - omegas[:, None] ** 2
         if not (_coupled(loss) or _coupled(damping) or self.dynamic):
             impedance = reactance + 1j * (damped[:, None] * np.diag(loss) + omegas[:, None] * np.diag(damping))
-            out[:, kept] = drive[:, kept] / np.where(impedance == 0.0, 1.0, impedance)
+            out[:, modes] = drive[:, modes] / np.where(impedance == 0.0, 1.0, impedance)
             return out
         full = 1j * (damped[:, None, None] * loss + omegas[:, None, None] * damping)
-        diagonal = np.arange(len(kept))
+        diagonal = np.arange(len(modes))
         full[:, diagonal, diagonal] += reactance
         if self.dynamic:
-            full += self.dynamic.impedance(omegas, self.modes.shapes[:, kept])
+            full += self.dynamic.impedance(omegas, self.modes.shapes[:, modes])
             _refuse_singular(omegas, np.asarray(full, dtype=np.complex128), drive)
         # a free mode under no steady load stays where it is
         still = (omegas == 0.0)[:, None] & (squares == 0.0)
         full[:, diagonal, diagonal] += still
-        out[:, kept] = np.linalg.solve(full, drive[:, kept, None])[..., 0]
+        out[:, modes] = np.linalg.solve(full, drive[:, modes, None])[..., 0]
         return out
 
     def _refuse_resonance(self, omegas: Array, drive: ComplexArray) -> None:
@@ -359,8 +359,8 @@ class DynamicSprings:
 
     def added(self, omegas: Array) -> ComplexArray:
         """Return the stiffness beyond that at rest, shape (frequencies, n) [N/m]."""
-        found = [law.at(np.asarray(omegas, dtype=float)) - law.static for law in self.laws]
-        return np.array(found, dtype=complex).reshape(len(self.laws), len(omegas)).T
+        additions = [law.at(np.asarray(omegas, dtype=float)) - law.static for law in self.laws]
+        return np.array(additions, dtype=complex).reshape(len(self.laws), len(omegas)).T
 
     def impedance(self, omegas: Array, shapes: Any) -> ComplexArray:
         """Return the added impedance in coordinates of shapes (6, k), shape (frequencies, k, k)."""
@@ -374,10 +374,10 @@ class DynamicSprings:
 
 def dynamic_springs(mounts: Sequence[Mount], motions: Array) -> DynamicSprings:
     """Return the frequency-dependent springs of mounts with motions G, shape (mounts, 3, 6)."""
-    found = [(place, spring, law) for place, spring in every_spring(mounts) for law in spring.dynamic]
-    axes = np.array([spring.orientation[law.axis] for _, spring, law in found]).reshape(-1, 3)
-    rows = np.array([axis @ motions[place] for axis, (place, _, _) in zip(axes, found, strict=True)]).reshape(-1, 6)
-    directions = np.zeros((3 * len(mounts), len(found)))
-    for n, (place, _, _) in enumerate(found):
+    springs = [(place, spring, law) for place, spring in every_spring(mounts) for law in spring.dynamic]
+    axes = np.array([spring.orientation[law.axis] for _, spring, law in springs]).reshape(-1, 3)
+    rows = np.array([axis @ motions[place] for axis, (place, _, _) in zip(axes, springs, strict=True)]).reshape(-1, 6)
+    directions = np.zeros((3 * len(mounts), len(springs)))
+    for n, (place, _, _) in enumerate(springs):
         directions[3 * place : 3 * place + 3, n] = axes[n]
-    return DynamicSprings(tuple(law for _, _, law in found), rows, directions)
+    return DynamicSprings(tuple(law for _, _, law in springs), rows, directions)

@@ -33,13 +33,13 @@ def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArra
     ModelError
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
-    gas, own, cycle, pace = _worked(gas, part, cycle)
+    gas, piston, cycle, pace = _worked(gas, part, cycle)
     angles = angles - part.swept.late
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles, pace)
     if isinstance(gas, Seiliger):
-        return seiliger_pressure(gas, own, cycle, pace * angles)
-    return wiebe_pressure(gas, own, cycle, pace * angles)
+        return seiliger_pressure(gas, piston, cycle, pace * angles)
+    return wiebe_pressure(gas, piston, cycle, pace * angles)
 
 
 def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChamber, SliderCrank, Cycle, float]:
@@ -93,11 +93,11 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[n
 
 
 def _breaks_of_one(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
-    gas, own, cycle, pace = _worked(gas, part, cycle)
+    gas, piston, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
         return np.array(gas.angles)
-    top, bottom = dead_centres(own)
+    top, bottom = dead_centres(piston)
     ends = [bottom - math.tau, top, bottom, top + math.tau]
     if isinstance(gas, Seiliger):
-        return np.array([*ends, cut_off_angle(gas, own, cycle)]) / pace
+        return np.array([*ends, cut_off_angle(gas, piston, cycle)]) / pace
     return np.array([*ends, gas.start, gas.start + gas.duration]) / pace

@@ -84,6 +84,6 @@ def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) ->
 
 def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: Array) -> Array:
     """Return the torque of a piston or one rotor chamber at crank angles after it fired [N m] (L5, Y4)."""
-    own, pace = part.swept.piston, part.swept.pace
-    alpha = own.fires_at + own.shaft.ratio * pace * since
-    return np.asarray(pace * own.shaft.ratio * thrust_at(gas, part, cycle, since) * own.velocity(np, alpha))
+    piston, pace = part.swept.piston, part.swept.pace
+    alpha = piston.fires_at + piston.shaft.ratio * pace * since
+    return np.asarray(pace * piston.shaft.ratio * thrust_at(gas, part, cycle, since) * piston.velocity(np, alpha))

@@ -104,8 +104,8 @@ def reduced(motion: Motion, with_rods: bool = True) -> tuple[Any, Any]:
     for mass, (_, velocity, acceleration) in motion.points:
         inertia = inertia + mass * np.abs(velocity) ** 2
         slope = slope + 2.0 * mass * (np.conj(velocity) * acceleration).real
-    for own, (rate, swing) in motion.swings if with_rods else ():
-        inertia, slope = inertia + own * rate**2, slope + 2.0 * own * rate * swing
+    for inertia_of_rod, (rate, swing) in motion.swings if with_rods else ():
+        inertia, slope = inertia + inertia_of_rod * rate**2, slope + 2.0 * inertia_of_rod * rate * swing
     return inertia, slope
 
 
@@ -161,19 +161,19 @@ CLOSED_FORMS: dict[type[SliderCrank], Callable[..., tuple[tuple[Effect, ...], tu
 
 def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
     needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
-    asked = fidelity.local_orders(part.shaft.ratio)
-    return needed if asked is None else min(needed, asked)
+    limit = fidelity.local_orders(part.shaft.ratio)
+    return needed if limit is None else min(needed, limit)
 
 
 def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
     # any mechanism; of two orders it has as many of each load as a slider-crank
     table = momentum_orders(part)
-    asked = fidelity.local_orders(part.shaft.ratio)
-    shape = part, fidelity.kinematics, asked
+    limit = fidelity.local_orders(part.shaft.ratio)
+    shape = part, fidelity.kinematics, limit
 
-    def series(row: int, few: int) -> Callable[[], ComplexArray]:
-        last = few if fidelity.kinematics == "two-order" else len(table[row]) - 1
-        return lambda: table[row, : min(last, last if asked is None else asked) + 1]
+    def series(row: int, count: int) -> Callable[[], ComplexArray]:
+        last = count if fidelity.kinematics == "two-order" else len(table[row]) - 1
+        return lambda: table[row, : min(last, last if limit is None else limit) + 1]
 
     masses = tuple(Effect(direction, 1.0, shape, series(direction, 2 + direction // 2)) for direction in Direction)
     return masses, (Effect(Direction.ROLL, 1.0, ("rod", shape), series(3, 1)),)

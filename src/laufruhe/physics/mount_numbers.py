@@ -116,8 +116,8 @@ def _turning(block: Block) -> Array:
 
 
 def _along(block: Block) -> Array:
-    found = np.linalg.cholesky(block.mass_matrix).T @ _turning(block)
-    return np.asarray(found / np.linalg.norm(found))
+    direction = np.linalg.cholesky(block.mass_matrix).T @ _turning(block)
+    return np.asarray(direction / np.linalg.norm(direction))
 
 
 def mass_root(block: Block) -> Array:

@@ -95,9 +95,9 @@ def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, hi
     return _fixed(np.concatenate([upper[:0:-1].conj(), upper]))
 
 
-def _fixed(found: ComplexArray) -> ComplexArray:
-    found.setflags(write=False)
-    return found
+def _fixed(coefficients: ComplexArray) -> ComplexArray:
+    coefficients.setflags(write=False)
+    return coefficients
 
 
 @lru_cache(maxsize=256)

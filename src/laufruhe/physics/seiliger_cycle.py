@@ -119,11 +119,11 @@ def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
     cut_off_ratio
         Volume at the cut-off over the smallest volume, 1 to the compression ratio.
     """
-    whole = gas.compression_ratio
-    compression = compression_end_pressure(gas) * _polytropic_work(whole, gas.compression_exponent)
-    expansion = cut_off_ratio * _polytropic_work(whole / cut_off_ratio, gas.expansion_exponent)
+    ratio = gas.compression_ratio
+    compression = compression_end_pressure(gas) * _polytropic_work(ratio, gas.compression_exponent)
+    expansion = cut_off_ratio * _polytropic_work(ratio / cut_off_ratio, gas.expansion_exponent)
     burning = gas.peak_pressure * (cut_off_ratio - 1.0 + expansion)
-    return (burning - compression) / (whole - 1.0) + gas_exchange_pressure(gas, cycle)
+    return (burning - compression) / (ratio - 1.0) + gas_exchange_pressure(gas, cycle)
 
 
 def _polytropic_work(ratio: float, exponent: float) -> float:

@@ -77,12 +77,12 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     -------
     Spectrum of shape (n, 6) [N, N m]; linear in the unbalances and their conjugates.
     """
-    return _turning_loads(_NOTHING, tuple(rotors), speed, cycle)
+    return _turning_loads(_BALANCED, tuple(rotors), speed, cycle)
 
 
 _Turning: TypeAlias = tuple[list[_Parts], tuple[int, ...]]
 """The wrench of each of some rotors, and the index of its order among those of a cycle."""
-_NOTHING: _Turning = ([], ())
+_BALANCED: _Turning = ([], ())
 
 
 def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> _Turning:
@@ -90,11 +90,11 @@ def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> _Turning:
 
 
 def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> Spectrum:
-    (wrenches, indices), (own, own_indices) = known, _turning(rotors, speed, cycle)
-    if not wrenches and not own:
+    (wrenches, indices), (turning, turning_indices) = known, _turning(rotors, speed, cycle)
+    if not wrenches and not turning:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    every = np.array(wrenches + own, dtype=complex)
-    return Spectrum(cycle.base_order, cancelling_sums(every, indices + own_indices))
+    every = np.array(wrenches + turning, dtype=complex)
+    return Spectrum(cycle.base_order, cancelling_sums(every, indices + turning_indices))
 
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:

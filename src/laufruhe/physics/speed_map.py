@@ -101,11 +101,11 @@ def speed_map(
     # inertia grows with the square of speed, gas does not
     growth = [np.asarray(speeds, dtype=float) ** 2, np.ones(len(speeds))][: len(spectra)]
     size = sum(np.abs(c).max(axis=1) * g.max(initial=0.0) for c, g in zip(padded, growth, strict=True))
-    kept = np.flatnonzero(size > minimum * np.max(size, initial=0.0))
+    indices = np.flatnonzero(size > minimum * np.max(size, initial=0.0))
     if wanted is not None:
-        kept = kept[orders_equal(kept * float(base), wanted)]
-    orders: Array = np.asarray(kept, dtype=float) * float(base)
-    parts = [c[kept] for c in padded]
+        indices = indices[orders_equal(indices * float(base), wanted)]
+    orders: Array = np.asarray(indices, dtype=float) * float(base)
+    parts = [c[indices] for c in padded]
     omegas = np.outer(speeds, orders).reshape(-1)
     drive = _over_speeds(growth, [mounting.drives(c) for c in parts]).reshape(-1, 6)
     forces = mounting.mount_forces(omegas, mounting.driven(omegas, drive))

@@ -34,7 +34,7 @@ def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Ef
     # load of equal effects of cylinders, by the orders of the cycle
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
-    sizes = np.array([own.size * square_of(part, speed) for part, (_, own) in zip(parts, members, strict=True)])
+    sizes = np.array([member.size * square_of(part, speed) for part, (_, member) in zip(parts, members, strict=True)])
     weights = sizes[:, None] * np.array([_weight(part, members[0][1].direction) for part in parts])
     turns = tuple([part.star_turn for part in parts])
     load = star_orders(weights, turns, len(series))

@@ -79,13 +79,13 @@ def case_wrench(block: Block, case: LoadCase) -> Array:
 
 def stops_of(mounting: ElasticMounting) -> Stops:
     """Return the stops of a mounting."""
-    found = every_spring(mounting.mounts)
-    rows = np.array([np.array(spring.orientation) @ mounting.motions[place] for place, spring in found])
-    directions = np.zeros((3 * len(mounting.mounts), 3 * len(found)))
-    for k, (place, spring) in enumerate(found):
+    springs = every_spring(mounting.mounts)
+    rows = np.array([np.array(spring.orientation) @ mounting.motions[place] for place, spring in springs])
+    directions = np.zeros((3 * len(mounting.mounts), 3 * len(springs)))
+    for k, (place, spring) in enumerate(springs):
         directions[3 * place : 3 * place + 3, 3 * k : 3 * k + 3] = np.array(spring.orientation).T
-    gaps = np.repeat([spring.stop_gap for _, spring in found], 3)
-    stiffness = np.repeat([spring.stop_stiffness for _, spring in found], 3)
+    gaps = np.repeat([spring.stop_gap for _, spring in springs], 3)
+    stiffness = np.repeat([spring.stop_stiffness for _, spring in springs], 3)
     return Stops(rows.reshape(-1, 6), gaps, np.where(np.isfinite(gaps), stiffness, 0.0), directions)
 
 

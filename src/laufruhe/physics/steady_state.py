@@ -106,11 +106,11 @@ def _over_period(
     )  # fmt: skip
 
 
-def integrated(*told: Any, **more: Any) -> Array:
+def integrated(*arguments: Any, **more: Any) -> Array:
     """Integrate by SciPy, which is loaded late, and return the states."""
     from scipy.integrate import solve_ivp
 
-    return np.asarray(solve_ivp(*told, **more).y)
+    return np.asarray(solve_ivp(*arguments, **more).y)
 
 
 def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: float, has_stops: bool) -> Array:
@@ -122,9 +122,9 @@ def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: flo
         gap = ends[:, 0] - start
         change = np.linalg.solve(np.eye(2 * count) - slope, gap)
         start = start + change
-        whole = max(np.abs(start).max(), size)
+        scale = max(np.abs(start).max(), size)
         # a gap of the integration's own rounding cannot be closed, only moved
-        if np.abs(change).max() <= CLOSED * whole or np.abs(gap).max() <= ROUNDING * tolerance * whole:
+        if np.abs(change).max() <= CLOSED * scale or np.abs(gap).max() <= ROUNDING * tolerance * scale:
             return start
     why = "the bump stops let no motion" if has_stops else "no motion was found to"
     raise SolverError(f"{why} repeat itself in one period; integrate a run-up instead")
@@ -153,7 +153,7 @@ class TimeMounting:
 
     mounting: ElasticMounting
     samples: int
-    _found: dict[tuple[int, float], tuple[Spectrum, SteadyState]] = field(default_factory=dict, repr=False)
+    _states: dict[tuple[int, float], tuple[Spectrum, SteadyState]] = field(default_factory=dict, repr=False)
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
         """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7).
@@ -172,10 +172,10 @@ class TimeMounting:
     def _state(self, wrench: Spectrum, speed: float) -> SteadyState:
         # forces and travel are of one integration; the wrench is kept, so that its id stays its own
         key = id(wrench), speed
-        if key not in self._found:
+        if key not in self._states:
             state = periodic_state(self.mounting, wrench, speed, self.samples, INTEGRATION)
-            self._found[key] = wrench, state
-        return self._found[key][1]
+            self._states[key] = wrench, state
+        return self._states[key][1]
 
 
 def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:

@@ -73,15 +73,15 @@ class TimeModel:
         """Return the forces on the mounts, shape (times, mounts, 3), of y and y' (n, times)."""
         out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
         if self.has_stops:
-            own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
-            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", own, self.turns))
+            forces = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
+            np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", forces, self.turns))
         return out
 
     def mount_travels(self, y: Array) -> Array:
         """Return the deflection of the mounts in the axes of C2, shape (times, mounts, 3), of y (n, times)."""
         first = np.unique(self.places, return_index=True)[1]
-        own = self.travels.reshape(len(self.turns), 3, -1)[first]
-        travels_in_c2 = np.einsum("mab,maj->mbj", self.turns[first], own).reshape(-1, self.size)
+        travels = self.travels.reshape(len(self.turns), 3, -1)[first]
+        travels_in_c2 = np.einsum("mab,maj->mbj", self.turns[first], travels).reshape(-1, self.size)
         return np.asarray((travels_in_c2 @ y).T.reshape(y.shape[1], -1, 3))
 
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
@@ -102,7 +102,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
     motions = mounting.motions @ root.T
     places, springs = zip(*every_spring(mounting.mounts), strict=True)
     turns = np.array([spring.orientation for spring in springs])
-    own = np.einsum("mab,mbj->maj", turns, motions[list(places)])
+    mount_motions = np.einsum("mab,mbj->maj", turns, motions[list(places)])
     spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
     lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
     drag = mounting.dampers @ motions + lossy
@@ -111,7 +111,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
         stiffness=root @ mounting.stiffness @ root.T,
         damping=np.einsum("mai,maj->ij", motions, drag),
         load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
-        travels=own.reshape(-1, 6),
+        travels=mount_motions.reshape(-1, 6),
         forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
         drag=drag.reshape(3 * mounts, 6),
         gaps=np.repeat([spring.stop_gap for spring in springs], 3),

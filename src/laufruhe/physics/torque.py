@@ -64,10 +64,10 @@ class TorqueFacts:
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
     """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1)."""
-    whole, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
+    total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
-    return {"gas": whole + _less(masses), "pistons": points, "rods": masses + _less(points), "all": whole}
+    return {"gas": total + _less(masses), "pistons": points, "rods": masses + _less(points), "all": total}
 
 
 def _less(torque: Spectrum) -> Spectrum:
@@ -115,8 +115,8 @@ def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fide
 
 @lru_cache(maxsize=256)
 def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
-    found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
-    series = found.with_finer_base(cycle.base_order).coefficients
+    torque = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
+    series = torque.with_finer_base(cycle.base_order).coefficients
     series.setflags(write=False)
     return series
 
@@ -204,17 +204,17 @@ class Swing:
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
     """Return work and inertia over the cycle; rotors, mounts and flywheel are not part of them."""
     bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, extras=(), geared=())
-    return _found_swing(bare, point, fidelity)
+    return _compute_swing(bare, point, fidelity)
 
 
 @lru_cache(maxsize=64)
-def _found_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Swing:
+def _compute_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Swing:
     torque, steps = gas_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
     angles = engine.cycle.angle * np.arange(steps) / steps
     work = torque.integral
     mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.kink_angles)
-    own, own_bent = (moving_inertia(engine, fidelity, at)[0] for at in (steady, bent))
-    return Swing(point.speed, mean, work.sample(steps), own, work.values(bent), own_bent)
+    steady_inertia, bent_inertia = (moving_inertia(engine, fidelity, at)[0] for at in (steady, bent))
+    return Swing(point.speed, mean, work.sample(steps), steady_inertia, work.values(bent), bent_inertia)
 
 
 def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
@@ -248,5 +248,5 @@ def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
         return fidelity.crank_inertia
     if engine.flywheel is not None:
         return engine.flywheel.inertia
-    told = (extra.turning_inertia(engine.slider_cranks) for extra in engine.extras)
-    return next((inertia for inertia in told if inertia is not None), None)
+    inertias = (extra.turning_inertia(engine.slider_cranks) for extra in engine.extras)
+    return next((inertia for inertia in inertias if inertia is not None), None)

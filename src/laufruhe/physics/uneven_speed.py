@@ -88,11 +88,11 @@ def _steps(engine: Engine, fidelity: Fidelity) -> Array:
 
 def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     # rotors and mounts do not move the crank; without them a motion is found once for all designs
-    return _found_turning(replace(engine, rotors=(), mounts=(), flywheel=None, geared=()), point, fidelity)
+    return _compute_turning(replace(engine, rotors=(), mounts=(), flywheel=None, geared=()), point, fidelity)
 
 
 @lru_cache(maxsize=32)
-def _found_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
+def _compute_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
     phi, torque = _steps(engine, fidelity), _alternating_torque(engine, point, fidelity)
     work, (inertia, _) = torque.integral.sample(fidelity.samples), _inertia(engine, fidelity, phi)
     start = start_energy(work, inertia, point.speed)

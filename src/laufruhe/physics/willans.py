@@ -46,7 +46,7 @@ class FrictionTest:
         Whether drag was measured over speed [Pa, rad/s]; else fuel, in any unit, over brake mean pressure [Pa].
     x, y
         Of every reading.
-    asked
+    target
         Speed [rad/s], or brake mean pressure [Pa], that is asked for.
     friction, deviations
         Told by the line, and how many deviations are looked at to either side.
@@ -56,15 +56,15 @@ class FrictionTest:
     is_motored: bool
     x: tuple[float, ...]
     y: tuple[float, ...]
-    asked: float
+    target: float
     friction: Friction
     deviations: float
 
     @property
     def line(self) -> tuple[float, float]:
         """Intercept and slope of y over x."""
-        found = _line(self.x, self.y, "reading")
-        return found.intercept, found.slope
+        fit = _line(self.x, self.y, "reading")
+        return fit.intercept, fit.slope
 
 
 @dataclass(frozen=True)
@@ -124,12 +124,12 @@ def _line(x: Sequence[float], y: Sequence[float], what: str) -> _Line:
     if any(b - a <= SAME * size for a, b in pairwise(places)):
         raise ModelError(f"one {what} stands there twice; give the mean of what was measured at it")
     # about the middle, where both are independent of each other
-    middle, given = float(np.mean(x)), np.asarray(y, dtype=float)
-    apart = np.asarray(x, dtype=float) - middle
-    spread = float(apart @ apart)
-    slope = float(apart @ given) / spread
-    rest = given - given.mean() - slope * apart
-    scatter = float(rest @ rest) / (len(given) - 2)
-    steep, level = scatter / spread, scatter / len(given)
+    middle, readings = float(np.mean(x)), np.asarray(y, dtype=float)
+    centred = np.asarray(x, dtype=float) - middle
+    spread = float(centred @ centred)
+    slope = float(centred @ readings) / spread
+    rest = readings - readings.mean() - slope * centred
+    scatter = float(rest @ rest) / (len(readings) - 2)
+    steep, level = scatter / spread, scatter / len(readings)
     covariance = np.array([[level + middle**2 * steep, -middle * steep], [-middle * steep, steep]])
-    return _Line(float(given.mean()) - slope * middle, slope, covariance)
+    return _Line(float(readings.mean()) - slope * middle, slope, covariance)

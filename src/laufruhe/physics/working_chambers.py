@@ -43,11 +43,11 @@ def chambers_breaks(gas: Chambers, part: SliderCrank) -> Array:
 def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
     """Return the absolute pressure [Pa], at a jump the mean of both sides, shape of `angles`."""
 
-    def at(own: Array) -> Array:
+    def at(angles: Array) -> Array:
         smallest, largest = _ends(chamber, part)
-        local = np.mod(own - smallest, math.tau)
+        local = np.mod(angles - smallest, math.tau)
         pressures = PRESSURES[type(chamber.diagram)]
-        return pressures(chamber.diagram, chamber_travel(chamber, part, own), local < largest - smallest, local)
+        return pressures(chamber.diagram, chamber_travel(chamber, part, angles), local < largest - smallest, local)
 
     return 0.5 * (at(angles - JUMP_WIDTH) + at(angles + JUMP_WIDTH))
 

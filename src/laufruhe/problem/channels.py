@@ -368,7 +368,9 @@ IRREGULARITY = _of_wheel(
     depends_on_torque=True,
 )
 FLYWHEEL_INERTIA = _of_wheel("flywheel inertia", "kg m^2", lambda wheel, _: wheel.inertia)
-FLYWHEEL_MASS = _of_wheel("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
+FLYWHEEL_MASS = _of_wheel(
+    "flywheel mass", "kg", lambda wheel, _: wheel.ring.mass_ratio * wheel.ring.mass, needs=Needs.RIM
+)
 RIM_STRESS = _of_wheel("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), _AT_POINTS, Needs.RIM)
 ARM_STRESS = _of_wheel(
     "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), _AT_POINTS, Needs.ARMS

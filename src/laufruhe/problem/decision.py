@@ -15,7 +15,7 @@ import numpy as np
 
 from laufruhe.extension import extended
 from laufruhe.machine import Engine, Flywheel, Mount
-from laufruhe.machine.leads import led
+from laufruhe.machine.leads import with_leads
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
@@ -158,7 +158,7 @@ class Numbers:
             changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
             engine = extra.move(engine, changes, base.slider_cranks)
         leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
-        return led(engine, leads) if leads else engine
+        return with_leads(engine, leads) if leads else engine
 
     def flywheel(self, base: Flywheel) -> Flywheel:
         """Return a flywheel with these numbers."""

@@ -56,7 +56,7 @@ class Rotary(Inline):
             raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(said))
         return Cycle.TWO_STROKE
 
-    def mechanism(self, own: Mapping[str, Any], **shared: Any) -> RotorMechanism:
+    def mechanism(self, options: Mapping[str, Any], **shared: Any) -> RotorMechanism:
         """Return rotor and eccentric.
 
         Raises
@@ -65,16 +65,16 @@ class Rotary(Inline):
             If the rotor cannot turn, or has no mass.
         """
         for key in ("eccentricity", "rotor_radius", "rotor_width", "rotor_mass"):
-            if own[key] is None:
+            if options[key] is None:
                 raise KeyedError(key, "is missing; add it")
-        shortest, radius = FLANKS * own["eccentricity"], own["rotor_radius"]
+        shortest, radius = FLANKS * options["eccentricity"], options["rotor_radius"]
         if radius <= shortest:
             limit = units.quantity_text(shortest, "m")
             rule = f"does not let the rotor turn, it must be over three eccentricities, {limit}"
             raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.quantity_text(radius, "m"))
         return RotorMechanism(
-            own["eccentricity"], math.inf, 0.0, rod_rotating_mass=own["rotor_mass"], rotor_radius=radius,
-            rotor_width=own["rotor_width"], rotor_inertia=own["rotor_inertia"], **shared,
+            options["eccentricity"], math.inf, 0.0, rod_rotating_mass=options["rotor_mass"], rotor_radius=radius,
+            rotor_width=options["rotor_width"], rotor_inertia=options["rotor_inertia"], **shared,
         )  # fmt: skip
 
 

@@ -17,12 +17,12 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class Yoke(Mechanism):
-    """Numbers that all yokes of an engine share; `own` are fields of `SwingingYoke` that a slider-crank has not."""
+    """Numbers that all yokes of an engine share; `options` are fields of `SwingingYoke` that a slider-crank has not."""
 
-    own: Mapping[str, float]
+    options: Mapping[str, float]
 
     def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
-        return SwingingYoke(**numbers_of(plain) | dict(self.own))
+        return SwingingYoke(**numbers_of(plain) | dict(self.options))
 
 
 class SwingingYokeDrive(DriveKind):
@@ -43,7 +43,7 @@ class SwingingYokeDrive(DriveKind):
 
     def radius(self, sizes: Sizes) -> float:
         """Return the crank radius, e sin of half the angle that the slow stroke is over half a turn [m]."""
-        numbers = sizes.own
+        numbers = sizes.options
         pivot, ratio, length = numbers["pivot_distance"], numbers["return_ratio"], numbers["lever_length"]
         if pivot is None:
             raise KeyedError("pivot_distance", "is missing; add the distance between crank and pivot")
@@ -63,7 +63,7 @@ class SwingingYokeDrive(DriveKind):
 
     def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
         """Return the mechanism with the lever, its weight, and the ram's path."""
-        numbers, pivot = sizes.own, sizes.own["pivot_distance"]
+        numbers, pivot = sizes.options, sizes.options["pivot_distance"]
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
         if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:
             raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
@@ -76,7 +76,7 @@ class SwingingYokeDrive(DriveKind):
             names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
             of_lever |= {name: numbers["lever"][key] for key, name in names.items()}
         shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
-        return Yoke(**shared | {"offset": 0.0}, own=of_lever)
+        return Yoke(**shared | {"offset": 0.0}, options=of_lever)
 
 
 SWINGING_YOKE = SwingingYokeDrive()

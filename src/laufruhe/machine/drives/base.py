@@ -21,7 +21,7 @@ class Sizes:
     ----------
     rod_length, rod_ratio
         One of them, of a drive that has a rod.
-    own
+    options
         The drive's own keys, None where left out.
     """
 
@@ -29,7 +29,7 @@ class Sizes:
     offset: float
     rod_length: float | None
     rod_ratio: float | None
-    own: Mapping[str, Any]
+    options: Mapping[str, Any]
 
 
 class DriveKind(ABC):

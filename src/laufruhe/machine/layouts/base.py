@@ -48,7 +48,7 @@ class LayoutInput:
 
     Attributes
     ----------
-    own
+    options
         The layout's own keys in SI, None where left out or open.
     piston_mass
         Reciprocating mass without the share of `rod` [kg].
@@ -61,7 +61,7 @@ class LayoutInput:
     cycle: Cycle
     cylinders: int
     mechanism: Mechanism
-    own: Mapping[str, Any]
+    options: Mapping[str, Any]
     firing_order: tuple[int, ...] | None = None
     piston_mass: float = 0.0
     rod: Rod | None = None
@@ -69,10 +69,10 @@ class LayoutInput:
 
     def spacing(self, places: int) -> float:
         """Return the distance between neighbouring places along the crank [m]; 1 for a single place."""
-        given = self.own["cylinder_spacing"]
-        if given is None and places > 1:
+        distance = self.options["cylinder_spacing"]
+        if distance is None and places > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
-        return 1.0 if given is None else float(given)
+        return 1.0 if distance is None else float(distance)
 
 
 def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:
@@ -121,18 +121,18 @@ class LayoutKind(ABC):
 
     def takes(self, key: str) -> bool:
         """Return True if a key means anything here."""
-        return key in self.lists or any(own.name == key for own in self.keys)
+        return key in self.lists or any(layout_key.name == key for layout_key in self.keys)
 
     def cycle(self, said: Cycle) -> Cycle:
         """Return the cycle in which loads repeat, of the cycle of the chambers (C6)."""
         return said
 
-    def mechanism(self, own: Mapping[str, Any], **shared: Any) -> Mechanism:
+    def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:
         """Return the shared numbers of cylinders of a layout without pistons.
 
         Parameters
         ----------
-        own
+        options
             As in `LayoutInput`.
         shared
             What [engine] says of all mechanisms: `rotating_mass` and `big_end`.

@@ -39,10 +39,10 @@ class Boxer(LayoutKind):
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Banks at 180 degrees."""
-        if inputs.own["bank_stagger"] is None:
+        if inputs.options["bank_stagger"] is None:
             raise KeyedError("bank_stagger", "is missing; add the distance between opposed cylinders")
         return boxer(
             inputs.cylinders,
             inputs.spacing(inputs.cylinders // self.banks),
-            inputs.own["bank_stagger"],
+            inputs.options["bank_stagger"],
         )

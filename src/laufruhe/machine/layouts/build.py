@@ -89,7 +89,7 @@ class Mechanism:
 
 def numbers_of(plain: SliderCrank) -> dict[str, Any]:
     """Return the fields of a slider-crank, to construct a mechanism that has more."""
-    return {own.name: getattr(plain, own.name) for own in fields(plain)}
+    return {number.name: getattr(plain, number.name) for number in fields(plain)}
 
 
 def firing_angles(
@@ -225,7 +225,7 @@ def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) ->
         Throw(
             x,
             angles[pin],
-            tuple(k for k, own in enumerate(layout.pins) if own == pin),
+            tuple(k for k, pin_throw in enumerate(layout.pins) if pin_throw == pin),
             mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
         )
         for pin, x in enumerate(layout.throw_positions)

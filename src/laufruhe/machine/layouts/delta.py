@@ -114,7 +114,7 @@ class Delta(LayoutKind):
         )
 
     def _triangle(self, inputs: LayoutInput) -> Triangle:
-        if inputs.own["crank_distance"] is None:
+        if inputs.options["crank_distance"] is None:
             raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
         if inputs.cycle is not Cycle.TWO_STROKE:
             rule = 'has ports in a triangle of cranks, which work every turn; write "two-stroke"'
@@ -122,36 +122,36 @@ class Delta(LayoutKind):
         if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
             raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
-        reversed_one = inputs.own["reversed_crank"] or 0
+        reversed_one = inputs.options["reversed_crank"] or 0
         if reversed_one > 3:
             raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))
         ratios = _RATIOS[reversed_one]
-        given = inputs.own["crank_leads"]
-        if given is not None and len(given) != 2:
-            raise KeyedError("crank_leads", f"has {len(given)} angles; give those of two banks, the third follows")
-        first, second = map(as_turn, given) if given is not None else (equal_lead(ratios),) * 2
-        return Triangle(inputs.own["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
+        leads = inputs.options["crank_leads"]
+        if leads is not None and len(leads) != 2:
+            raise KeyedError("crank_leads", f"has {len(leads)} angles; give those of two banks, the third follows")
+        first, second = map(as_turn, leads) if leads is not None else (equal_lead(ratios),) * 2
+        return Triangle(inputs.options["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the pistons at the first corners of the banks, then at the second, and the throws of all cranks."""
         triangle, mechanism = self._triangle(inputs), inputs.mechanism
-        found: list[SliderCrank] = []
+        pistons: list[SliderCrank] = []
         cranks: list[Throw] = []
         for turned in (0, 1):
             for bank in range(3):
                 corner = (bank + turned) % 3
                 for row, x in enumerate(layout.throw_positions):
-                    found.append(_piston(triangle, corner, bank, x, throws[row], inputs, len(found) + 1))
+                    pistons.append(_piston(triangle, corner, bank, x, throws[row], inputs, len(pistons) + 1))
         for shaft in triangle.shafts:
             for x in layout.throw_positions:
-                own = tuple(k for k, part in enumerate(found) if part.shaft == shaft and part.x == x)
-                angle = found[own[0]].throw
+                piston_numbers = tuple(k for k, part in enumerate(pistons) if part.shaft == shaft and part.x == x)
+                angle = pistons[piston_numbers[0]].throw
                 unbalance = mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angle))
-                cranks.append(Throw(x, angle, own, unbalance, shaft))
-        _check_order(inputs.firing_order, found[: inputs.cylinders])
-        return tuple(found), tuple(cranks)
+                cranks.append(Throw(x, angle, piston_numbers, unbalance, shaft))
+        _check_order(inputs.firing_order, pistons[: inputs.cylinders])
+        return tuple(pistons), tuple(cranks)
 
 
 def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> None:
@@ -161,8 +161,8 @@ def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> 
         reduced_turn(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order
     ]
     if turns != sorted(turns):
-        told = sorted(range(len(firsts)), key=lambda k: firsts[k].firing_angle)
-        raise ModelError(f"these throws fire in the order {[k + 1 for k in told]}, not {list(order)}")
+        fired = sorted(range(len(firsts)), key=lambda k: firsts[k].firing_angle)
+        raise ModelError(f"these throws fire in the order {[k + 1 for k in fired]}, not {list(order)}")
 
 
 def _piston(

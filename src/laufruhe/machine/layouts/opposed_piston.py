@@ -84,21 +84,21 @@ class OpposedPiston(Inline):
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the lower pistons, then the upper ones, and the throws of both cranks."""
         lower, cranks = super().parts(inputs, layout, throws)
-        distance, lead = inputs.own["crank_distance"], inputs.own["crank_lead"]
+        distance, lead = inputs.options["crank_distance"], inputs.options["crank_lead"]
         if distance is None:
             raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
-        ports = inputs.own["port_arc"]
+        ports = inputs.options["port_arc"]
         if ports is not None and abs(lead) >= ports:
             rule = f"is beyond the ports, which are open for {units.quantity_text(ports, 'rad')} and never together"
             raise KeyedError("crank_lead", f"{rule}; lessen it", units.quantity_text(lead, "rad"))
         if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
             raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
-        crank = Shaft("second crankshaft", float(inputs.own["crank_ratio"] or -1), 0.0, distance)
+        crank = Shaft("second crankshaft", float(inputs.options["crank_ratio"] or -1), 0.0, distance)
         upper = facing_pistons(lower, crank, lead, inputs.mechanism.rotating_mass)
-        own = inputs.own["second_reciprocating_mass"]
-        if own is not None:
-            heavier = own - inputs.piston_mass
+        second_mass = inputs.options["second_reciprocating_mass"]
+        if second_mass is not None:
+            heavier = second_mass - inputs.piston_mass
             upper = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + heavier) for part in upper)
         above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
         return (*lower, *upper), (*cranks, *above)

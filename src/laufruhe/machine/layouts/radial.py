@@ -138,30 +138,34 @@ def _master_rod(inputs: LayoutInput) -> MasterRod:
     KeyedError
         If it contradicts itself.
     """
-    own, count = inputs.own, inputs.cylinders
-    radius, master, given = own["knuckle_radius"], own["master_cylinder"] or 1, own["knuckle_angles"]
+    options, count = inputs.options, inputs.cylinders
+    radius, master, knuckle_angles = (
+        options["knuckle_radius"],
+        options["master_cylinder"] or 1,
+        options["knuckle_angles"],
+    )
     if radius is None:
         raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
     if math.isinf(inputs.mechanism.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
     if master > count:
         raise KeyedError("master_cylinder", f"is none of {count} cylinders; count them from 1", str(master))
-    if inputs.rod is not None and own["articulated_rod"] is None:
+    if inputs.rod is not None and options["articulated_rod"] is None:
         raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
     banks = _banks(count)
-    if given is not None and len(given) != count - 1:
-        rule = f"has {counted(len(given), 'angle')} for {counted(count - 1, 'articulated rod')}"
+    if knuckle_angles is not None and len(knuckle_angles) != count - 1:
+        rule = f"has {counted(len(knuckle_angles), 'angle')} for {counted(count - 1, 'articulated rod')}"
         raise KeyedError("knuckle_angles", f"{rule}; give one each, by cylinder")
     even = [bank - banks[master - 1] for bank in banks]
-    angles = even if given is None else [*given[: master - 1], 0.0, *given[master - 1 :]]
+    angles = even if knuckle_angles is None else [*knuckle_angles[: master - 1], 0.0, *knuckle_angles[master - 1 :]]
     return MasterRod(
         **{shared.name: getattr(inputs.mechanism, shared.name) for shared in fields(inputs.mechanism)},
         master=master,
         master_bank=banks[master - 1],
         knuckle_radius=radius,
         knuckle_angles=tuple(angles),
-        length=own["articulated_rod_length"],
+        length=options["articulated_rod_length"],
         piston_mass=inputs.piston_mass,
-        knuckle_mass=own["knuckle_mass"],
-        rod=own["articulated_rod"],
+        knuckle_mass=options["knuckle_mass"],
+        rod=options["articulated_rod"],
     )

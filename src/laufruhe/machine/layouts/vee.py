@@ -57,14 +57,14 @@ class Vee(LayoutKind):
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Return two banks on shared or split pins."""
-        own = inputs.own
-        if own["bank_angle"] is None:
+        options = inputs.options
+        if options["bank_angle"] is None:
             raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
-        split, stagger = own["split_pin_angle"] or 0.0, own["bank_stagger"] or 0.0
+        split, stagger = options["split_pin_angle"] or 0.0, options["bank_stagger"] or 0.0
         return vee(
             inputs.cylinders,
             inputs.spacing(inputs.cylinders // self.banks),
-            own["bank_angle"],
+            options["bank_angle"],
             split,
             stagger,
         )

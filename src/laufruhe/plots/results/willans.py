@@ -42,12 +42,12 @@ def _fuelled(axes: Axes, test: FrictionTest) -> None:
     """Draw fuel over brake mean pressure: the line reaches zero fuel at the friction."""
     (intercept, slope), friction = test.line, test.friction
     x, y = BAR * np.array(test.x), np.array(test.y)
-    ends = np.array([-friction.mean, max(*test.x, test.asked)])
+    ends = np.array([-friction.mean, max(*test.x, test.target)])
     axes.plot(BAR * ends, intercept + slope * ends, color=SKY, linewidth=1.6)
     axes.plot(x, y, "o", color=INK, markersize=5.0)
     room = BAR * test.deviations * friction.deviation
     axes.errorbar(-BAR * friction.mean, 0.0, xerr=room, color=AFTER, capsize=4.0, linewidth=1.8)
-    axes.plot(BAR * test.asked, intercept + slope * test.asked, "D", color=AFTER, markersize=6.0)
+    axes.plot(BAR * test.target, intercept + slope * test.target, "D", color=AFTER, markersize=6.0)
     axes.axhline(0.0, color=INK, linewidth=0.8)
     axes.margins(0.06)
     axes.set(xlabel=f"brake mean pressure at {test.at} [bar]", ylabel="fuel, as measured")
@@ -55,10 +55,12 @@ def _fuelled(axes: Axes, test: FrictionTest) -> None:
 
 def _motored(axes: Axes, test: FrictionTest) -> None:
     (intercept, slope), friction = test.line, test.friction
-    ends = np.array([min(*test.x, test.asked), max(*test.x, test.asked)])
+    ends = np.array([min(*test.x, test.target), max(*test.x, test.target)])
     axes.plot(RPM * ends, BAR * (intercept + slope * ends), color=SKY, linewidth=1.6)
     axes.plot(RPM * np.array(test.x), BAR * np.array(test.y), "o", color=INK, markersize=5.0)
     room = BAR * test.deviations * friction.deviation
-    axes.errorbar(RPM * test.asked, BAR * friction.mean, yerr=room, color=AFTER, capsize=4.0, linewidth=1.8, marker="D")
+    axes.errorbar(
+        RPM * test.target, BAR * friction.mean, yerr=room, color=AFTER, capsize=4.0, linewidth=1.8, marker="D"
+    )
     axes.margins(0.06)
     axes.set(xlabel=f"speed, asked for at {test.at} [rpm]", ylabel="drag [bar]")
