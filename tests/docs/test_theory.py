@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from laufruhe.extensions.torsion.machine import Disc, Section, Torsion
+from laufruhe.extensions.torsion.machine import Disc, ShaftSection, Torsion
 from laufruhe.extensions.torsion.physics import critical_speed, natural_modes
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.physics.bearing_loads import beam_shares, lever_shares
@@ -92,7 +92,7 @@ def torque_of_a_cylinder() -> list[str]:
 
 
 def mode_of_two_discs() -> list[str]:
-    chain = Torsion(discs=(Disc("crank", 0.05), Disc("flywheel", 0.5)), sections=(Section("shaft", 1e5),))
+    chain = Torsion(discs=(Disc("crank", 0.05), Disc("flywheel", 0.5)), sections=(ShaftSection("shaft", 1e5),))
     modes = natural_modes(chain)
     assert modes.shapes[:, 0] == pytest.approx([1.0, -0.1])
     (frequency,) = modes.frequencies

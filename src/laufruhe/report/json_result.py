@@ -145,7 +145,10 @@ def _point(result: Result, k: int) -> Record:
         "mounts": [],
         **{places.key: _places(result, k, places.channel) for places in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
-        "torque": asdict(torque_facts(final.engine, point, result.problem.fidelity)),
+        "torque": _attributes(
+            torque_facts(final.engine, point, result.problem.fidelity),
+            "mean power least=minimum largest excursion irregularity",
+        ),
     }
 
 

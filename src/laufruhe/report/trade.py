@@ -131,7 +131,7 @@ def as_json(trade: Trade) -> str:
         "reference": {"objective": trade.value, "optimum": trade.optimum},
         "uneven_speed": trade.flywheel and dict(zip(("crank_inertia", "change"), trade.flywheel, strict=True)),
         "time_domain": trade.time_domain and asdict(trade.time_domain),
-        "rows": [asdict(row) for row in trade.rows],
+        "rows": [{"excess" if key == "violation" else key: value for key, value in asdict(row).items()} for row in trade.rows],
     })  # fmt: skip
 
 
