@@ -98,7 +98,7 @@ def test_mounts_over_two_points_are_weighted() -> None:
 
 
 def test_every_key_is_explained() -> None:
-    text = (Path(__file__).parents[2] / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "reference" / "result-json.md").read_text(encoding="utf-8")
     written = parsed(scenes.solved(scenes.TIGHT))
     keys = {*written, *written["objective"], *written["certificate"], *written["constraints"][0], *written["mounts"][0]}
     keys |= {*written["shaking"], *written["points"][0], *next(iter(written["decisions"].values()))}

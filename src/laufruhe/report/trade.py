@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from typing import Any
 
 from laufruhe.errors import counted
 from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
@@ -131,8 +132,12 @@ def as_json(trade: Trade) -> str:
         "reference": {"objective": trade.value, "optimum": trade.optimum},
         "uneven_speed": trade.flywheel and dict(zip(("crank_inertia", "change"), trade.flywheel, strict=True)),
         "time_domain": trade.time_domain and asdict(trade.time_domain),
-        "rows": [{"excess" if key == "violation" else key: value for key, value in asdict(row).items()} for row in trade.rows],
+        "rows": [_row_record(row) for row in trade.rows],
     })  # fmt: skip
+
+
+def _row_record(row: TradeRow) -> dict[str, Any]:
+    return {"excess" if key == "violation" else key: value for key, value in asdict(row).items()}
 
 
 def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
