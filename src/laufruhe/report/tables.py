@@ -212,7 +212,7 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
     for x, y in zip(test.x, test.y, strict=True):
         places = (none, RPM * x, none, y) if test.is_motored else (x, none, y, none)
         yield [test.at, "measured", *places, intercept + slope * x, none]
-    target, line = test.target, intercept + slope * test.asked
+    target, line = test.target, intercept + slope * test.target
     yield [test.at, "requested", *((none, RPM * target) if test.is_motored else (target, none)), none, none, line, none]
     told = (none, RPM * target, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
     yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
