@@ -216,7 +216,7 @@ def test_what_follows_from_the_rest_tells_no_ends_apart():
     )  # fmt: skip
     starts = [np.array([1.0, sign]) for sign in (1.5, -1.5)]
     apart, same = (
-        solve_nonlinear(replace(program, deciding=count), starts, workers=1, stop_when=lambda optima: False)
+        solve_nonlinear(replace(program, leading_variables=count), starts, workers=1, stop_when=lambda optima: False)
         for count in (None, 1)
     )
     assert [o.starts for o in apart] == [1, 1]
