@@ -1,4 +1,4 @@
-"""Errors that a user can act on: what, where, which rule, and the remedy."""
+"""Errors with a remedy for the user: place, value, broken rule and remedy in one line."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ from numbers import Integral
 
 
 def printed(text: str, maximum: int = 2000) -> str:
-    """Return one line with escapes for characters that are not printed, cut if it is long."""
-    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:maximum])
-    return shown if len(text) <= maximum and len(shown) <= maximum else shown[: maximum - 3] + "..."
+    """Return a text as one line, with escapes for characters that cannot be printed, cut after `maximum` characters."""
+    escaped = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:maximum])
+    return escaped if len(text) <= maximum and len(escaped) <= maximum else escaped[: maximum - 3] + "..."
 
 
 def plural(name: str, count: int) -> str:
-    """Return a noun in the form that follows a number."""
+    """Return a noun in the singular for one and in the plural for other numbers."""
     return name if count == 1 else f"{name}s"
 
 
 def counted(count: int, name: str) -> str:
-    """Return a number with its noun: 1 cylinder, 4 cylinders."""
+    """Return a number with its noun, such as 1 cylinder or 4 cylinders."""
     return f"{count} {plural(name, count)}"
 
 
 class LaufruheError(Exception):
-    """Base of every error this package raises on purpose."""
+    """Base of all errors that this package raises on purpose."""
 
 
 class ModelError(LaufruheError, ValueError):
-    """Machine that cannot exist or cannot run as described; `where` is the key to blame, if known."""
+    """Machine that cannot exist or cannot run as described; `where` is the key at fault, empty if unknown."""
 
     def __init__(self, text: str, where: str = "") -> None:
         self.where = where
@@ -36,7 +36,10 @@ class ModelError(LaufruheError, ValueError):
 
 
 class KeyedError(ModelError):
-    """Machine that cannot exist, with the key of [engine] to blame and its value; rule, and remedy after '; '."""
+    """Machine that cannot exist, with the key of [engine] at fault and its value.
+
+    The text consists of rule and remedy, separated by '; '.
+    """
 
     def __init__(self, key: str, text: str, value: str = "") -> None:
         self.key, self.text, self.value = key, text, value
@@ -48,7 +51,7 @@ class KeyedError(ModelError):
 
 @dataclass(frozen=True)
 class Complaint:
-    """Fault of an input: place, value, rule and remedy; all text can be printed."""
+    """Fault of an input, with place, value (may be empty), rule and remedy."""
 
     where: str
     value: str
@@ -56,22 +59,25 @@ class Complaint:
     remedy: str = ""
 
     def __str__(self) -> str:
-        shown = f" = {printed(self.value, 300)}" if self.value else ""
+        value = f" = {printed(self.value, 300)}" if self.value else ""
         remedy = f"; {printed(self.remedy, 400)}" if self.remedy else ""
-        return f"{printed(self.where, 120)}{shown}: {printed(self.rule, 300)}{remedy}"
+        return f"{printed(self.where, 120)}{value}: {printed(self.rule, 300)}{remedy}"
 
     @classmethod
     def from_error(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
-        """Return the complaint of an error, whose text is a rule and a remedy after '; '; `remedy` is the default."""
+        """Return the complaint for an error whose text is a rule, perhaps with a remedy after '; '.
+
+        `where`, `value` and `remedy` are defaults for errors without them.
+        """
         text = str(error)
         if isinstance(error, KeyedError):
             where, value, text = error.where, error.value, error.text
-        rule, _, own = text.partition("; ")
-        return cls(where, value, rule, own or remedy)
+        rule, _, own_remedy = text.partition("; ")
+        return cls(where, value, rule, own_remedy or remedy)
 
 
 class InputError(LaufruheError, ValueError):
-    """Bad input: one line a complaint, each with the name of its file."""
+    """Faulty input; its text has one line for each complaint, with the name of the file."""
 
     def __init__(self, source: str, complaints: tuple[Complaint, ...]) -> None:
         self.source = source
@@ -88,7 +94,7 @@ class LaufruheWarning(UserWarning):
 
 
 class UncarriedLoadError(ModelError):
-    """The engine excites a direction that no mount carries."""
+    """Load of the engine in a direction that no mount carries."""
 
     def __init__(self, text: str) -> None:
         super().__init__(text, "mounts")
@@ -99,7 +105,7 @@ class SolverError(LaufruheError, RuntimeError):
 
 
 class BoundError(LaufruheError, RuntimeError):
-    """Contradiction of a bound and a known design, one of which is wrong.
+    """Lower bound above the value of a known design; one of the two is wrong.
 
     Attributes
     ----------
@@ -119,17 +125,17 @@ class BoundError(LaufruheError, RuntimeError):
 
 
 def refused(where: str, value: str, rule: str, remedy: str, source: object = "laufruhe") -> InputError:
-    """Return an error with one complaint about a file."""
+    """Return an `InputError` with one complaint; `source` is the name of the file."""
     return InputError(str(source), (Complaint(where, value, rule, remedy),))
 
 
 def wrong_call(where: str, argument: object, rule: str, remedy: str) -> InputError:
-    """Return the error of a wrong argument of a Python call."""
+    """Return an `InputError` about a wrong argument of a Python call."""
     return refused(where, printed(repr(argument), 60), rule, remedy)
 
 
 def check_integer(where: str, argument: object, lower: int, upper: float = math.inf) -> None:
-    """Refuse an argument that is no whole number between two bounds."""
+    """Raise `InputError` unless an argument is a whole number between two bounds."""
     if isinstance(argument, bool) or not isinstance(argument, Integral) or not lower <= int(argument) <= upper:
         span = f"{lower} or more" if upper == math.inf else f"{lower} to {upper}"
         raise wrong_call(where, argument, f"must be a whole number, {span}", "give one")

@@ -1,8 +1,8 @@
-"""Extensions: additions to the tables of the core.
+"""Extensions: packages that add objects to the tables of the core, such as channels, layouts or solvers.
 
-Those of this package are the folders of `laufruhe.extensions`; the core runs without each of them. Another installed
-package names an `Extension` as an entry point of the group `laufruhe.extensions`. Objects are imported when the table
-that they belong to is made, so that each of their modules imports no more than the room of that table.
+The extensions of this package are the folders of `laufruhe.extensions`; the core runs without any of them. Other
+packages name an `Extension` as an entry point of the group `laufruhe.extensions`. The objects of a table are imported
+at its first use.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Tables = Literal[
 
 @dataclass(frozen=True)
 class Extension:
-    """Objects that a package adds to the tables, each by its name `module:attribute`.
+    """Objects that a package adds to the tables of the core, each by its address `module:attribute`.
 
     Attributes
     ----------
@@ -38,8 +38,8 @@ class Extension:
     channels
         Objects of `laufruhe.problem.channels.Channel`.
     dependences
-        Lines of the table in `laufruhe.problem.dependence`, about these channels and kinds; a channel without one is
-        unknown to every bound, and decided locally.
+        Lines of the table in `laufruhe.problem.dependence` for these channels and kinds. Without a line no bound is
+        known, and problems with the channel are solved locally.
     kinds
         Objects of `laufruhe.problem.decision.Kind`: kinds of numbers that may be open.
     layouts
@@ -47,21 +47,21 @@ class Extension:
     drives
         Objects of `laufruhe.machine.drives.DriveKind`.
     methods
-        Objects of `laufruhe.solvers.method.Method`: rows of the table of methods, each before the one that it names.
+        Objects of `laufruhe.solvers.method.Method`; each is tried before the method that it names.
     quantities
-        Objects of `laufruhe.files.quantities.Quantity`: decisions that several numbers of the file follow.
+        Objects of `laufruhe.files.quantities.Quantity`: numbers that determine several numbers of the file.
     provers
         Objects of `laufruhe.prove.mounts.provers.Prover`: bounds of designs on open mounts.
     reductions
-        Objects of `laufruhe.solvers.methods.Reduction`, each with the one that it stands before.
+        Objects of `laufruhe.solvers.methods.Reduction`; each is applied before the reduction that it names.
     study_kinds
         Subclasses of `laufruhe.studies.part.Part`.
     commands
-        Objects of `typer.models.CommandInfo`; their modules are imported by `laufruhe --help`, so they import little.
+        Objects of `typer.models.CommandInfo`; `laufruhe --help` imports their modules, so these should import little.
     keys
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
     notes
-        Objects of `laufruhe.files.problem_file.Note`: what a file may write at any number.
+        Objects of `laufruhe.files.problem_file.Note`: notes that a file may add to any number, such as tolerances.
     sections
         Objects of `laufruhe.report.section.Section`: tables and numbers of a result.
     pictures
@@ -108,34 +108,34 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     "drives": {"swinging-yoke": "swinging_yoke"},
     "channels": dict.fromkeys(_OF_SIZES, "sizes"),
 }
-"""Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
+"""Extensions of this package by the names that they add to tables, for the complaint if one is not installed."""
 INSTALL = "install laufruhe with all its folders"
 
 
 def lack(extension: str) -> tuple[str, str]:
-    """Return rule and remedy of what needs an extension of this package that is not there."""
+    """Return rule and remedy for a file that needs an extension of this package that is not installed."""
     return f"needs the extension '{extension}', which is not installed", INSTALL
 
 
 @cache
 def extensions() -> tuple[Extension, ...]:
-    """Return the extensions of this package, then those of other packages, each in the order of their names."""
+    """Return the extensions of this package, then those of other packages, each in alphabetical order."""
     folders = iter_modules([str(Path(__file__).with_name("extensions"))])
-    addresses = [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in folders]
+    addresses = [(extension.name, f"laufruhe.extensions.{extension.name}:EXTENSION") for extension in folders]
     addresses += sorted((point.name, point.value) for point in entry_points(group=GROUP))
     loaded = []
     for name, address in addresses:
-        one = _imported(name, address)
-        if not isinstance(one, Extension):
-            raise ModelError(f"extension '{name}': {address} is no laufruhe.extension.Extension; mend it")
-        loaded.append(one)
+        extension = _imported(name, address)
+        if not isinstance(extension, Extension):
+            raise ModelError(f"extension '{name}': {address} is no laufruhe.extension.Extension; correct the address")
+        loaded.append(extension)
     return tuple(loaded)
 
 
 class Table(Mapping[str, Any]):
-    """Objects by their names, filled at first use.
+    """Mapping of names to objects that is filled at first use.
 
-    A module of an extension may import the room of its table, whichever of the two is imported first.
+    So a module of an extension and the module of the table may import each other.
     """
 
     def __init__(self, fill: Callable[[], Mapping[str, Any]]) -> None:
@@ -152,60 +152,71 @@ class Table(Mapping[str, Any]):
 
 
 def extended(
-    table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str] = lambda one: str(one.name)
+    table: Tables, kind: Any, core_objects: Iterable[Any], name_of: Callable[[Any], str] = lambda entry: str(entry.name)
 ) -> Table:
-    """Return a table by names: objects or classes of this package, then those of extensions.
+    """Return a table by names: objects or classes of the core, then those of extensions.
 
     Parameters
     ----------
+    table
+        Name of the table in `Extension`.
     kind
         Class of the objects, or base of the classes.
-    own
-        Objects of this package.
+    core_objects
+        Objects of the core.
     name_of
         Function that returns the name of an object in the table.
 
     Raises
     ------
     ModelError
-        At first use, if one cannot be imported, is of another kind, or has the name of another one.
+        At first use of the table, if an object cannot be imported, is of another class, or has the name of another one.
     """
 
     def filled() -> dict[str, Any]:
-        entries = {name_of(one): one for one in own}
+        entries = {name_of(entry): entry for entry in core_objects}
         for extension in extensions():
-            for address, one in objects(extension, table):
-                if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
-                    raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
-                if (name := name_of(one)) in entries:
+            for address, entry in objects(extension, table):
+                if not (issubclass(entry, kind) if isinstance(entry, type) else isinstance(entry, kind)):
+                    raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; correct it")
+                if (name := name_of(entry)) in entries:
                     rule = f"{table} have '{name}' already; give it another name"
                     raise ModelError(f"extension '{extension.name}': {rule}")
-                entries[name] = one
+                entries[name] = entry
         return entries
 
     return Table(filled)
 
 
 def objects(extension: Extension, table: Tables) -> Iterator[tuple[str, Any]]:
-    """Yield the addresses and objects that an extension adds to a table."""
+    """Yield (address, object) of all objects that an extension adds to a table."""
     for address in getattr(extension, table):
         yield address, _imported(extension.name, address)
 
 
-def in_order(table: Tables, kind: Any, own: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a table as a list: an object of an extension comes before the one that it names, else last.
+def in_order(table: Tables, kind: Any, core_objects: Sequence[Any]) -> tuple[Any, ...]:
+    """Return the objects of a table in order: an object of an extension comes before the one that it names, or last.
+
+    Parameters
+    ----------
+    table
+        Name of the table in `Extension`.
+    kind
+        Class of the objects.
+    core_objects
+        Objects of the core, in order.
 
     Raises
     ------
     ModelError
-        If it names a missing one.
+        If an object names a missing one.
     """
-    entries = list(own)
-    for one in [*extended(table, kind, own).values()][len(own) :]:
-        names = [other.name for other in entries]
-        if one.before and one.before not in names:
-            raise ModelError(f"{table}: '{one.name}' stands before '{one.before}', which is not there; mend it")
-        entries.insert(names.index(one.before) if one.before else len(entries), one)
+    entries = list(core_objects)
+    for entry in [*extended(table, kind, core_objects).values()][len(core_objects) :]:
+        names = [existing.name for existing in entries]
+        if entry.before and entry.before not in names:
+            raise ModelError(f"{table}: '{entry.name}' names '{entry.before}', which does not exist; correct `before`")
+        entries.insert(names.index(entry.before) if entry.before else len(entries), entry)
     return tuple(entries)
 
 
@@ -214,4 +225,6 @@ def _imported(name: str, address: str) -> Any:
     try:
         return getattr(import_module(module), attribute)
     except (ImportError, AttributeError) as error:
-        raise ModelError(f"extension '{name}': {address} cannot be imported ({error}); mend or uninstall it") from error
+        raise ModelError(
+            f"extension '{name}': {address} cannot be imported ({error}); repair or uninstall it"
+        ) from error

@@ -19,15 +19,15 @@ _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """Number with a decimal comma."""
 THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
-"""Number with a comma that may also separate thousands."""
-# kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
+"""Number with a comma that may separate thousands."""
+# cm2 is read as cm^2; the digit of H2O is no power
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
 _NAME = r"(?!\d)(?:(?![⁰¹²³⁴-⁹])[\w°%])+"
 _POWERED = rf"{_NAME}(?:⁻?[⁰¹²³⁴-⁹]| ?(?:\^|\*\*) ?-?[0-9](?:\.[0-9]{{1,3}})?)?"
 _PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MOST_FACTORS - 1}}}")
-"""Unit as a product of names and powers below ten; the registry would evaluate any expression."""
+"""Unit as a product of names and powers below ten; the registry would evaluate other texts as expressions."""
 _OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
-# full names of units with an angle
+# full names of units of angle
 _TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
@@ -51,12 +51,12 @@ COMMON = {
     "s": {"s": 1.0},
     "": {"%": 1e-2},
 }
-"""SI values of frequent units by dimension; the registry takes long to load."""
+"""SI values of frequent units by SI unit; for these the registry, which takes long to load, is not needed."""
 _COMMON_UNITS = {unit for units in COMMON.values() for unit in units}
 
 
 class UnitError(ValueError):
-    """Text that is no number with a unit of the right dimension: rule, and remedy after '; '."""
+    """Text that is no number with a unit of the required dimension; rule and remedy, separated by '; '."""
 
 
 @cache
@@ -70,41 +70,41 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 
 @cache
-def _factor(unit: str, wanted: str) -> float:
-    """Return the SI value of one `unit`, in the dimension of `wanted`."""
+def _factor(unit: str, si_unit: str) -> float:
+    """Return the SI value of one `unit`, in the dimension of `si_unit`."""
     unit = _POWER.sub(r"^\1", unit)
-    if wanted == "Hz" and "Hz" not in unit:
+    if si_unit == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would pass for a frequency 2 pi too high
-        raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
-    other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_in_units(wanted)}")
-    if wanted in COMMON and unit in _COMMON_UNITS:
-        if unit not in COMMON[wanted]:
-            raise other
-        return COMMON[wanted][unit]
-    return _by_registry(unit, wanted, other)
+        raise UnitError(f"'{unit}' is no frequency in Hz; {advice(si_unit)}")
+    wrong_dimension = UnitError(f"'{unit}' is not a unit of {dimension_name(si_unit)}; {_in_units(si_unit)}")
+    if si_unit in COMMON and unit in _COMMON_UNITS:
+        if unit not in COMMON[si_unit]:
+            raise wrong_dimension
+        return COMMON[si_unit][unit]
+    return _by_registry(unit, si_unit, wrong_dimension)
 
 
-def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
-    unknown = UnitError(f"unit '{unit}' is not known; {_in_units(wanted)}")
+def _by_registry(unit: str, si_unit: str, wrong_dimension: UnitError) -> float:
+    unknown = UnitError(f"unit '{unit}' is not known; {_in_units(si_unit)}")
     if _PRODUCT.fullmatch(unit) is None:
         raise unknown
     registry = _registry()
     try:
         parsed = registry.parse_units(unit)
-        one = registry.Quantity(1.0, parsed)
-        target = registry.parse_units(wanted) if wanted else registry.dimensionless
-        ratio = float(one.to(target).magnitude)
-        doubled = float((2.0 * one).to(target).magnitude)
+        unit_quantity = registry.Quantity(1.0, parsed)
+        target = registry.parse_units(si_unit) if si_unit else registry.dimensionless
+        ratio = float(unit_quantity.to(target).magnitude)
+        doubled = float((2.0 * unit_quantity).to(target).magnitude)
     except Exception as error:
-        # the registry and its tokenizer raise a dozen kinds of errors
+        # the registry and its tokenizer raise many kinds of errors
         if type(error).__name__ == "DimensionalityError":
-            raise other from None
+            raise wrong_dimension from None
         raise unknown from None
-    if (_TURNING.search(str(parsed)) is not None) != (wanted in _OF_ANGLES):
+    if (_TURNING.search(str(parsed)) is not None) != (si_unit in _OF_ANGLES):
         # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
-        raise other
+        raise wrong_dimension
     if not math.isclose(doubled, 2.0 * ratio):
-        raise UnitError(f"'{unit}' has a zero of its own; {advice(wanted)}")
+        raise UnitError(f"'{unit}' is a scale with its own zero; {advice(si_unit)}")
     return ratio
 
 
@@ -134,17 +134,17 @@ _EXAMPLES = {
 
 
 def dimension_name(unit: str) -> str:
-    """Return the name of a unit's dimension."""
+    """Return the name of the dimension of an SI unit, with article: "a length"."""
     return _EXAMPLES.get(unit, (f"the dimension of {unit}", ""))[0]
 
 
 def example(unit: str) -> str:
-    """Return an example of a value with this unit."""
+    """Return an example of a value in the dimension of an SI unit: "120 mm"."""
     return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]
 
 
 def advice(unit: str) -> str:
-    """Return the advice on how to write a value with this unit."""
+    """Return the remedy for a wrong value in the dimension of an SI unit: an example."""
     return f"write for example {_written(example(unit), unit)}"
 
 
@@ -153,7 +153,7 @@ def _written(text: str, unit: str) -> str:
 
 
 def usual(unit: str) -> str:
-    """Return frequent units of this dimension."""
+    """Return frequent units in the dimension of an SI unit, joined by commas."""
     return ", ".join(COMMON.get(unit) or [example(unit).partition(" ")[2]])
 
 
@@ -162,12 +162,12 @@ def _in_units(unit: str) -> str:
 
 
 def parse(text: str, unit: str) -> float:
-    """Return the SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` if it has none."""
+    """Return the SI value of a text such as '120 mm'; `UnitError` unless it has the dimension of the SI unit `unit`."""
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
-        point, whole = (text.replace(",", mark, 1).strip() for mark in (".", ""))
-        point, whole = _written(point, unit), _written(whole, unit)
-        either = f"write {whole} or {point}" if THOUSANDS.match(text) else f"write {point}"
+        point, without_comma = (text.replace(",", mark, 1).strip() for mark in (".", ""))
+        point, without_comma = _written(point, unit), _written(without_comma, unit)
+        either = f"write {without_comma} or {point}" if THOUSANDS.match(text) else f"write {point}"
         raise UnitError(f"has a comma, and decimals follow a point; {either}")
     if match is None:
         raise UnitError(f"is not a number{' with a unit' * bool(unit)}; {advice(unit)}")
@@ -185,13 +185,13 @@ def parse(text: str, unit: str) -> float:
 
 
 def unit_of(text: str) -> str:
-    """Return the unit of a number in a text; empty if there is none."""
+    """Return the unit in a text such as '120 mm'; empty if there is none."""
     match = _QUANTITY.match(text)
     return (match.group(3) or "").strip() if match else ""
 
 
 def dimension_of(text: str) -> str | None:
-    """Return the SI unit of a text such as '12 Hz'; None if it is no number with a known unit."""
+    """Return the SI unit for the dimension of a text such as '12 Hz'; None if it is no number with a known unit."""
     for unit in _EXAMPLES:
         with suppress(UnitError):
             parse(text, unit)
@@ -227,7 +227,7 @@ _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
 
 
 def pattern(unit: str) -> str:
-    """Return the pattern of a number with a usual unit of this dimension, for editors."""
+    """Return the regular expression of a number with a unit in the dimension of an SI unit, for editors."""
     return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}) *$"
 
 
@@ -241,12 +241,12 @@ _SHOWN = {
 
 
 def readable(unit: str) -> tuple[str, float]:
-    """Return the printed unit of reports, and its factor on an SI value."""
+    """Return the unit of reports for an SI unit, with powers as printed, and the factor on an SI value."""
     name, factor = _SHOWN.get(unit, (unit, 1.0))
     return name.replace("^2", "²").replace("^3", "³"), factor
 
 
 def quantity_text(value: float, unit: str, digits: int = 4) -> str:
-    """Return value and unit for messages, as they may be typed: degrees, mm, rpm, N/mm^2."""
+    """Return an SI value as text with a common unit that files accept: degrees, mm, rpm, N/mm^2."""
     name, factor = _SHOWN.get(unit, (unit, 1.0))
     return f"{value * factor:.{digits}g} {name}".rstrip()

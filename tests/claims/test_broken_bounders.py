@@ -147,7 +147,7 @@ def contradicted(bound: float) -> float:
 
 def test_bounds_and_values_are_compared_to_a_rounding() -> None:
     assert check_bound("", 1.0 + 5e-10, 1.0)
-    assert check_bound("", 1.0 + 5e-4, 1.0, nothing=1e-3)
+    assert check_bound("", 1.0 + 5e-4, 1.0, zero_level=1e-3)
     for bound, value in ((1.0 + 2e-9, 1.0), (math.nan, 1.0), (math.inf, 1.0), (1.0, math.nan)):
         with pytest.raises(BoundError):
             check_bound("a bound", bound, value)

@@ -92,7 +92,7 @@ def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cyli
         ("bmw-b49\n\n\n\n\n\n\n\n\n\n\n\n", "did you mean 'bmw-b48'?", 4),
         ("\n\n\n\nfive\n3\n1-2\n\n\n\n\n\n\n", "must be a whole number", 3),
         ("\n\n\n\n\n\n\n\n1,5 mm\n\n1.2\n\n\n", 'write "1.5 mm"', 4),
-        ("\n\n\n\n\n\n\n\n\n1.2\n\n\n", "does not let the crank turn", 4),
+        ("\n\n\n\n\n\n\n\n\n1.2\n\n\n", "blocks the crank", 4),
     ],
 )  # fmt: skip
 def test_a_mistake_is_told_and_asked_again(

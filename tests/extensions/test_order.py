@@ -20,5 +20,5 @@ def test_an_object_stands_before_the_one_that_it_names(monkeypatch: pytest.Monke
     assert in_order("methods", Method, own) == (*own[:2], more, own[2], last)
     lost = replace(more, before="nothing of the kind")
     monkeypatch.setattr(extension, "extended", lambda *_: {row.name: row for row in (*own, lost)})
-    with pytest.raises(ModelError, match="'more' stands before 'nothing of the kind', which is not there"):
+    with pytest.raises(ModelError, match="'more' names 'nothing of the kind', which does not exist"):
         in_order("methods", Method, own)

@@ -114,7 +114,7 @@ def test_texts_and_notes_have_no_depth(value: str, tmp_path: Path) -> None:
     ("old", "new"), [('title = "', 'title = "{}'), ('stroke = "', 'stroke = "{}'), ("stroke =", '"{}" =')]
 )
 def test_characters_that_command_a_screen(character: str, old: str, new: str, tmp_path: Path) -> None:
-    refused(spoilt(tmp_path, old, new.format(character)), "U+" + character[2:].upper(), "no character to read")
+    refused(spoilt(tmp_path, old, new.format(character)), "U+" + character[2:].upper(), "not a printable character")
 
 
 def test_a_file_name_cannot_command_a_screen(tmp_path: Path) -> None:

@@ -59,13 +59,13 @@ SPLIT = changed(TWIN, "bank_angle = { between = [40, 120] }", "bank_angle = 60\n
 def test_a_balance_factor_without_throws(fraction: str, tmp_path: Path) -> None:
     """Counterweights stand on the crankshaft, and here no throw does."""
     line = complaint_about(written(tmp_path, changed(GEARED, "{ between = [0, 1] }", fraction)))
-    assert line == "web.balance_factor: is open, and nothing of this engine follows it; fix or leave it out"
+    assert line == "web.balance_factor: is open but has no effect in this engine; fix or leave it out"
 
 
 def test_a_balance_factor_of_massless_pistons(tmp_path: Path) -> None:
     light = changed(TWIN, 'reciprocating_mass = "0.6 kg"', 'reciprocating_mass = "0 kg"')
     text = changed(light, "bank_angle = { between = [40, 120] }", "bank_angle = 90")
-    assert complaint_about(written(tmp_path, text)).startswith("web.balance_factor: is open, and nothing")
+    assert complaint_about(written(tmp_path, text)).startswith("web.balance_factor: is open but has no effect")
 
 
 @pytest.mark.parametrize(("text", "key"), [(TWIN, "bank_angle"), (SPLIT, "split_pin_angle")])
@@ -80,9 +80,9 @@ def test_an_angle_beside_given_throws(text: str, key: str, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("orders", "said"),
     [
-        ("[1.0004, 2.0004]", "holds 1.0004, and the orders of its cycle are multiples of 1/2; did you mean 1?"),
-        ("[0.5, 1.25]", "holds 1.25, and the orders of its cycle are multiples of 1/2; did you mean 1?"),
-        ("[2.00001]", "holds 2.00001, and the orders of its cycle are multiples of 1/2; did you mean 2?"),
+        ("[1.0004, 2.0004]", "contains 1.0004, and orders of this cycle are multiples of 1/2; did you mean 1?"),
+        ("[0.5, 1.25]", "contains 1.25, and orders of this cycle are multiples of 1/2; did you mean 1?"),
+        ("[2.00001]", "contains 2.00001, and orders of this cycle are multiples of 1/2; did you mean 2?"),
     ],
 )
 def test_orders_that_are_none(orders: str, said: str, tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_orders_of_a_two_stroke_are_whole(tmp_path: Path) -> None:
     text = changed(changed(TWIN, "throws = [0]", 'throws = "open"'), "orders = [1]", "orders = [1.5, 2]")
     assert load(written(tmp_path, text)).objective[0].measure.orders == (1.5, 2.0)
     line = complaint_about(written(tmp_path, changed(text, "four-stroke", "two-stroke")))
-    assert line.endswith("holds 1.5, and the orders of its cycle are multiples of 1; did you mean 2?")
+    assert line.endswith("contains 1.5, and orders of this cycle are multiples of 1; did you mean 2?")
 
 
 def test_a_shaft_that_follows_an_optional_one_is_optional(tmp_path: Path) -> None:

@@ -92,7 +92,7 @@ REFUSED = {
     "no side": (MOUNTS, BLOCK, SAG.replace('max = "40/3 Hz"', ""), "is missing; give min or max or outside"),
     "band upside down": (MOUNTS, BLOCK, SAG.replace('max = "40/3 Hz"', 'outside = ["9 Hz", "5 Hz"]'), "is no band"),
     "frequencies minimised": (MOUNTS, BLOCK, SAG.replace('"static sag"', '"natural frequencies"'),
-                              "is not minimised but limited"),
+                              "can be limited but not minimised"),
     "travel of rigid mounts": (RIGID, "", '[objective]\nminimise = "mean mount travel"\n', "needs elastic mounts"),
     "axis without frequency": (MOUNTS, BLOCK, SAG.replace("static sag", "torque-roll residual"),
                                "frequency: is missing"),

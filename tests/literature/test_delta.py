@@ -152,7 +152,7 @@ def test_no_star_of_the_eighteen_has_less_couple() -> None:
         ("reversed_crank = 1", "crank_leads = [20]", "engine.crank_leads: has 1 angles"),
         ('crank_distance = "1.1 m"', "", "engine.crank_distance: is missing"),
         ('"1.1 m"', '"0.8 m"', "no chamber: their pins meet"),
-        ("reversed_crank = 1", 'reversed_crank = 1\nthrows = [{ between = [0, 60] }]', "lets throws leave the even"),
+        ("reversed_crank = 1", 'reversed_crank = 1\nthrows = [{ between = [0, 60] }]', "allows uneven firing"),
     ],
 )  # fmt: skip
 def test_triangles_that_cannot_be(old: str, new: str, said: str, tmp_path: Path) -> None:
@@ -176,4 +176,4 @@ def test_inside_the_crankcase_throws_are_given(tmp_path: Path) -> None:
     text = changed(changed(text, "[[objective]]", gas), '"rms rocking couple"', '"maximum crank-pin force"')
     with pytest.raises(InputError) as caught:
         loaded(tmp_path, text)
-    assert "engine.throws: is open in layout 'delta'" in str(caught.value)
+    assert "engine.throws: cannot be open in layout 'delta'" in str(caught.value)

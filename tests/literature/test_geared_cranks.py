@@ -234,7 +234,7 @@ class TestOpposedPistons:
             ),
             ("crank_lead = 12\nport_arc = 110", "crank_lead = 95", "dead centres 95 deg apart; bring them within 90"),
             ('"640 mm"', '"480 mm"', "leaves cylinder 1 upper and cylinder 1 no chamber: their pins meet"),
-            ("rod_ratio = 0.25", "rod_ratio = 1.25", "does not let the crank turn"),
+            ("rod_ratio = 0.25", "rod_ratio = 1.25", "blocks the crank"),
         ],
     )
     def test_machines_that_cannot_be(self, old: str, new: str, said: str, tmp_path: Path) -> None:

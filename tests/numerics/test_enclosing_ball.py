@@ -30,7 +30,7 @@ def test_a_ball_holds_all_and_has_its_centre_between_points_on_it(kind: str, d: 
     points = sets_of(kind, d)
     balls, size = enclosing_balls(points), np.abs(points).max(axis=(1, 2))
     rows = np.arange(len(points))[:, None]
-    held = points[rows, balls.inside]
+    held = points[rows, balls.support]
     apart = np.linalg.norm(points - balls.centres[:, None], axis=2).max(axis=1)
     assert np.all(apart <= balls.radii + 1e-12 * size)
     assert np.all(balls.shares >= 0.0)

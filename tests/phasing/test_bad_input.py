@@ -89,7 +89,7 @@ def test_a_failure_names_the_limit_of_time_that_ended_it(tmp_path):
             "engine.firing_order.*no permutation of 1 to 4",
         ),
         (4, 'throws = [0, 90, 180]\nfiring_order = "open"', "", engines.COUPLE, "engine.throws: has 3 of 4 throws"),
-        (4, OPEN, "intervals = { }", engines.COUPLE, "phasing.intervals: says nothing"),
+        (4, OPEN, "intervals = { }", engines.COUPLE, "phasing.intervals: is empty"),
         (
             4,
             OPEN,
@@ -98,7 +98,7 @@ def test_a_failure_names_the_limit_of_time_that_ended_it(tmp_path):
             "phasing.intervals.min: is more than max",
         ),
         (4, OPEN, 'intervals = { largest_deviation = "-1 deg" }', engines.COUPLE, "largest_deviation = .*is negative"),
-        (4, OPEN, "most_shafts = 1", engines.COUPLE, "phasing.most_shafts: limits optional shafts, and none is"),
+        (4, OPEN, "most_shafts = 1", engines.COUPLE, "phasing.most_shafts: limits optional shafts, and there are none"),
         (4, OPEN, "best = 0", engines.COUPLE, "phasing.best"),
         (4, OPEN, 'method = "magic"', engines.COUPLE, "phasing.method.*is not allowed"),
         (
@@ -131,7 +131,7 @@ def test_cylinders_are_asked_for(tmp_path):
     engines.problem(tmp_path, 4, engine='throws = "open"')
     path = tmp_path / "none.toml"
     path.write_text((tmp_path / "scene.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
-    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not say how many"):
+    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not give the number"):
         load(path)
 
 
@@ -141,7 +141,7 @@ def test_layouts_without_stars_are_refused(tmp_path):
 
 
 def test_a_sum_that_even_firing_leaves_open_is_refused(tmp_path):
-    """Bank angle and split pin both open: even firing binds only their sum, so no search over them would be whole."""
+    """Bank angle and split pin both open: even firing fixes only their sum, so no search over them would be whole."""
     both = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
-    with pytest.raises(InputError, match=r"split_pin_angle.*binds only their sum.*fix one of the two"):
+    with pytest.raises(InputError, match=r"split_pin_angle.*fixes only their sum.*fix one of the two"):
         engines.problem(tmp_path, 6, "four-stroke", both + OPEN, layout="vee")

@@ -176,7 +176,7 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "old", "new", "said"),
     [
-        ("1750, 20, 2\n1750, 60, 3\n", "", "", "has 2 points at 1750 rpm of pulling, and a line takes 3"),
+        ("1750, 20, 2\n1750, 60, 3\n", "", "", "has 2 rows at 1750 rpm, the speed of pulling, and a fit needs 3"),
         (ROWS.replace("1750, 60", "1750, 20"), "", "", "one load stands there twice"),
         ("1750, 20, 9\n1750, 60, 6\n1750, 90, 5\n", "", "", "does not rise with the load"),
         ("1750, 20, 0.5\n1750, 60, 3.0\n1750, 90, 5.7\n", "", "", "no friction"),
@@ -188,8 +188,8 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\ndeviation = "1 bar"', "follows from the file"),
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\nload_unit = "kg"', "load_unit"),
         (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nbmep = "9 bar"', "given beside"),
-        (ROWS, 'brake_torque = "250 N m"', "", "serves no operating point"),
-        (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nmotored = true', "burn fuel"),
+        (ROWS, 'brake_torque = "250 N m"', "", "is used by no operating point"),
+        (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nmotored = true', "needs combustion"),
         (ROWS, '[friction]\nfile = "fuel.csv"', "", "needs [friction]"),
         (ROWS, 'bore = "85 mm"', "", "bore"),
     ],

@@ -222,9 +222,9 @@ def test_no_star_moves_what_is_constant() -> None:
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("mount force   a a a  b m >  >  a a  0", "'mount force' is no channel without dependences"),
-        ("mount force   flywheel=a", "'mount force' is no channel without dependences"),
-        ("no such force   a a a  b m >  >  s s  0", "'no such force' is no channel"),
+        ("mount force   a a a  b m >  >  a a  0", "'mount force' has dependences already"),
+        ("mount force   flywheel=a", "'mount force' has dependences already"),
+        ("no such force   a a a  b m >  >  s s  0", "'no such force' has dependences already, or is no channel"),
         ("mount force", "is no line of dependences"),
         ("own force   a a a", "is no line of dependences"),
         ("own force   a a a  b m >  >  s s  !", "is no line of dependences"),

@@ -58,7 +58,7 @@ def test_a_usual_engine_raises_none() -> None:
         ("0.6 kg", "450 kg", "reciprocating mass = 450 kg: is that of no usual piston"),
         ("0.6 kg", "0 kg", "reciprocating mass = 0 kg: makes no inertia force"),
         ("0.6 kg", "0.6 g", "reciprocating mass = 0.0006 kg"),
-        ("3000 rpm", "5e6 rpm", "makes a mean piston speed of 1.5e+04 m/s"),
+        ("3000 rpm", "5e6 rpm", "gives a mean piston speed of 1.5e+04 m/s"),
         ("0.28", "0.6", "rod length = 75 mm: is 1.67 crank radii"),
         ('bore = "90 mm"', 'bore = "900 mm"', "stroke = 90 mm: is 0.1 times the bore"),
         ("0.03 kg m", "30 kg m", "unbalance of web = 30 kg m"),

@@ -104,7 +104,7 @@ def test_a_limit_holds_the_lead_away(tmp_path: Path) -> None:
 def test_bounds_beyond_the_ports_are_refused(tmp_path: Path) -> None:
     text = (PROBLEMS / "opposed-pistons-masses.toml").read_text(encoding="utf-8")
     text = changed(text, "crank_lead = 12", "crank_lead = { between = [0, 30] }\nport_arc = 25")
-    with pytest.raises(InputError, match="goes beyond the ports, which are open for 25 deg"):
+    with pytest.raises(InputError, match="may exceed the angle for which the ports are open, 25 deg"):
         loaded(tmp_path, text)
 
 

@@ -64,7 +64,7 @@ BY_PLACE = "counterweights.1.balance_factor"
 MANY = "from = 0\nto = 1\npoints = 100000"
 LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
 BAD = [
-    (study().replace('name = "p"', 'name = "My part/.."'), "names files and has small letters, digits and"),
+    (study().replace('name = "p"', 'name = "My part/.."'), "must have small letters, digits and"),
     (study().replace(f"{PROBLEMS / 'tractor-single'}", f"{PROBLEMS / 'tractor-sweeps'}"),
      "study: makes this a study file; a case of a study names a problem"),
     (study(sweep=swept(FRACTION, "from = 0\nto = nan\npoints = 3")), "sweep[1].to = [NaN]: is not finite"),
@@ -138,7 +138,7 @@ BAD = [
     (study(sweep=swept("operating_points.mean_piston_speed", 'from = "6 m/s"\nto = "8 m/s"\npoints = 3')),
      "is no number of a problem file; write its whole path, such as operating_points.1.speed"),
     (study(sweep=swept(FRACTION, 'from = "0,1"\nto = 1\npoints = 3')), 'decimals follow a point; write 0.1'),
-    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\nunit = "x"')), "a unit stands beside its number"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\nunit = "x"')), "write the unit with its number"),
     (study("layout comparison", problem="tractor-study"), "makes this a study file"),
     (study("layout comparison") + case("one", "x.toml"), "two cases of one name"),
     (study("layout comparison") + case("V", str(VEE)) + "equal_power_to = 4", "differs between cases"),

@@ -1,1 +1,1 @@
-"""What of the physics a problem needs, chosen, explained and bounded."""
+"""Automatic choice of fidelity, its explanation, and error bounds of cheaper models."""

@@ -1,4 +1,4 @@
-"""The cheapest fidelity that keeps the objective within a tolerance, and what it leaves out (F10)."""
+"""Choice of the cheapest fidelity that keeps the objective within a tolerance (F10)."""
 
 from __future__ import annotations
 
@@ -15,22 +15,26 @@ from laufruhe.problem.problem import Problem
 
 DEFAULT_TOLERANCE = 1e-3
 TRIED = (1e-2, 1e-3, 1e-4)
-"""Tolerances of the automatic choices that a trade tries."""
+"""Tolerances at which a trade tries the automatic choice."""
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A fidelity, how wrong it can be, and why it is enough.
+    """Chosen fidelity with its error bound and explanation.
 
     Attributes
     ----------
+    fidelity
+        The fidelity.
     error_estimate
-        Relative error of the objective that is not exceeded for the design chosen for.
-    kept, left_out
-        What is computed, in words, and what is not.
+        Upper bound of the relative error of the objective, for the design of the choice.
+    description
+        Descriptions of the physics that is computed.
+    left_out
+        Parts of the physics that are omitted.
     numbers
-        Mount force components that one evaluation samples, and those of the exact model
-        at as many steps as the problem file asks.
+        Number of force components that one evaluation samples at this fidelity, and by the exact model with the samples
+        of the problem file.
     """
 
     fidelity: Fidelity
@@ -41,54 +45,54 @@ class Choice:
 
 
 def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
-    """The cheapest fidelity for an objective (F10).
+    """Return the cheapest sufficient fidelity for an objective (F10).
 
     Parameters
     ----------
     problem
-        Objective and operating points. An uneven crank speed that it has is kept.
+        Objective and operating points. An uneven crank speed stays uneven.
     tolerance
-        Relative error of the objective allowed.
+        Allowed relative error of the objective.
     engine
-        The design chosen for; that of the problem as given when left out.
+        Design of the choice; by default that of the problem as given.
 
     Returns
     -------
-    Choice whose estimate is under the tolerance wherever the reference itself is; of
-    an objective that is zero, everything that is not zero is kept.
+    Choice with an error bound below the tolerance, if the reference is that exact. If the objective is zero, all parts
+    that are not zero are computed.
     """
     return chosen_by(Scale.of(problem, engine), tolerance)
 
 
 def chosen_by(scale: Scale, tolerance: float) -> Choice:
-    """Choose a fidelity like `choose`, from a known reference."""
-    room = max(tolerance - scale.doubt, 0.0)
-    chosen = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
+    """Return the choice of `choose` from a known reference."""
+    allowed_error = max(tolerance - scale.doubt, 0.0)
+    fidelity = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:
-        chosen = knob.chosen(scale, chosen, room)
-    estimate = scale.loses(chosen) + scale.misses(chosen) + scale.doubt
-    left = [part for knob in KNOBS for part in knob.left_out(scale, chosen)]
+        fidelity = knob.chosen(scale, fidelity, allowed_error)
+    estimate = scale.loses(fidelity) + scale.misses(fidelity) + scale.doubt
+    left = [part for knob in KNOBS for part in knob.left_out(scale, fidelity)]
     return Choice(
-        chosen,
-        # the bounds are relative to the reference, a reader's error to what was computed
+        fidelity,
+        # convert from an error relative to the reference to one relative to the computed value
         estimate / max(1.0 - estimate, 0.5),
-        tuple(text for knob in KNOBS for text in knob.describe(scale, chosen)),
-        # what is exactly zero first
+        tuple(text for knob in KNOBS for text in knob.describe(scale, fidelity)),
+        # parts that are exactly zero come first
         tuple(sorted(left, key=lambda part: part.restored is not None)),
-        _numbers(scale.problem, scale, chosen),
+        _numbers(scale.problem, scale, fidelity),
     )
 
 
 def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) -> Problem:
-    """The problem at the fidelity chosen for it, beside a reference where one is known."""
+    """Return the problem at its automatic fidelity; `scale` is the reference if it is known."""
     if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
-        # no bound says what a simulation loses with an order
+        # simulations have no error bound for omitted orders
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
     return problem.at(chosen_by(scale or Scale.of(problem), tolerance).fidelity)
 
 
 def ladder(scale: Scale) -> list[tuple[str, Problem]]:
-    """Return the fidelities that a trade compares, where they differ on this problem (F13)."""
+    """Return the fidelities that a trade compares: (name, problem at this fidelity) (F13)."""
     problem = scale.problem
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
     if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
@@ -97,11 +101,11 @@ def ladder(scale: Scale) -> list[tuple[str, Problem]]:
 
 
 def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int]:
-    pruned = whole = 0
+    pruned = full = 0
     for term in scale.terms:
-        found = signals(term.measure, scale.best)
-        directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in found)
-        mounts, width = found[0].coefficients.shape[1:]
+        spectra = signals(term.measure, scale.best)
+        directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in spectra)
+        mounts, width = spectra[0].coefficients.shape[1:]
         pruned += max(chosen.samples // scale.repeats, 24) * mounts * directions
-        whole += problem.fidelity.samples * mounts * width * len(found)
-    return pruned, whole
+        full += problem.fidelity.samples * mounts * width * len(spectra)
+    return pruned, full

@@ -1,8 +1,7 @@
-"""How far a cheaper model can be from the reference, without a guess (F6-F9).
+"""Proven bounds of the difference between a cheaper model and the reference (F6-F9).
 
-Every measure of a load is a norm, so the value of a signal and that of the same signal with
-something left out differ by no more than the norm of what was left out. Of a sampled
-mean or maximum the curvature of the signal bounds what the samples miss.
+A measure of a load is a norm. By the triangle inequality, omitting a part of a signal changes its norm by at most the
+norm of that part. The curvature of the signal bounds the sampling error of a mean or maximum.
 """
 
 from __future__ import annotations
@@ -26,35 +25,58 @@ from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.problem import Problem
 
 REFERENCE_SAMPLES = 5760
-"""Steps a cycle of the reference: what cheaper choices are compared with."""
+"""Number of samples over the cycle of the reference, with which cheaper models are compared."""
 STRAIGHT, FEWEST = 8, 16
-"""Parts of a straight line from one point of a trace to the next, and points of which every other may go."""
+"""Number of linear pieces between two points of a pressure trace, and smallest number of points of a trace from which
+every second one may be dropped."""
 ROUNDING = 2e-12
-"""Relative error that sums of a few thousand rounded terms may have (F9)."""
+"""Relative rounding error of sums of a few thousand terms (F9)."""
 
 
 def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
-    """The highest fidelity: every order, rigid rod, gas at many steps, every mode; uneven speed where it was asked."""
-    own = problem.fidelity
-    best = replace(EXACT, samples=samples, crank_inertia=own.crank_inertia, crankshaft=own.crankshaft)
+    """Return the evaluation of a design at the highest fidelity: all orders and modes, rigid rods, many gas samples.
+
+    The crank speed is uneven if it is in the problem.
+
+    Parameters
+    ----------
+    problem
+        Objective and operating points.
+    engine
+        Design; by default that of the problem as given.
+    samples
+        Number of samples over the cycle.
+    """
+    fidelity = problem.fidelity
+    best = replace(EXACT, samples=samples, crank_inertia=fidelity.crank_inertia, crankshaft=fidelity.crankshaft)
     return evaluate(replace(problem, fidelity=best), engine)
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
-    """Return the counted spectra of a load per operating point, (n, places, d), on a common lowest order."""
-    found = [measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
-    return with_common_base(evaluation.engine.cycle.base_order, found)
+    """Return the spectrum of a measured load at each operating point, shape (n, places, d), with one base order."""
+    spectra = [measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
+    return with_common_base(evaluation.engine.cycle.base_order, spectra)
 
 
 def relative(bound: float, value: float) -> float:
-    """A bound over a value; infinite where that is zero and the bound is not."""
+    """Return bound / value; infinite if only the value is zero, zero if both are."""
     return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
 def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Return the most that the samples of an evaluation miss of a measure [its unit]; zero without samples (F7, F8)."""
+    """Return an upper bound of the sampling error of a measure, in its unit; zero without samples (F7, F8).
+
+    Parameters
+    ----------
+    measure
+        Measure.
+    evaluation
+        Evaluation of a design with its number of samples.
+    finest
+        Smallest number of samples with which these are compared.
+    """
     if measure.channel.simulation:
-        return measure.channel.missed(evaluation.engine) * evaluation.value(measure)
+        return measure.channel.peak_error(evaluation.engine) * evaluation.value(measure)
     if measure.channel.depends_on_torque:
         return _missed_of_torque(measure, evaluation, finest)
     if not measure.is_load:
@@ -64,20 +86,28 @@ def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAM
 
 
 def _missed_of_torque(measure: Measure, evaluation: Evaluation, finest: int) -> float:
-    # the remaining error is no more than the change by the finest steps
-    own = evaluation.fidelity
-    finer = replace(own, samples=max(2 * own.samples, finest), gas_samples=max(2 * own.gas_steps, finest))
-    value, other = evaluation.value(measure), replace(evaluation, fidelity=finer).value(measure)
-    return 2.0 * abs(other - value) if math.isfinite(value) and math.isfinite(other) else 0.0
+    # the remaining error is assumed to be at most the change to the finest steps
+    fidelity = evaluation.fidelity
+    finer = replace(
+        fidelity, samples=max(2 * fidelity.samples, finest), gas_samples=max(2 * fidelity.gas_steps, finest)
+    )
+    value, finer_value = evaluation.value(measure), replace(evaluation, fidelity=finer).value(measure)
+    return 2.0 * abs(finer_value - value) if math.isfinite(value) and math.isfinite(finer_value) else 0.0
 
 
 class Scale:
-    """Objective of a design at the reference, and bounds beside it.
+    """Reference of one design, to which error bounds of cheaper models are relative.
 
     Attributes
     ----------
+    problem
+        Objective and operating points.
+    best
+        Evaluation at the reference.
     terms
-        Those of the objective that a fidelity can change.
+        Terms of the objective that are norms of loads, which a fidelity can change.
+    value
+        Objective of loads and masses at the reference [SI].
     """
 
     def __init__(self, problem: Problem, best: Evaluation) -> None:
@@ -88,70 +118,73 @@ class Scale:
 
     @classmethod
     def of(cls, problem: Problem, engine: Engine | None = None) -> Scale:
-        """Build the scale of the design as given, or of another."""
+        """Return the scale of a design; by default that of the problem as given."""
         return cls(problem, reference(problem, engine))
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
-        """The same design at another fidelity."""
+        """Return the evaluation of the same design at another fidelity."""
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
     def lost(self, ours: Evaluation, theirs: Evaluation) -> float:
-        """Return the largest change of the objective when their signals replace ours (F6)."""
+        """Return an upper bound of the change of the objective between the signals of two evaluations (F6)."""
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
             left_out = [x + y.mapped(np.negative) for x, y in pairs]
-            # the weight of every operating point, zero where it does not count
+            # weight of each operating point, zero for points that do not count
             shares = term.measure.shares([loads.point for loads in self.best.loads])
             total += term.weight * term.measure.norm.upper_bound(left_out, shares)
         return total
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-        """Return the most that the samples of an evaluation miss of the objective (F7, F8)."""
+        """Return an upper bound of the sampling error of the objective of an evaluation (F7, F8)."""
         return sum(term.weight * missed(term.measure, evaluation, finest) for term in self.terms)
 
     @cached_property
     def doubted(self) -> float:
-        """Most that the reference misses of gas torque between its steps (F9).
+        """Upper bound of the error of the reference from the steps of the gas torque, in units of the objective (F9).
 
-        What corners in closed form leave falls off at least with the step: half the steps change no less than
-        what is left.
+        With kinks in closed form the error falls at least in proportion to the step, so the change to half as many
+        steps is at least the remaining error.
         """
-        whole = self.best.fidelity
-        if all(whole.gas_of(loads.point) is None for loads in self.best.loads):
+        fidelity = self.best.fidelity
+        if all(fidelity.gas_of(loads.point) is None for loads in self.best.loads):
             return 0.0
-        return self.lost(self.evaluation(replace(whole, gas_samples=whole.gas_steps // 2)), self.best)
+        return self.lost(self.evaluation(replace(fidelity, gas_samples=fidelity.gas_steps // 2)), self.best)
 
     @property
     def doubt(self) -> float:
-        """Relative error bound of the reference (F9)."""
+        """Upper bound of the relative error of the reference itself (F9)."""
         return relative(self.doubted, self.value) + ROUNDING
 
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
-        """Return the largest relative loss of a fidelity against the reference or another evaluation (F6)."""
+        """Return an upper bound of the relative change of the objective by a fidelity (F6).
+
+        The change is against the reference, or against the evaluation `than`.
+        """
         if than is not None:
             return relative(self.lost(self.evaluation(fidelity), than), self.value)
         return self._once("loses", fidelity, lambda own: self.lost(own, self.best))
 
     def misses(self, fidelity: Fidelity) -> float:
-        """Return the largest relative sampling error of a fidelity (F7, F8)."""
+        """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
         return self._once("misses", fidelity, self.missed)
 
-    def _once(self, what: str, fidelity: Fidelity, found: Callable[[Evaluation], float]) -> float:
-        key = what, replace(fidelity, tolerance=None)
+    def _once(self, name: str, fidelity: Fidelity, error: Callable[[Evaluation], float]) -> float:
+        key = name, replace(fidelity, tolerance=None)
         if key not in self._known:
-            self._known[key] = relative(found(self.evaluation(fidelity)), self.value)
+            self._known[key] = relative(error(self.evaluation(fidelity)), self.value)
         return self._known[key]
 
     def error_of(self, evaluation: Evaluation) -> float:
-        """Return the relative error bound of an evaluation of the same design, as `error_bound` does."""
+        """Return an upper bound of the relative error of an evaluation of the same design, as `error_bound` does."""
         value = value_of_loads(self.problem, evaluation)
         bound = self.lost(evaluation, self.best) + self.missed(evaluation, self.best.samples) + self.doubted
         return relative(bound + ROUNDING * value, value)
 
     @cached_property
     def repeats(self) -> int:
-        """Times that all measured signals repeat within the cycle, whatever is decided."""
+        """Number of times that all measured signals repeat within the cycle, for any values of decisions."""
         ratios = tuple(
             as_order(abs(rotor.shaft.ratio))
             for rotor in self.problem.engine.rotors
@@ -162,24 +195,24 @@ class Scale:
 
     @property
     def driving(self) -> list[Spectrum]:
-        """Loads on the block, fixed or open, and the measured loads inside the crankcase, per operating point."""
+        """Spectra of the loads on the block, of unit open unbalances, and of measured loads inside the crankcase."""
         inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
         return [*(loads.wrench for loads in self.best.loads), *self.decided, *inside]
 
     @property
     def open_rotors(self) -> set[str]:
-        """Rotors whose unbalance or place is decided."""
+        """Names of the rotors with open unbalance or position."""
         sized = {drive.rotor for decision in self.problem.decisions for drive in decision.rotor_drives}
         return sized | {drive.rotor for decision in self.problem.decisions for drive in decision.place_drives}
 
     @cached_property
     def mounting(self) -> ElasticMounting | None:
-        """Block and mounts; None where the mounts are rigid."""
+        """Block on elastic mounts; None for rigid mounts."""
         return None if self.best.engine.block is None else mounting_in(self.best.engine)
 
     @cached_property
     def decided(self) -> list[Spectrum]:
-        """Wrenches that open rotors may make: what is none now may not stay so."""
+        """Wrenches of unit unbalances of the open rotors, at all positions along their open axes."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
         by_name = {rotor.name: rotor for rotor in rotors}
         for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
@@ -189,46 +222,47 @@ class Scale:
 
     @cached_property
     def decided_modes(self) -> set[int]:
-        """Modes that an open rotor drives, 1 the lowest: what is small now may not stay so."""
+        """Numbers of the natural modes that open rotors can excite, 1 the lowest."""
         return {mode + 1 for load in self.decided for mode in self.mounting.excited(load)} if self.mounting else set()
 
     @cached_property
     def excited_modes(self) -> tuple[int, ...]:
-        """Modes that the loads or an open rotor drive, 1 the lowest (E12)."""
+        """Numbers of the natural modes that the loads or open rotors excite, 1 the lowest (E12)."""
         if self.mounting is None:
             return ()
-        found = {mode + 1 for loads in self.best.loads for mode in self.mounting.excited(loads.wrench)}
-        return tuple(sorted(found | self.decided_modes))
+        modes = {mode + 1 for loads in self.best.loads for mode in self.mounting.excited(loads.wrench)}
+        return tuple(sorted(modes | self.decided_modes))
 
     @cached_property
     def strengths(self) -> dict[int, float]:
-        """Largest relative contribution of each excited mode to the objective (F6)."""
-        others = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
-        return {mode: self.loses(replace(self.best.fidelity, modes=rest)) for mode, rest in others.items()}
+        """Upper bound of the relative contribution of each excited mode to the objective (F6)."""
+        other_modes = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
+        return {mode: self.loses(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()}
 
 
 def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> float:
-    """Relative error of the objective of an evaluation that is not exceeded (F6-F9).
+    """Return an upper bound of the relative error of the objective of an evaluation (F6-F9).
 
     Parameters
     ----------
+    problem
+        Objective and operating points.
     evaluation
-        Of a design, at any fidelity and samples.
+        Evaluation of a design at any fidelity.
     best
-        Of the same design at the reference.
+        Evaluation of the same design at the reference.
 
     Returns
     -------
-    Over the objective of `evaluation`; infinite where that is zero and the bound is not.
+    Bound over the objective of `evaluation`; infinite if only the objective is zero.
     """
     return Scale(problem, best).error_of(evaluation)
 
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative error of the objective from its samples and those of the gas, which is not exceeded (F7-F9).
+    """Return an upper bound of the relative error of the objective from samples of loads and gas (F7-F9).
 
-    Over the objective of `evaluation`, of the physics that its fidelity asks for; infinite where that is zero and the
-    bound is not.
+    The physics is that of the fidelity of `evaluation`. Infinite if only the objective is zero.
     """
     scale = Scale(problem, evaluation)
     bound = scale.missed(evaluation) + ROUNDING * scale.value
@@ -236,36 +270,36 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
-    """Return what the steps of the gas, and what the points of a trace miss of the loads minimised at most (F9, F9a).
+    """Return upper bounds of the errors of the objective from gas samples and from points of a trace (F9, F9a).
 
-    Both are the same for every design: what the gas does no unbalance changes.
+    Both are in the unit of the objective, and the same for all designs, because unbalances do not change the gas.
     """
-    own = evaluation.fidelity
-    if not (own.is_uneven or any(own.gas_of(loads.point) for loads in evaluation.loads)):
+    fidelity = evaluation.fidelity
+    if not (fidelity.is_uneven or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
         return 0.0, 0.0
     scale = Scale(problem, evaluation)
-    # integration in time is taken as wanted, and would take long
-    still = replace(own, mounts="frequency") if own.mounts == "time" else own
-    given = evaluation if still is own else scale.evaluation(still)
-    finer = replace(still, samples=2 * own.samples, gas_samples=2 * own.gas_steps)
-    # what is left of twice the steps is no more than what they change
-    steps = 2.0 * scale.lost(given, scale.evaluation(finer))
-    if not any(isinstance(own.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
+    # mounts in the frequency domain, because integration in time takes long
+    still = replace(fidelity, mounts="frequency") if fidelity.mounts == "time" else fidelity
+    initial = evaluation if still is fidelity else scale.evaluation(still)
+    finer = replace(still, samples=2 * fidelity.samples, gas_samples=2 * fidelity.gas_steps)
+    # the error at twice the steps is at most the change to twice the steps
+    steps = 2.0 * scale.lost(initial, scale.evaluation(finer))
+    if not any(isinstance(fidelity.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
         return steps, 0.0
-    others, cycle = [], evaluation.engine.cycle
-    for told in (lambda gas: _straight(gas, cycle), _thinned):
-        points = tuple(replace(at, gas=told(own.gas_of(at))) for at in problem.points)
-        other = evaluate(replace(problem, points=points, fidelity=still), evaluation.engine)
-        others.append(sum(term.weight * _apart(term.measure, given, other) for term in scale.terms))
-    return steps, min(others)
+    changes, cycle = [], evaluation.engine.cycle
+    for change in (lambda gas: _straight(gas, cycle), _thinned):
+        points = tuple(replace(point, gas=change(fidelity.gas_of(point))) for point in problem.points)
+        changed = evaluate(replace(problem, points=points, fidelity=still), evaluation.engine)
+        changes.append(sum(term.weight * _apart(term.measure, initial, changed) for term in scale.terms))
+    return steps, min(changes)
 
 
 def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
-    # many angles: a root mean square would hide a spike
+    # norm of the difference at many angles, which also shows spikes
     pairs = zip(ours.loads, theirs.loads, strict=True)
-    found = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]
+    differences = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]
     engine, points = ours.engine, [loads.point for loads in ours.loads]
-    signals = with_common_base(engine.cycle.base_order, found)
+    signals = with_common_base(engine.cycle.base_order, differences)
     return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value
 
 
@@ -276,8 +310,8 @@ def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
     if angles[-1] < angles[0] + cycle.angle - SAME_ANGLE:
         angles, pressures = [*angles, angles[0] + cycle.angle], [*pressures, pressures[0]]
     places = np.arange(STRAIGHT * (len(angles) - 1) + 1) / STRAIGHT
-    told = [tuple(np.interp(places, range(len(angles)), own).tolist()) for own in (angles, pressures)]
-    return replace(gas, angles=told[0], pressures=told[1])
+    resampled = [tuple(np.interp(places, range(len(angles)), column).tolist()) for column in (angles, pressures)]
+    return replace(gas, angles=resampled[0], pressures=resampled[1])
 
 
 def _thinned(gas: GasModel | None) -> GasModel | None:

@@ -1,4 +1,4 @@
-"""What a choice of fidelity has to say of itself, and how one is found that is enough (F1, F10)."""
+"""Base class of knobs: a knob is one field of the fidelity that a file may set or the program chooses (F1, F10)."""
 
 from __future__ import annotations
 
@@ -11,19 +11,23 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.problem import Problem
 
 PART_SHARE = 0.1
-"""Share of the tolerance that one whole part may use."""
+"""Fraction of the tolerance that omitting one part may use."""
 
 
 @dataclass(frozen=True)
 class LeftOut:
-    """A part of the physics that is not computed.
+    """Part of the physics that is not computed.
 
     Attributes
     ----------
+    what
+        Name of the part.
+    why
+        Reason for the omission.
     share
-        Put back, it changes the objective by no more than this, relative.
+        Upper bound of the relative change of the objective if the part is computed.
     restored
-        The choice with this part put back; None where nothing at all was lost.
+        Fidelity with this part; None if the part is exactly zero.
     """
 
     what: str
@@ -36,14 +40,14 @@ Rungs = list[tuple[str, Fidelity]]
 
 
 class Knob:
-    """A field of a fidelity.
+    """Field of the fidelity, with its rules for the automatic choice; defaults are those of a field without effect.
 
     Attributes
     ----------
     key, kind, unit, schema
-        In the [fidelity] table: its name, type, SI unit if it has one, and what a schema tells of it.
+        Key in table [fidelity], its type, SI unit (empty without one), and keyword arguments of its pydantic field.
     is_decided
-        Whether the automatic choice decides it, so that a file may not.
+        True if the automatic choice decides it; a file with the automatic choice then may not set it.
     """
 
     key: ClassVar[str]
@@ -53,44 +57,54 @@ class Knob:
     is_decided: ClassVar[bool] = True
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
-        """Why a problem cannot have this value, and the remedy; None where it can."""
+        """Return (rule, remedy) if a problem cannot have this value; None if it can."""
         return None
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        """Return the fidelity with the cheapest sufficient value; `room` is the error allowed in total (F10)."""
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
+        """Return the fidelity with the cheapest sufficient value of this field (F10).
+
+        Parameters
+        ----------
+        scale
+            Reference of the design.
+        fidelity
+            Fidelity so far.
+        allowed_error
+            Allowed relative error of the objective from all fields together.
+        """
         return fidelity
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        """Describe the kept physics in words."""
+        """Return descriptions of the physics that the fidelity computes in this field."""
         return []
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        """Return the omitted parts and their largest cost; parts that are exactly zero cost nothing."""
+        """Return the parts that the fidelity omits in this field, with upper bounds of their effect."""
         return []
 
     def rungs(self, scale: Scale) -> Rungs:
-        """Fidelities that a trade tries for its sake, by name."""
+        """Return the fidelities that a trade tries for this field: (name, fidelity)."""
         return []
 
     def away(self, problem: Problem) -> Rungs:
-        """The fidelity of a problem with a whole part of its loads taken away, by the name of the part."""
+        """Return fidelities of a problem without one part of its loads: (name of the part, fidelity)."""
         return []
 
 
 def first_sufficient(
     fidelity: Fidelity, key: str, values: Sequence[int | None], is_sufficient: Callable[[Fidelity], bool]
 ) -> Fidelity:
-    """Return the fidelity with the first sufficient value; with the last one where no value suffices."""
-    found = fidelity
+    """Return the fidelity with the first sufficient value of a field; with the last value if none is sufficient."""
+    candidate = fidelity
     for value in values:
         changed: dict[str, Any] = {key: value}
-        found = replace(fidelity, **changed)
-        if is_sufficient(found):
+        candidate = replace(fidelity, **changed)
+        if is_sufficient(candidate):
             break
-    return found
+    return candidate
 
 
 def part_left_out(scale: Scale, chosen: Fidelity, restored: Fidelity, what: str, why: str) -> LeftOut:
-    """A part and what it changes of the objective itself; samples see that to within their own error."""
-    both = scale.loses(chosen, scale.evaluation(restored))
-    return LeftOut(what, why if both > 0.0 else "the objective does not count them", both, restored)
+    """Return an omitted part with the bound of its effect, from the chosen fidelity and the one with the part."""
+    share = scale.loses(chosen, scale.evaluation(restored))
+    return LeftOut(what, why if share > 0.0 else "the objective does not count them", share, restored)

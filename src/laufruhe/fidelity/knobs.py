@@ -1,8 +1,7 @@
-"""Every choice of fidelity: how a file tells it, when it pays, what it costs, where it is tried (F1, F10, F13).
+"""All knobs of the fidelity: key in a file, automatic choice, error bound, and variants of a trade (F1, F10, F13).
 
-The automatic choice, `explain`, the trade, the schema and the reader of problem files go through `KNOBS`, in that
-order, and know nothing of a choice but what its knob says. One more is a field of `physics.fidelity.Fidelity`, the line
-of physics that obeys it, and a class here.
+The automatic choice, `explain`, the trade, the schema and the reader of problem files use the list `KNOBS` only. A new
+knob needs a field of `physics.fidelity.Fidelity`, physics that reads the field, and a class here.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 25
 SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
 GAS_ORDERS = 12
-"""Of a rung whose gas is cut."""
+"""Last order of the gas in the variant of a trade with fewer orders of gas."""
 PHYSICS_SHARE, GAS_SHARE = 0.5, 0.25
-"""Shares of the tolerance that all physics, and the steps of the gas, may use."""
+"""Fractions of the tolerance for all omitted physics, and for the samples of the gas."""
 TWO_ORDER, NO_GAS = "two-order, 720 steps", "exact without gas, 720 steps"
-"""Rungs that a report speaks of."""
+"""Names of variants of a trade that reports mention."""
 
 
 class _Kinematics(Knob):
@@ -43,12 +42,16 @@ class _Kinematics(Knob):
 
 
 class _SwitchedPart(Knob):
-    """A part of the loads that is there or not.
+    """Part of the loads that is computed or not.
 
     Attributes
     ----------
+    what
+        Name of the part.
+    rung
+        Name of the variant of a trade without the part.
     less, whole
-        Fields that take it away, and that put it back.
+        Fields of the fidelity without and with the part.
     """
 
     what: ClassVar[str]
@@ -60,23 +63,23 @@ class _SwitchedPart(Knob):
         raise NotImplementedError
 
     def is_active(self, problem: Problem, fidelity: Fidelity) -> bool:
-        """Return True if the problem has this part and the fidelity keeps it."""
+        """Return True if the problem has this part and the fidelity computes it."""
         return self.is_there(problem) and getattr(fidelity, self.key) == getattr(EXACT, self.key)
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        # where the speed is uneven, gas and inertia drive it: they are a part of everything
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
+        # at an uneven speed, gas and inertia affect all loads
         if fidelity.is_uneven or not self.is_there(scale.problem):
             return fidelity
         less = replace(fidelity, **self.less)
-        return less if scale.loses(less) - scale.loses(fidelity) <= PART_SHARE * room else fidelity
+        return less if scale.loses(less) - scale.loses(fidelity) <= PART_SHARE * allowed_error else fidelity
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         if not self.is_there(scale.problem):
             return [LeftOut(self.what, "the problem describes none")]
         if self.is_active(scale.problem, fidelity):
             return []
-        why = "the objective hardly sees its roll moment"
-        return [part_left_out(scale, fidelity, replace(fidelity, **self.whole), self.what, why)]
+        reason = "the objective hardly sees its roll moment"
+        return [part_left_out(scale, fidelity, replace(fidelity, **self.whole), self.what, reason)]
 
     def rungs(self, scale: Scale) -> Rungs:
         return [(self.rung, Fidelity(samples=720, **self.less))] if self.is_there(scale.problem) else []
@@ -118,36 +121,38 @@ class _GasSamples(Knob):
     key, kind = "gas_samples", int
     schema: ClassVar = {"description": "Steps of the gas torque over the working cycle.", "ge": 48, "le": 100_000}
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if not GAS.is_active(scale.problem, fidelity):
             return replace(fidelity, gas_samples=None)
-        return first_sufficient(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * room)
+        return first_sufficient(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * allowed_error)
 
 
 class _Orders(Knob):
     key, kind = "orders", int
     schema: ClassVar = {"description": "Last order kept of pistons, rods and gas.", "ge": 1}
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if fidelity.is_uneven:
             return fidelity
-        return first_sufficient(fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
+        return first_sufficient(
+            fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * allowed_error
+        )
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.decided]
-        found = []
+        parts = []
         idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
         if idle:
-            found.append(LeftOut("loads " + ", ".join(idle), "nothing drives them"))
+            parts.append(LeftOut("loads " + ", ".join(idle), "nothing drives them"))
         last = min(float(fidelity.orders or 8), 12.0)
         orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
         silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.driving)]
         if silent:
-            found.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
+            parts.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
         if fidelity.orders is not None:
             what, restored = f"orders above {fidelity.orders}", replace(fidelity, orders=None)
-            found.append(part_left_out(scale, fidelity, restored, what, "their forces are small"))
-        return found
+            parts.append(part_left_out(scale, fidelity, restored, what, "their forces are small"))
+        return parts
 
     def rungs(self, scale: Scale) -> Rungs:
         gas = _gas_steps(scale.problem)
@@ -161,7 +166,7 @@ class _Orders(Knob):
 
 
 class _GasOrders(Knob):
-    # a choice by hand: fewer orders of everything have already spared its steps
+    # set by hand only: the automatic choice limits the orders of all loads
     key, kind = "gas_orders", int
     schema: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
 
@@ -174,7 +179,7 @@ class _GasOrders(Knob):
 
 
 class _Crankshaft(Knob):
-    """A choice by hand: neither is the truth, and what a crank of throws does lies nearer to one or the other."""
+    """Model of the crankshaft, set by hand only: real crankshafts lie between the two models."""
 
     key, kind, is_decided = "crankshaft", CrankshaftModel, False
     schema: ClassVar = {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."}
@@ -202,11 +207,11 @@ class _Samples(Knob):
     key, kind = "samples", int
     schema: ClassVar = {"description": "Steps over the working cycle.", "ge": 48, "le": 100_000}
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if fidelity.is_uneven:
             return fidelity
         lost, steps = scale.loses(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
-        return first_sufficient(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= room)
+        return first_sufficient(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= allowed_error)
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return [f"{fidelity.samples} steps over the cycle"]

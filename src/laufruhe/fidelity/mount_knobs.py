@@ -1,4 +1,4 @@
-"""Choices of fidelity of a block on elastic mounts: whether these give way, and which natural modes answer (F1)."""
+"""Knobs of the fidelity for a block on elastic mounts: rigid or elastic mounts, and the natural modes (F1)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from laufruhe.physics.fidelity import EXACT, Fidelity, MountModel
 from laufruhe.problem.problem import Problem
 
 TIME_ORDERS, TIME_SAMPLES = 12, 360
-"""Of a rung in the time domain: more orders cost minutes."""
+"""Orders and samples of the variant of a trade in the time domain; more orders take minutes."""
 RIGID = "rigid mounts, 720 steps"
-"""A rung that a report speaks of."""
+"""Name of a variant of a trade that reports mention."""
 
 
 class _OfElasticMounts(Knob):
-    """A choice for a block on elastic mounts: only one value leaves mounts to be decided."""
+    """Knob for a block on elastic mounts; with open mounts only its exact value is allowed."""
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         if value == getattr(EXACT, self.key):
@@ -28,11 +28,11 @@ class _OfElasticMounts(Knob):
         if problem.engine.block is None:
             return "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"'
         if problem.mount_decisions:
-            return "would change with the mounts that are open", "leave it out, or fix the mounts"
+            return "cannot be set while mounts are open", "leave it out, or fix the mounts"
         return None
 
     def is_open(self, scale: Scale) -> bool:
-        """Return True if the automatic choice may decide this field here."""
+        """Return True if the automatic choice may decide this field for the problem."""
         return scale.mounting is not None and not scale.problem.mount_decisions
 
 
@@ -40,7 +40,7 @@ class _Mounts(_OfElasticMounts):
     key, kind = "mounts", MountModel
     schema: ClassVar = {"description": "Elastic mounts order by order, as if they gave no way, or integrated in time."}
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if not self.is_open(scale):
             return fidelity
         rigid = replace(fidelity, mounts="rigid")
@@ -48,7 +48,7 @@ class _Mounts(_OfElasticMounts):
             lost = scale.loses(rigid)
         except UncarriedLoadError:
             return fidelity
-        return rigid if lost <= scale.loses(fidelity) + PART_SHARE * room else fidelity
+        return rigid if lost <= scale.loses(fidelity) + PART_SHARE * allowed_error else fidelity
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["mounts as if they gave no way"] if scale.mounting and fidelity.mounts == "rigid" else []
@@ -66,11 +66,11 @@ class _Mounts(_OfElasticMounts):
     def rungs(self, scale: Scale) -> Rungs:
         if scale.mounting is None or not scale.terms:
             return []
-        cut, every = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
+        cut, orders = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
         return [
             (RIGID, Fidelity(samples=720, mounts="rigid")),
-            (f"{every}, {TIME_SAMPLES} steps", cut),
-            *([(f"in time, {every}", replace(cut, mounts="time"))] if scale.mounting.dynamic.has_law else []),
+            (f"{orders}, {TIME_SAMPLES} steps", cut),
+            *([(f"in time, {orders}", replace(cut, mounts="time"))] if scale.mounting.dynamic.has_law else []),
         ]
 
 
@@ -78,41 +78,41 @@ class _Modes(_OfElasticMounts):
     key, kind = "modes", list[int]
     schema: ClassVar = {"description": "Natural modes that answer, 1 the lowest."}
 
-    def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        """Without the modes that hardly answer; what an open rotor drives stays, for its answer is not known yet."""
+    def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
+        """Return the fidelity without modes of small response; modes that open rotors excite stay."""
         if fidelity.mounts != "frequency" or not self.is_open(scale):
             return fidelity
-        allowed = scale.loses(fidelity) + PART_SHARE * room
-        chosen, kept = fidelity, scale.excited_modes
-        for mode in sorted(set(kept) - scale.decided_modes, key=lambda mode: scale.strengths[mode]):
-            kept = tuple(m for m in kept if m != mode)
-            candidate = replace(fidelity, modes=kept)
+        allowed = scale.loses(fidelity) + PART_SHARE * allowed_error
+        result, modes = fidelity, scale.excited_modes
+        for mode in sorted(set(modes) - scale.decided_modes, key=lambda mode: scale.strengths[mode]):
+            modes = tuple(m for m in modes if m != mode)
+            candidate = replace(fidelity, modes=modes)
             if scale.loses(candidate) > allowed:
                 break
-            chosen = candidate
-        return chosen
+            result = candidate
+        return result
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         if scale.mounting is None or fidelity.mounts != "frequency":
             return []
         modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
-        rest = "; modes are of the stiffness at rest, loads of that at each frequency" if scale.mounting.dynamic else ""
-        return [f"{mode_names(scale.mounting, modes)} of the block on its mounts{rest}"]
+        note = "; modes are of the stiffness at rest, loads of that at each frequency" if scale.mounting.dynamic else ""
+        return [f"{mode_names(scale.mounting, modes)} of the block on its mounts{note}"]
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         if scale.mounting is None:
             return []
-        found, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
+        parts, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
         if still:
-            found.append(LeftOut(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+            parts.append(LeftOut(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
         if fidelity.modes is not None:
             silent = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
-            what, every = f"{mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
-            found.append(part_left_out(scale, fidelity, every, what, "what they answer is small"))
-        return found
+            what, all_modes = f"{mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
+            parts.append(part_left_out(scale, fidelity, all_modes, what, "what they answer is small"))
+        return parts
 
     def rungs(self, scale: Scale) -> Rungs:
-        """The modes that answer most."""
+        """Return variants with the one and the three modes of largest response."""
         if scale.mounting is None or not scale.terms:
             return []
         by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
@@ -127,7 +127,7 @@ MOUNT_KNOBS: tuple[Knob, ...] = (_Mounts(), _Modes())
 
 
 def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
-    """Modes in words, 1 the lowest: number, motion and natural frequency."""
-    own = mounting.modes
-    named = [f"{k} ({own.names[k - 1]}, {own.frequencies[k - 1]:.3g} Hz)" for k in modes]
+    """Return the names of modes, 1 the lowest, with number, motion and natural frequency."""
+    shapes = mounting.modes
+    named = [f"{k} ({shapes.names[k - 1]}, {shapes.frequencies[k - 1]:.3g} Hz)" for k in modes]
     return f"{plural('mode', len(named))} {', '.join(named)}"

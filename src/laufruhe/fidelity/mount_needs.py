@@ -1,8 +1,8 @@
-"""What of the physics a question about a block on its mounts needs, found by taking parts away (F15).
+"""Physics that measures of a block on its mounts depend on, tested by removing parts (F15).
 
-Sag, natural frequencies and the torque-roll axis are no loads: whole parts of the physics
-do not enter them. Each part is taken away, or changed where it cannot be, and everything
-that is asked is computed again; what then stays the same to the last digits does not enter.
+Sag, natural frequencies and the torque-roll axis are no loads, and do not depend on some parts of the physics. Each
+part is removed, or changed by a tenth if it cannot be removed, and all measures are computed again. If they stay the
+same to the last digits, they do not depend on the part.
 """
 
 from __future__ import annotations
@@ -28,33 +28,35 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 
 SAME = 1e-12
-"""Relative change under which a value is the same."""
+"""Relative change below which a value counts as unchanged."""
 MORE = 1.1
-"""Factor on what cannot be taken away altogether."""
+"""Factor on numbers that cannot be removed."""
 
 
 def needs(problem: Problem) -> Choice:
-    """Return the physics that the questions about mounts depend on; the omitted parts change nothing."""
-    whole, kept, left = _values(problem), [], []
-    parts = [*_loads(problem)] if _moved(whole, _values(replace(problem, points=()))) else []
+    """Return the physics that the measures of a problem depend on; omitted parts have no effect on them."""
+    initial, dependences, left = _values(problem), [], []
+    parts = [*_loads(problem)] if _moved(initial, _values(replace(problem, points=()))) else []
     if not parts:
-        what = "loads at every speed: gas, pistons, rods, rotors"
-        left.append(LeftOut(what, "nothing that is asked depends on them"))
+        part = "loads at every speed: gas, pistons, rods, rotors"
+        left.append(LeftOut(part, "nothing that is asked depends on them"))
     for name, changed in (*parts, *_of_the_block(problem)):
-        change = _moved(whole, _values(changed))
+        change = _moved(initial, _values(changed))
         if change > SAME:
-            kept.append(f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %")
+            dependences.append(
+                f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %"
+            )
         else:
             left.append(LeftOut(name, "nothing that is asked depends on it"))
     left += _modes_of_the_sag(problem)
-    # mount force components sampled for what is asked, and by an evaluation with all loads
+    # mount force components that are sampled for these measures, and by an evaluation with all loads
     count = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
-    return Choice(problem.fidelity, 0.0, tuple(kept), tuple(left), (count if parts else 0, count))
+    return Choice(problem.fidelity, 0.0, tuple(dependences), tuple(left), (count if parts else 0, count))
 
 
 def _values(problem: Problem) -> Array:
-    evaluation, wanted = evaluate(problem), [measure for measure in problem.measures if measure.channel.is_number]
-    return np.array([value for measure in wanted for value in evaluation.values(measure)])
+    evaluation, measures = evaluate(problem), [measure for measure in problem.measures if measure.channel.is_number]
+    return np.array([value for measure in measures for value in evaluation.values(measure)])
 
 
 def _moved(before: Array, after: Array) -> float:
@@ -70,7 +72,7 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """Parts of block and mounts, each with the problem that lacks it or has more of it."""
+    """Yield parts of block and mounts, each with the problem in which it is removed or increased."""
     if problem.engine.block is None:
         return
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts

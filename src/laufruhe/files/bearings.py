@@ -14,7 +14,7 @@ from laufruhe.machine.layouts import Throw
 
 
 class MainBearingTable(Table):
-    """A main bearing."""
+    """Main bearing, or one bearing between each pair of neighbouring throws."""
 
     x: f.Length | None = f.optional("Place along the shaft.")
     beside_throws: f.PositiveLength | None = f.optional(
@@ -30,18 +30,19 @@ class MainBearingTable(Table):
 
 
 def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
-    """Return a table for every bearing, those beside throws in order from the front."""
+    """Return one table for each bearing; `beside_throws` becomes bearings between and beyond the throws of a shaft."""
     single: list[MainBearingTable] = []
     for k, table in enumerate(tables, 1):
         where, beyond = f"main_bearings[{k}]", table.beside_throws
         if (beyond is None) == (table.x is None):
-            rule = "is missing; give a place, or beside_throws" if beyond is None else "is told beside beside_throws"
-            raise Refused(f"{where}.x", None, rule, "leave one out" if beyond else '"-62.5 mm", for example')
+            rule = "is missing" if beyond is None else "is given twice, also by beside_throws"
+            remedy = "leave one out" if beyond else 'give a place such as "-62.5 mm", or beside_throws'
+            raise Refused(f"{where}.x", None, rule, remedy)
         if beyond is None:
             single.append(table)
             continue
         if table.name is not None:
-            raise Refused(f"{where}.name", table.name, "names several bearings", "leave it out")
+            raise Refused(f"{where}.name", table.name, "would name several bearings", "leave it out")
         for key in ("diameter", "width"):
             if isinstance(getattr(table, key), Open):
                 raise Refused(f"{where}.{key}", None, "is open for several bearings", "list them one by one, by x")
@@ -54,7 +55,7 @@ def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> l
 
 
 def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
-    """Return the main bearings, on shafts with slider-cranks, beside every throw and clear of each other."""
+    """Return the main bearings; refuse shafts without cranks, overlapping journals, and throws without support."""
     shafts = {part.shaft.name: part.shaft for part in parts}
     bearings: list[Bearing] = []
     for k, table in enumerate(tables, 1):
@@ -65,14 +66,14 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
             rule = "rubs on a journal whose diameter is missing"
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
         name = table.name or str(k)
-        size = [None if each is None else Open.from_value(each).start for each in (table.diameter, table.width)]
+        size = [None if value is None else Open.from_value(value).start for value in (table.diameter, table.width)]
         bearing = Bearing(name, table.x or 0.0, size[0], size[1], table.friction, shafts[table.shaft])
-        for other in bearings:
-            if name == other.name:
+        for placed in bearings:
+            if name == placed.name:
                 raise Refused(f"{where}.name", name, "is the name of another bearing", "give each its own name")
-            reach = 0.5 * ((bearing.width or 0.0) + (other.width or 0.0))
-            if bearing.shaft == other.shaft and abs(bearing.x - other.x) <= reach:
-                rule = f"lets its journal overlap that of bearing {other.name}"
+            reach = 0.5 * ((bearing.width or 0.0) + (placed.width or 0.0))
+            if bearing.shaft == placed.shaft and abs(bearing.x - placed.x) <= reach:
+                rule = f"lets its journal overlap that of bearing {placed.name}"
                 raise Refused(
                     f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move one of them, or make it narrower"
                 )
@@ -86,7 +87,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
 
 
 def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
-    # throws lie between two bearings; a single one may hang over, and one at each end of an axle
+    # throws must lie between bearings, except a single overhung throw and the two end cranks of an axle
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
         raise Refused("main_bearings", None, rule, "give it two at least")

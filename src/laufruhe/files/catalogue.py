@@ -1,4 +1,4 @@
-"""Engine catalogue, whose figures are defaults of a problem (docs/reference/engine-catalogue.md)."""
+"""Engine catalogue: data of published engines as defaults of [engine] (docs/reference/engine-catalogue.md)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _PHASES = ("throws", "firing_order")
 
 @dataclass(frozen=True)
 class CatalogueEngine:
-    """Published engine.
+    """Published engine with its data.
 
     Attributes
     ----------
     key
         Name in a problem file.
     source
-        Source of all that is not assumed.
+        Source of all data that are not assumed.
     displacement
         Published displacement, a check of bore and stroke.
     assumed
@@ -47,12 +47,12 @@ class CatalogueEngine:
     engine: Mapping[str, Any]
 
     def assumption(self, table: Mapping[str, Any]) -> str:
-        """Return the sentence about assumed values that a problem does not give; empty if it gives all."""
+        """Return the sentence about assumed values that [engine] of a problem does not give; empty if it gives all."""
         left = [f"{key.replace('_', ' ')} {as_text(self.engine[key])}" for key in self.assumed if key not in table]
         return f"{self.name}: assumed, not published: {', '.join(left)}." if left else ""
 
     def under(self, table: Mapping[str, Any]) -> dict[str, Any]:
-        """Return [engine] with the figures of the catalogue as defaults."""
+        """Return [engine] of a problem with the data of the catalogue as defaults."""
         dropped = {KEY, *(key for pair in _EITHER if any(one in table for one in pair) for key in pair)}
         if any(table.get(key) == "open" for key in _PHASES):
             dropped |= {*_PHASES}
@@ -71,7 +71,7 @@ def engines() -> Mapping[str, CatalogueEngine]:
 
 
 def engine_named(name: object, where: str) -> CatalogueEngine:
-    """Return an engine by name; `Refused` if there is none."""
+    """Return an engine of the catalogue by name; `Refused` at the key `where` if there is none."""
     engine = engines().get(name) if isinstance(name, str) else None
     if engine is None:
         remedy = nearest(str(name), list(engines()), "laufruhe engines lists them")
@@ -80,21 +80,21 @@ def engine_named(name: object, where: str) -> CatalogueEngine:
 
 
 def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
-    """Return tables with the catalogue engine written out, with its source and assumptions."""
+    """Return the tables of a file with its catalogue engine written out; source and assumptions are added."""
     value = tables.get("engine")
     table = value if isinstance(value, dict) else {KEY: value} if isinstance(value, str) else {}
     if KEY not in table:
         return tables
     engine = engine_named(table[KEY], "engine" if isinstance(value, str) else f"engine.{KEY}")
     assumptions, source = tables.get("assumptions", []), tables.get("source", "")
-    whole = {**tables, "engine": engine.under(table)}
+    completed = {**tables, "engine": engine.under(table)}
     if isinstance(assumptions, list):
-        whole["assumptions"] = [*assumptions, *filter(None, (engine.assumption(table),))]
+        completed["assumptions"] = [*assumptions, *filter(None, (engine.assumption(table),))]
     if isinstance(source, str):
-        whole["source"] = f"{source}; engine: {engine.source}" if source else engine.source
-    return whole
+        completed["source"] = f"{source}; engine: {engine.source}" if source else engine.source
+    return completed
 
 
 def as_text(value: Any) -> str:
-    """Return a value as text; a list is joined by hyphens."""
+    """Return a value as text; entries of a list are joined by hyphens."""
     return "-".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -1,4 +1,7 @@
-"""Complaints about a file: one line with place, rule and remedy. Code that assembles a problem raises `Refused`."""
+"""Complaints about a problem file: one line with key, value, rule and remedy.
+
+Code that assembles a problem raises `Refused`; the reader turns it into an `InputError` with the name of the file.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,7 @@ MOST_COMPLAINTS = 20
 _CLOSE = 0.6
 _FEW = 3
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
-"""Tables of extensions by the keys that name their objects."""
+"""Kinds of extension objects by the keys of a file that name such an object."""
 _COUNTED = {
     "too_short": ("at least", "min_length", "add what is missing"),
     "too_long": ("at most", "max_length", "take some out"),
@@ -44,40 +47,45 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """Return a complaint for every wrong key in the order of the file, up to a readable number."""
+    """Return one complaint for each wrong key, at most `MOST_COMPLAINTS` and the number of further ones.
+
+    If keys belong to extensions that are not installed, only these are reported.
+    """
     complaints: dict[str, Complaint] = {}
     errors = error.errors(include_url=False)[: 10 * MOST_COMPLAINTS]
     details = [(*_walk(detail["loc"], model), detail) for detail in errors]
     unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
     for loc, tables, detail in details:
-        # a key that is missing may be there in another spelling, which is a complaint of its own
-        words = [str(other[-1]) for other in unknown if other[:-1] == loc[:-1]]
+        # a missing key may be present in another spelling, which is a complaint of its own
+        words = [str(loc_unknown[-1]) for loc_unknown in unknown if loc_unknown[:-1] == loc[:-1]]
         if detail["type"] == "missing" and difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE):
             continue
         complaints.setdefault(key_path(loc), _complaint(detail, loc, tables, model))
     lacking = tuple(complaint for complaint in complaints.values() if complaint.remedy == INSTALL)
     if lacking:
-        # keys of a missing extension are no faults
+        # other complaints may follow from the missing extension
         return lacking
     first = list(complaints.values())[:MOST_COMPLAINTS]
-    rest = error.error_count() - len(errors) + len(complaints) - len(first)
-    more = [Complaint("file", "", f"has {rest} more such faults", "correct these first")] if rest else []
-    return (*first, *more)
+    further = error.error_count() - len(errors) + len(complaints) - len(first)
+    summary = [Complaint("file", "", f"has {further} more such faults", "correct these first")] if further else []
+    return (*first, *summary)
 
 
 def _walk(loc: Loc, model: type[BaseModel]) -> tuple[Loc, list[type[BaseModel]]]:
-    """Return a path without the tags of unions (gas.seiliger.imep), and the tables at its end."""
+    """Return a path of pydantic without the tags of unions (gas.seiliger.imep), and the models of the tables there."""
     path: list[str | int] = []
-    here = [model]
+    models = [model]
     for part in loc:
-        fields = [table.model_fields[part] for table in here if part in table.model_fields]
-        if len(here) > 1 and isinstance(part, str):
-            here = [table for table in here if any(part in get_args(f.annotation) for f in table.model_fields.values())]
+        fields = [table.model_fields[part] for table in models if part in table.model_fields]
+        if len(models) > 1 and isinstance(part, str):
+            models = [
+                table for table in models if any(part in get_args(f.annotation) for f in table.model_fields.values())
+            ]
             continue
         path.append(part)
         if isinstance(part, str) and fields:
-            here = [table for field in fields for table in _tables_in(field.annotation)]
-    return tuple(path), here
+            models = [table for field in fields for table in _tables_in(field.annotation)]
+    return tuple(path), models
 
 
 def _tables_in(annotation: Any) -> list[type[BaseModel]]:
@@ -87,7 +95,7 @@ def _tables_in(annotation: Any) -> list[type[BaseModel]]:
 
 
 def key_path(loc: Sequence[str | int]) -> str:
-    """Return a path as engine.throws[2], counted from one, with keys in quotes as in TOML."""
+    """Return a path as text such as engine.throws[2], with indices from one and unusual keys in quotes."""
     text = ""
     for part in loc:
         key = f"[{part + 1}]" if isinstance(part, int) else toml_key(part)
@@ -96,7 +104,7 @@ def key_path(loc: Sequence[str | int]) -> str:
 
 
 def short(value: Any) -> str:
-    """Return a value as the file has it, cut if it is long."""
+    """Return a value as it stands in the file, cut after 60 characters."""
     if isinstance(value, dict | list):
         return printed(json.dumps(value, default=str, ensure_ascii=False), 60)
     return printed(f'"{value}"' if isinstance(value, str) else str(value), 60)
@@ -108,12 +116,15 @@ def _plain(word: str) -> str:
 
 
 def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
-    """Return a remedy that names the nearest word, the words that contain it, or else `otherwise` or all words."""
-    plain = {_plain(each): each for each in words}
+    """Return the remedy for a word that is not among the allowed words.
+
+    It names the nearest word, or the words that contain it; else it is `otherwise`, by default a list of all words.
+    """
+    plain = {_plain(candidate): candidate for candidate in words}
     parts = set(_plain(word).split())
     holding = sorted(
-        each for each in words
-        if len(word) >= _FEW and (word.lower() in each.lower() or parts < set(_plain(each).split()))
+        candidate for candidate in words
+        if len(word) >= _FEW and (word.lower() in candidate.lower() or parts < set(_plain(candidate).split()))
     )  # fmt: skip
     close = difflib.get_close_matches(_plain(word), plain, n=1, cutoff=_CLOSE)
     if len(holding) == 1 or (close and not holding):
@@ -122,8 +133,8 @@ def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
 
 
 def nearest_file(path: Path, otherwise: str) -> str:
-    """Return a remedy that names the file closest to a missing one."""
-    names = [other.stem for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    """Return the remedy for a missing file: the nearest file name in its folder, or `otherwise`."""
+    names = [path_in_folder.stem for path_in_folder in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     close = difflib.get_close_matches(path.stem, names, n=1, cutoff=_CLOSE)
     return f"did you mean '{path.with_name(close[0])}.toml'?" if close else otherwise
 
@@ -141,7 +152,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         ]
         remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")
         if loc[-1] == "unit":
-            remedy = 'a unit stands beside its number, as in "120 mm"'
+            remedy = 'write the unit with its number, as in "120 mm"'
         return Complaint(where, short(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
@@ -158,7 +169,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         if table and (extension := HOMES[table].get(str(value))):
             return Complaint(where, short(value), *lack(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
-        # of two or three words all are named: the nearest in letters may not be meant
+        # two or three words are all named, because the nearest spelling may be the wrong one
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
         return Complaint(where, short(value), "is not allowed", remedy)
     if kind in _COUNTED:
@@ -172,7 +183,17 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
 
 
 class Refused(LaufruheError):
-    """Complaint while a problem is assembled; the reader adds the name of the file."""
+    """Refusal of a key while a problem is assembled; the reader adds the name of the file.
+
+    Parameters
+    ----------
+    where
+        Key, such as engine.throws[2].
+    value
+        Value in the file; None to leave it out of the message.
+    rule, remedy
+        Broken rule as the end of a sentence about the key, and remedy as an instruction.
+    """
 
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
         self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
@@ -180,12 +201,12 @@ class Refused(LaufruheError):
 
 
 def number_read(number: Number, place: Sequence[str | int], raw: Any) -> float | Open:
-    """Read the number at a place of a file.
+    """Return the number that a field reads from a raw value of a file [SI].
 
     Raises
     ------
     Refused
-        If it is no such number.
+        At `place`, if the value is no number that the field allows.
     """
     try:
         return number.read(raw)
@@ -196,7 +217,7 @@ def number_read(number: Number, place: Sequence[str | int], raw: Any) -> float |
 
 @contextmanager
 def in_file(source: object) -> Iterator[None]:
-    """Turn `Refused` into `InputError` with the name of the file."""
+    """Turn `Refused` in the block into `InputError` with the name of the file, `source`."""
     try:
         yield
     except Refused as refused:
@@ -204,19 +225,31 @@ def in_file(source: object) -> Iterator[None]:
 
 
 def measured(text: str | float, unit: str, where: str, unit_text: str | None = None) -> float:
-    """Return the SI value of a text such as '120 mm' or of a number; `given` is the unit alone at a key for units."""
+    """Return the SI value of a text such as '120 mm', or of a plain number.
+
+    Parameters
+    ----------
+    text
+        Number with its unit.
+    unit
+        SI unit that fixes the dimension.
+    where
+        Key for complaints.
+    unit_text
+        Unit in the file, for keys that give a unit without a number; None for others.
+    """
     try:
         return units.parse(str(text), unit)
     except units.UnitError as error:
         complaint = Complaint.from_error(error, where)
-        # a key for units has no number
+        # the complaint about a key for units must not ask for a number
         remedy = f"use {units.usual(unit)} ..." if unit_text else complaint.remedy
         raise Refused(where, unit_text or text, complaint.rule, remedy) from None
 
 
 @contextmanager
 def blamed_on(where: str, value: str = "") -> Iterator[None]:
-    """Turn `ModelError` into a complaint about this key and its value."""
+    """Turn `ModelError` in the block into `Refused` at this key, with its value."""
     try:
         yield
     except ModelError as error:
@@ -225,7 +258,21 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
 
 
 def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
-    """Refuse both or none of two keys; `named` is the name of the other in the remedy."""
+    """Raise `Refused` unless exactly one of two keys is given.
+
+    Parameters
+    ----------
+    table
+        Table with the keys.
+    where
+        Path of the table.
+    key, other
+        The two keys.
+    shown
+        Value in the message.
+    named
+        Name of the other key in the remedy; by default the key.
+    """
     present = [getattr(table, k) not in (None, []) for k in (key, other)]
     if present[0] == present[1]:
         state = f"is given twice, also as {other}" if present[0] else "is missing"
@@ -233,14 +280,14 @@ def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None
 
 
 def none_of(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
-    """Refuse keys that mean nothing here, unless they have their default."""
+    """Raise `Refused` if one of these keys differs from its default."""
     for key in keys:
         if getattr(table, key) != type(table).model_fields[key].default:
             raise Refused(f"{where}.{key}", None, rule, remedy)
 
 
 def all_different(things: Sequence[Any], where: str, rule: str, remedy: str = "rename one") -> None:
-    """Refuse equal things."""
+    """Raise `Refused` if two values are equal; `rule` follows the word "two"."""
     for k, thing in enumerate(things):
         if thing in things[:k]:
             raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", remedy)

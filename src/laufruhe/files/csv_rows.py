@@ -10,10 +10,19 @@ MOST_ROWS, MOST_BYTES = 100_000, 10_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
-    """Return the numbers in the first columns of a file; complaints about `key` name the columns.
+    """Return the numbers in the first columns of a CSV file, one tuple for each row.
 
     Columns are separated by commas, semicolons or tabs; with the latter two a comma may be the decimal sign. The first
-    row may be a heading; rows that begin with # are skipped.
+    row may be a heading, and rows that begin with # are skipped.
+
+    Parameters
+    ----------
+    file, path
+        Name in the problem file, and path.
+    key
+        Key of the problem file for complaints.
+    columns
+        Names of the columns for complaints.
     """
     remedy, row_name = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
     try:
@@ -22,11 +31,11 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
         if len(content) > MOST_BYTES:
-            raise Refused(key, file, f"is larger than {MOST_BYTES // 1_000_000} MB", "thin it out")
+            raise Refused(key, file, f"is larger than {MOST_BYTES // 1_000_000} MB", "remove rows")
         text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
-        why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
-        raise Refused(key, file, f"cannot be read ({why})", remedy) from None
+        reason = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
+        raise Refused(key, file, f"cannot be read ({reason})", remedy) from None
     separator = next((sign for sign in ";\t" if sign in text), ",")
     rows: list[tuple[float, ...]] = []
     heading = True
@@ -43,5 +52,5 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
                 raise Refused(key, file, rule, "write: " + ", ".join(columns)) from None
         heading = False
         if len(rows) > MOST_ROWS:
-            raise Refused(key, file, f"has more than {MOST_ROWS} rows", "thin it out")
+            raise Refused(key, file, f"has more than {MOST_ROWS} rows", "remove rows")
     return rows

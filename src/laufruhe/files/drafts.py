@@ -1,4 +1,4 @@
-"""Drafts of problem files: the usual tables with comments on what to change."""
+"""Drafts of problem files: the usual tables with comments about what to change."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 SPEED = "3000 rpm"
 _ASIDE = 0.25
 _OVERHANG = 0.1
-# fraction of one cylinder's force, or of its moment about the middle, from which an order is worth balancing
+# smallest fraction of one cylinder's force, or of its moment about the middle, at which balancing an order pays
 _WORTH = 0.02
 _HEAD = """\
 {schema}
@@ -57,7 +57,7 @@ alternating = true              # without the steady reaction to the mean torque
 
 @dataclass(frozen=True)
 class _Excitation:
-    """Free force and couple of one order, and whether they are worth balancing."""
+    """Free force [N] and couple [N m] of one order; `is_large` is True if balancing pays."""
 
     order: int
     force: float
@@ -69,7 +69,7 @@ class _Excitation:
 
 
 def draft_of_engine(name: str) -> str:
-    """Return the draft for an engine of the catalogue; `Refused` if there is none of that name."""
+    """Return the text of a draft for an engine of the catalogue; `Refused` if there is none of this name."""
     entry = engine_named(name, "engine")
     lines = {key: f"# {key} = {toml_value(value)}" for key, value in entry.engine.items()}
     published = [line for key, line in lines.items() if key not in entry.assumed]
@@ -84,47 +84,49 @@ def draft_of_engine(name: str) -> str:
 
 
 def draft_of_table(title: str, engine: Mapping[str, Any], path: Path) -> str:
-    """Return the draft for a described engine; an `InputError` names the file if it cannot exist."""
+    """Return the text of a draft for an [engine] table; `InputError` for the file if the engine cannot exist."""
     lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
     return _draft(title, f"\n[engine]\n{lines}\n", engine_of_table(title, engine, path))
 
 
 def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
-    """Return the engine of a table; an `InputError` names the file if it cannot exist."""
+    """Return the engine of an [engine] table; `InputError` for the file if the engine cannot exist."""
     tables = {"title": title, "engine": dict(engine), "operating_points": [{"speed": SPEED}]}
     return load_tables(tables, path).engine
 
 
-def _draft(title: str, engine: str, built: Engine) -> str:
-    half = max(abs(part.x) for part in built.slider_cranks) + _OVERHANG
+def _draft(title: str, engine: str, built_engine: Engine) -> str:
+    half = max(abs(part.x) for part in built_engine.slider_cranks) + _OVERHANG
     places = [(x, y) for x in (half, -half) for y in (_ASIDE, -_ASIDE)]
     mounts = "\n".join(f'    ["{1e3 * x:g} mm", "{1e3 * y:g} mm", "0 mm"],' for x, y in places)
-    balance = _balance(built)
+    balance = _balance(built_engine)
     return _HEAD.format(
         schema=schema_line(), title=toml_value(title), engine=engine, speed=SPEED, mounts=mounts, balance=balance
     )
 
 
 def _free(engine: Engine) -> list[_Excitation]:
-    """Return free forces and couples of first and second order, without the roll moment."""
+    """Return the free forces and couples of first and second order, without the roll moment."""
     speed = units.parse(SPEED, "rad/s")
     wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
     parts = engine.slider_cranks
-    one = max(part.reciprocating_mass * part.crank_radius for part in parts) * speed**2
+    unit_force = max(part.reciprocating_mass * part.crank_radius for part in parts) * speed**2
     arm = max((abs(part.x) for part in parts), default=0.0) or 0.1
     excitations = []
     for order in (1, 2):
         amplitudes = wrench.at(order)
         force = float(order_amplitude(amplitudes[:3]))
         couple = float(order_amplitude(amplitudes[4:]))
-        is_large = force > _WORTH * one or couple > _WORTH * one * arm
-        force, couple = (0.0 if value < 1e-9 * scale else value for value, scale in ((force, one), (couple, one * arm)))
+        is_large = force > _WORTH * unit_force or couple > _WORTH * unit_force * arm
+        force, couple = (
+            0.0 if value < 1e-9 * scale else value for value, scale in ((force, unit_force), (couple, unit_force * arm))
+        )
         excitations.append(_Excitation(order, force, couple, is_large))
     return excitations
 
 
 def _balance(engine: Engine) -> str:
-    """Return weights and shafts that may balance free forces and couples."""
+    """Return the lines with counterweights and balancer shafts that may balance free forces and couples."""
     free = _free(engine)
     lines = [f"# Free at {SPEED}: {'; '.join(map(str, free))}."]
     half = max(abs(part.x) for part in engine.slider_cranks)
@@ -143,7 +145,7 @@ def _balance(engine: Engine) -> str:
                 named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
                 lines += ["[[balancer_shafts.unbalances]]", *named, *_open(0.25 * ratio * moment)]
             lines.append("")
-    if not any(one.is_large for one in free):
+    if not any(excitation.is_large for excitation in free):
         lines += ["# Nothing of first or second order is left to balance; weights are shown as an example."]
         lines += _webs(half, moment)
     return "\n".join(lines) + "\n"

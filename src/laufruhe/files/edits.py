@@ -1,4 +1,4 @@
-"""Edits of a problem file by the names that results show: numbers at other values, left open, or fixed."""
+"""Edits of the tables of a problem file: numbers, by their names in results, get other values, are opened or fixed."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _THROW, _BUILT = re.compile(r"throw (\d{1,3})"), " built"
 
 
 def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with numbers at other values; open numbers start there and stay open.
+    """Return tables with other values of named numbers; open numbers start there and stay open.
 
-    Open throws have no start; values for all of them fix the crank that a result shows.
+    Open throws have no start, so values for all throws fix the crank of a result.
     """
     engine, edited = tables.get("engine", {}), dict(tables)
     star = {int(throw[1]): name for name in values if (throw := _THROW.fullmatch(name))}
@@ -32,23 +32,23 @@ def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     if engine.get("throws") == "open" and star and sorted(star) == list(range(1, len(star) + 1)):
         phases = {key: values[name] for key in PHASES if (name := key.replace("_", " ")) in values}
         phases["throws"] = [values[star[k]] for k in sorted(star)]
-        built = {name: name.removesuffix(_BUILT) for name in values if name.endswith(_BUILT)}
-        edited = with_star(tables, phases, [shaft for name, shaft in built.items() if not float(values[name])])
-        done = {*star.values(), *built, *(key.replace("_", " ") for key in phases)}
+        built_names = {name: name.removesuffix(_BUILT) for name in values if name.endswith(_BUILT)}
+        edited = with_star(tables, phases, [shaft for name, shaft in built_names.items() if not float(values[name])])
+        done = {*star.values(), *built_names, *(key.replace("_", " ") for key in phases)}
     for name, value in values.items():
         edited = edited if name in done else with_value(edited, name, value)
     return edited
 
 
 def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
-    """Return tables with a number at another value; an open one starts there and stays open."""
+    """Return tables with another value of one number; an open one starts there and stays open."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
     return put(tables, keys, {**now, "start": value} if _is_open(now) else value)
 
 
 def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
-    """Return tables with a number left open; by default it starts at its present value."""
+    """Return tables with a number open between `low` and `high`; by default it starts at its present value."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
     first = start if start is not None else now.get("start") if _is_open(now) else now
@@ -56,15 +56,15 @@ def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start
 
 
 def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
-    """Return tables with a number fixed at a value, or at its start."""
+    """Return tables with a number fixed at a value, by default at its start."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
     if value is None:
         if not _is_open(now):
-            raise Refused(name, now, "is not open", "give the value that it is to have")
+            raise Refused(name, now, "is not open", "give a value for it")
         value = now.get("start", _default_start(*now["between"]))
     edited = put(tables, keys, value)
-    # an angle is open with its size only
+    # an angle may be open only together with its size
     if keys[-1] in _SIZES and _is_open(at(edited, (*keys[:-1], "angle"))):
         return fix_number(edited, f"{name.rpartition('.')[0]}.angle")
     return edited
@@ -75,13 +75,23 @@ PHASES = ("throws", "firing_order", "bank_angle", "split_pin_angle")
 
 
 def with_star(tables: Mapping[str, Any], star: Mapping[str, Any], gone: Collection[str]) -> dict[str, Any]:
-    """Return tables with a crank, its firing order and bank angles fixed, without the shafts in `gone`."""
+    """Return tables with a fixed crank star, without open phasing.
+
+    Parameters
+    ----------
+    tables
+        Tables of a problem file.
+    star
+        Values of the keys in `PHASES`: throws, firing order, bank angles.
+    gone
+        Names of balancer shafts to remove.
+    """
     phases = {key: star[key] for key in PHASES if star.get(key) is not None}
     edited = {**tables, "engine": {**tables["engine"], **phases}}
     edited.pop("phasing", None)
     if "balancer_shafts" in tables:
-        built = [shaft for shaft in tables["balancer_shafts"] if shaft.get("name") not in gone]
-        edited["balancer_shafts"] = [{k: v for k, v in shaft.items() if k != "optional"} for shaft in built]
+        remaining = [shaft for shaft in tables["balancer_shafts"] if shaft.get("name") not in gone]
+        edited["balancer_shafts"] = [{k: v for k, v in shaft.items() if k != "optional"} for shaft in remaining]
     return edited
 
 
@@ -100,17 +110,17 @@ def _is_negative(value: Any) -> bool:
 
 
 def unit_of_bounds(tables: Mapping[str, Any], name: str) -> str:
-    """Return the unit of the bounds of an open number; empty if they have none."""
+    """Return the unit in which the file gives a number or its bounds; empty without a unit."""
     now = at(tables, keys_by_name(tables, name))
     bound = now["between"][-1] if _is_open(now) else now
     return units.unit_of(bound) if isinstance(bound, str) else ""
 
 
 def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
-    """Return the place of a number, named as in results or by a path as in studies."""
-    first, _, rest = name.partition(".")
+    """Return the address of a number from its name in results or its path in studies."""
+    first, _, remainder = name.partition(".")
     if name.replace(" ", "_") in tables.get("engine", {}):
-        # masses of all cylinders are named by their key alone
+        # numbers of all cylinders are named by their key alone
         return "engine", name.replace(" ", "_")
     if throw := _THROW.fullmatch(name):
         throws, k = tables.get("engine", {}).get("throws"), int(throw[1]) - 1
@@ -118,21 +128,25 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
             remedy = "give values for all throws, or write them into the problem file first"
             raise Refused(name, None, "is no number of this problem", remedy)
         return "engine", "throws", k
-    named = list(_named(tables))
-    # a part may have the name of a table: names in results come first
-    known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
-    for label, keys in sorted(known, key=lambda pair: -len(pair[0])):
+    labelled = list(_named(tables))
+    # names in results come before names of tables
+    matches = [(label, keys) for label, keys in labelled if name.startswith(f"{label}.")]
+    for label, keys in sorted(matches, key=lambda pair: -len(pair[0])):
         below = _below(at(tables, keys), name.removeprefix(f"{label}.").split("."))
         if below is not None:
             return (*keys, *below)
-    if first in file_model().model_fields and rest and (first in tables or first not in {label for label, _ in named}):
+    if (
+        first in file_model().model_fields
+        and remainder
+        and (first in tables or first not in {label for label, _ in labelled})
+    ):
         parent, _, last = name.rpartition(".")
         keys = keys_of(dict(tables), parent)
-        here = at(tables, keys)
-        return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
+        parent_value = at(tables, keys)
+        return (*keys, last) if isinstance(parent_value, dict) else keys_of(dict(tables), name)
     names = [
         f"{label}.{key}"
-        for label, keys in named
+        for label, keys in labelled
         for key, value in at(tables, keys).items()
         if key not in ("name", "mirror_of") and type(value) in (int, float, str, dict)
     ]
@@ -140,7 +154,7 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
 
 
 def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
-    """Yield the names of parts in results, and their places in the file."""
+    """Yield the name of each part in results, and the address of its table in the file."""
     for k, weight in enumerate(tables.get("counterweights", ())):
         yield weight.get("name", ""), ("counterweights", k)
     for k, shaft in enumerate(tables.get("balancer_shafts", ())):
@@ -163,14 +177,14 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
         yield place.get("name", str(k + 1)), ("mounts", "places", k)
 
 
-def _below(here: Mapping[str, Any], words: list[str]) -> Keys | None:
-    # place in a table of a name after that of the table
-    if len(words) == 2 and words[1] in _AXES and isinstance(here.get(words[0]), list):
+def _below(table: Mapping[str, Any], words: list[str]) -> Keys | None:
+    # address within the table of a part of the words after its name
+    if len(words) == 2 and words[1] in _AXES and isinstance(table.get(words[0]), list):
         return words[0], _AXES[words[1]]
-    if len(words) == 1 and words[0] in _ACROSS and "ratio" in here:
+    if len(words) == 1 and words[0] in _ACROSS and "ratio" in table:
         return "position", _ACROSS[words[0]]
-    others = (*_SIZES, "angle", "x", "radius", "loss_factor")
-    return (words[0],) if len(words) == 1 and (words[0] in here or words[0] in others) else None
+    further_keys = (*_SIZES, "angle", "x", "radius", "loss_factor")
+    return (words[0],) if len(words) == 1 and (words[0] in table or words[0] in further_keys) else None
 
 
 def _is_open(value: Any) -> bool:

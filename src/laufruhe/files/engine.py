@@ -1,4 +1,4 @@
-"""[engine] of a problem file: its tables, the slider-cranks that they make, and open masses and leads."""
+"""[engine] of a problem file: its tables, the slider-cranks of the engine, and decisions about masses and leads."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _SECOND, _RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
 
 class RodTable(Table):
-    """The connecting rod as a rigid body."""
+    """Connecting rod as a rigid body."""
 
     mass: f.PositiveMass
     centre_of_gravity: f.Length = f.required(
@@ -47,19 +47,19 @@ class RodTable(Table):
 
 
 class BigEndTable(Table):
-    """The rod's bearing on the crank pin."""
+    """Big-end bearing of the rod on the crank pin."""
 
     diameter: f.OpenPositiveLength
     width: f.OpenPositiveLength
 
     @property
     def size(self) -> tuple[float, float]:
-        """Diameter and width [m], open ones at their start."""
+        """Diameter and width [m]; open numbers at their start."""
         return Open.from_value(self.diameter).start, Open.from_value(self.width).start
 
 
 class ShaftTable(Table):
-    """A crankshaft of a free list of parts."""
+    """Crankshaft in a free list of parts."""
 
     name: Name
     ratio: f.Ratio = 1.0
@@ -68,7 +68,7 @@ class ShaftTable(Table):
 
 
 class SliderCrankTable(Table):
-    """Slider-crank of a free list of parts; missing keys are those of [engine]."""
+    """Slider-crank in a free list of parts; missing keys are those of [engine]."""
 
     x: f.Length
     bank_angle: f.Angle = f.optional("Angle of the cylinder axis, from upright towards the left.", 0.0)
@@ -104,12 +104,12 @@ _KINDS: dict[str, Any] = {
 
 
 def _with_owned_keys(table: type[T]) -> type[T]:
-    # [engine] with the names of all layouts and drives, and their own keys
+    # [engine] with the names of all layouts and drives, and with their own keys
     names: Any = tuple(LAYOUTS)
     drives: Any = tuple(DRIVES)
     fields: dict[str, Any] = {"layout": (Literal[names], ...), "drive": (Literal[drives], "slider-crank")}
-    owned = [kind.keys for kind in LAYOUTS.values()] + [kind.keys for kind in DRIVES.values()]
-    for key in (key for keys in owned for key in keys):
+    key_sets = [kind.keys for kind in LAYOUTS.values()] + [kind.keys for kind in DRIVES.values()]
+    for key in (key for keys in key_sets for key in keys):
         kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
         fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
     return f.with_keys(table, fields)
@@ -143,14 +143,14 @@ class EngineTable(Table):
 
     @property
     def piston_mass(self) -> Open:
-        """Reciprocating mass without a share of the rod; it may be open."""
+        """Reciprocating mass without a share of the rod [kg]; it may be open."""
         return Open.from_value(self.reciprocating_mass or 0.0)
 
     @property
     def open_masses(self) -> dict[str, Open]:
-        """Open masses by their keys, which are those of the mechanisms."""
+        """Open masses by their keys, which are also the names of attributes of mechanisms."""
         keys = ["reciprocating_mass", *(k.name for k in DRIVES[self.drive].keys if k.kind == "open mass")]
-        return {key: own for key in keys if isinstance(own := getattr(self, key), Open) and own.is_open}
+        return {key: mass for key in keys if isinstance(mass := getattr(self, key), Open) and mass.is_open}
 
     @property
     def listed_throws(self) -> list[float] | None:
@@ -164,7 +164,7 @@ class EngineTable(Table):
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
     def value_of(self, key: str) -> Any:
-        """Return the value of a key that a layout owns."""
+        """Return the value of a key, also of one that a layout or drive adds."""
         return getattr(self, key)
 
     @property
@@ -180,18 +180,18 @@ def cycle_of(table: EngineTable) -> Cycle:
 
 
 def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Return the slider-cranks of [engine], and the throws that they work on."""
+    """Return the slider-cranks and throws of [engine]; `gas` is True if gas acts on the bore."""
     kind = table.kind
     for key in _OWNED:
         if table.value_of(key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
     _check_pistons(table)
     drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
-    none_of(table, [key.name for other in DRIVES.values() for key in other.keys if key not in drive.keys], "engine",
-            rule, "leave it out")  # fmt: skip
+    foreign_keys = [key.name for other_drive in DRIVES.values() for key in other_drive.keys if key not in drive.keys]
+    none_of(table, foreign_keys, "engine", rule, "leave it out")
     if kind.needs_rod and not drive.has_rod:
         remedy = "leave it out, or take another layout"
-        raise Refused("engine.drive", table.drive, "has no rod that could carry the others", remedy)
+        raise Refused("engine.drive", table.drive, "has no rod, and this layout needs a master rod", remedy)
     if not drive.has_rod:
         none_of(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
     bores = [part.bore for part in table.slider_cranks] or [None]
@@ -209,9 +209,9 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
 
 def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
     for k, part in enumerate(parts):
-        for other in parts[:k]:
-            if part.faces(other) and minimum_room(part, other) <= 0.0:
-                rule = f"leaves {part.name} and {other.name} no chamber: their pins meet"
+        for previous in parts[:k]:
+            if part.faces(previous) and minimum_room(part, previous) <= 0.0:
+                rule = f"leaves {part.name} and {previous.name} no chamber: their pins meet"
                 raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
     with blamed_on("engine"):
         return with_shared_chambers(parts, cycle_of(table).angle) if gas else tuple(parts)
@@ -227,37 +227,37 @@ def _check_pistons(table: EngineTable) -> None:
 
 
 def layout_of(table: EngineTable) -> Layout:
-    """Return the layout: positions, banks and pins without masses."""
+    """Return the layout of [engine]: positions, banks and pins, without masses."""
     _check_pistons(table)
     with blamed_on("engine.cylinders"):
         return table.kind.place(_layout_input(table))
 
 
 def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
-    """Return the input of the layout."""
+    """Return the numbers that the layout needs, with open masses and leads at their start."""
     values = {key.name: table.value_of(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
-    own = {
+    numbers = {
         name: value if not isinstance(value, Open) else value.start if name in masses else None
         for name, value in values.items()
     }
-    rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
+    rods = {name: value.model_dump() for name, value in numbers.items() if isinstance(value, RodTable)}
     order = None if table.listed_order is None else tuple(table.listed_order)
     counts = cylinder_counts(table)
     if not counts:
         raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
     first, count = counts[0]
-    for key, other in counts:
-        if other != count:
-            rule = f"makes {counted(other, 'cylinder')}, but engine.{first} makes {count}"
-            raise Refused(f"engine.{key}", None, rule, "let them agree")
+    for key, other_count in counts:
+        if other_count != count:
+            rule = f"gives {counted(other_count, 'cylinder')}, but engine.{first} gives {count}"
+            raise Refused(f"engine.{key}", None, rule, "make them agree")
     check_order(table.listed_order, count)
-    mechanism, rod = _mechanism(table, own)
-    return LayoutInput(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
+    mechanism, rod = _mechanism(table, numbers)
+    return LayoutInput(cycle_of(table), count, mechanism, numbers | rods, order, table.piston_mass.start, rod, gas)
 
 
 def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
-    """Return the keys that give the number of cylinders, with that number."""
+    """Return (key, number) for each key of [engine] that determines the number of cylinders."""
     throws, order, per_throw = table.throws, table.listed_order, table.kind.cylinders_per_throw
     counts = [("cylinders", table.cylinders)] if table.cylinders is not None else []
     if order is not None and not order:
@@ -267,7 +267,7 @@ def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
 
 
 def check_order(order: Sequence[int] | None, count: int) -> None:
-    """Refuse a firing order that does not name every cylinder once."""
+    """Raise `Refused` for a firing order that is not a permutation of the cylinders."""
     if order is not None and sorted(order) != list(range(1, count + 1)):
         rule = f"is no permutation of 1 to {count}"
         raise Refused("engine.firing_order", list(order), rule, "name every cylinder once")
@@ -287,7 +287,7 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
 
 
 def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
-    """Return masses and lengths of one cylinder, and its rod if that is a rigid body."""
+    """Return masses and lengths of one cylinder, and its rod if it is a rigid body, else None."""
     big_end = None if table.big_end is None else table.big_end.size
     if not table.kind.has_pistons:
         return table.kind.mechanism(values or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
@@ -336,10 +336,10 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
         key, value = (
             ("rod_length", units.quantity_text(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
         )
-        rule = f"does not let the crank turn, (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
+        rule = f"blocks the crank: (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
         remedy = "lengthen the rod"
         if ratio is not None and ratio >= 1.0:
-            remedy = "give crank radius over rod length, for example 0.27, or a length as rod_length"
+            remedy = "give crank radius over rod length, for example 0.27; for a length write rod_length"
         raise Refused(f"engine.{key}", value, rule, remedy)
     return radius, rod
 
@@ -354,31 +354,41 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
         with blamed_on(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
-    # slider-cranks on one throw share the mass that is given for every throw
+    # slider-cranks on one throw share the rotating mass of the throw
     pins = [(part.shaft, part.x, direction(part.throw)) for part in table.slider_cranks if part.rotating_mass is None]
     parts = []
     for k, part in enumerate(table.slider_cranks, 1):
         where = f"engine.slider_cranks[{k}]"
         if part.shaft not in shafts:
             raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
-        own = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
+        overrides = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
         if part.rod_ratio is not None or part.rod_length is not None:
-            own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
-        own_shaft, rotating = shafts[part.shaft], part.rotating_mass
+            overrides |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
+        carrying_shaft, rotating = shafts[part.shaft], part.rotating_mass
         if rotating is None:
             rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
         with blamed_on(where):
-            mechanism, _ = _mechanism(table.model_copy(update=own))
-            first = (part.bank_angle - part.throw) / own_shaft.ratio % (math.tau / abs(own_shaft.ratio))
+            mechanism, _ = _mechanism(table.model_copy(update=overrides))
+            first = (part.bank_angle - part.throw) / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
-            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, own_shaft))
+            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, carrying_shaft))
     return parts_with_leads(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
 
 
 def piston_masses(
     table: EngineTable, parts: Sequence[SliderCrank], weights: Sequence[CounterweightTable]
 ) -> list[Decision]:
-    """Return decisions about masses of slider-cranks: of all that give none of their own, and of single ones."""
+    """Return decisions about open masses of slider-cranks: common ones of [engine], and those of single parts.
+
+    Parameters
+    ----------
+    table
+        Table [engine].
+    parts
+        Slider-cranks of the engine.
+    weights
+        Counterweights, which may not have balance factors if a mass is open.
+    """
     second = getattr(table, _SECOND)
     decisions = list[Decision]()
 
@@ -386,10 +396,10 @@ def piston_masses(
         decisions.extend(mass.decisions(name, "kg", *(NumberDrive(Kind.PISTON, (part, key)) for part in names)))
 
     for key, mass in table.open_masses.items():
-        own = [getattr(row, key, None) for row in table.slider_cranks] or [
+        part_masses = [getattr(row, key, None) for row in table.slider_cranks] or [
             second if part.shaft != CRANKSHAFT and key == _RECIPROCATING else None for part in parts
         ]
-        names = [part.name for part, mass_of in zip(parts, own, strict=True) if mass_of is None]
+        names = [part.name for part, mass_of in zip(parts, part_masses, strict=True) if mass_of is None]
         decide(key.replace("_", " "), mass, names, key)
     if isinstance(second, Open):
         names = [part.name for part in parts if part.shaft != CRANKSHAFT]
@@ -403,15 +413,15 @@ def piston_masses(
 
 
 def leads_of(table: EngineTable) -> list[Decision]:
-    """Return a decision for every shaft with an open phase lead."""
+    """Return one decision for each shaft with an open phase lead."""
     lead, ports = table.value_of("crank_lead"), table.value_of("port_arc")
-    # the layout knows the start only
+    # the layout checks the start only
     if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
-        rule = f"goes beyond the ports, which are open for {units.quantity_text(ports, 'rad')}"
+        rule = f"may exceed the angle for which the ports are open, {units.quantity_text(ports, 'rad')}"
         raise Refused("engine.crank_lead", None, rule, "narrow its bounds")
     leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
     return [
         decision
-        for name, shaft, own in (*leads, ("crank lead", _OPPOSED, lead))
-        for decision in Open.from_value(own).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
+        for name, shaft, lead_angle in (*leads, ("crank lead", _OPPOSED, lead))
+        for decision in Open.from_value(lead_angle).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
     ]

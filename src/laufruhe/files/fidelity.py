@@ -1,4 +1,4 @@
-"""[fidelity] of a problem file: fidelity options by hand, or the cheapest that is accurate enough."""
+"""[fidelity] of a problem file: explicit fidelity options, or the cheapest ones that are accurate enough."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _with_knobs(table: type[T]) -> type[T]:
 class FidelityTable(Table):
     """Fidelity of the physics; exact by default."""
 
-    closed: ClassVar[str] = "says how exactly things are computed, not what the engine is"
+    closed: ClassVar[str] = "sets the accuracy of the computation, not the engine"
 
     kinematics: Literal["exact", "two-order", "auto"] = f.optional(
         "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",
@@ -56,7 +56,7 @@ def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
         if value is None or value == "auto":
             continue
         if is_auto and knob.is_decided:
-            raise Refused(f"fidelity.{knob.key}", value, "is what auto decides", "leave it out")
+            raise Refused(f"fidelity.{knob.key}", value, 'is chosen by kinematics = "auto"', "leave it out")
         refused = knob.refused(problem, value)
         if refused is not None:
             raise Refused(f"fidelity.{knob.key}", value, *refused)

@@ -44,7 +44,7 @@ _TOLERANCE = {"type": "string", "description": "How far a built one may be off."
 
 @dataclass(frozen=True)
 class Open:
-    """Open number between bounds [SI], with a start value."""
+    """Open number with lower bound, upper bound and start value [SI]."""
 
     lower: float
     upper: float
@@ -52,7 +52,7 @@ class Open:
 
     @classmethod
     def from_value(cls, value: float | Open | None) -> Open:
-        """Return a number as open: a fixed one has equal bounds, None is zero."""
+        """Return a value as an open number; a fixed value gets equal bounds, None counts as zero."""
         return value if isinstance(value, Open) else cls(*(float(value or 0.0),) * 3)
 
     @property
@@ -66,7 +66,7 @@ class Open:
         return self.lower < self.upper
 
     def decisions(self, name: str, unit: str, *drives: Drive) -> list[Decision]:
-        """Return one decision if it is open, else none."""
+        """Return a list with one decision if the bounds differ, else an empty list."""
         return [Decision(name, unit, Interval(*self.bounds), self.start, drives)] if self.is_open else []
 
 
@@ -85,7 +85,7 @@ class Number:
     plain
         Factor that turns a bare number into SI, if one is allowed (degrees).
     closed
-        Reason why it may never be open, as the end of "it ..."; empty if a search may move it.
+        Reason why it may never be open, as the end of a sentence "it ..."; empty if it may.
     """
 
     unit: str
@@ -120,12 +120,12 @@ class Number:
             # a number with a tolerance is text
             return {"anyOf": [{"type": "number"}, {"type": "string", "examples": ["0.26 ± 1 %"]}]}
         dimension = units.dimension_name(self.unit)
-        about = {"description": dimension, "x-dimension": dimension, "examples": [units.example(self.unit)]}
-        text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **about}
+        annotations = {"description": dimension, "x-dimension": dimension, "examples": [units.example(self.unit)]}
+        text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **annotations}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def read(self, raw: Any) -> float | Open:
-        """Return a number [SI], or an open one."""
+        """Return a raw value of a file as a number or open number [SI]; raise a pydantic error if it is neither."""
         return self._open(raw) if isinstance(raw, dict) else self._bounded(self._number(raw))
 
     def _number(self, raw: Any) -> float:
@@ -145,9 +145,9 @@ class Number:
 
     def _bounded(self, value: float) -> float:
         if abs(value) > LARGEST:
-            raise refusal(f"is beyond any engine; {units.advice(self.unit)}")
+            raise refusal(f"is too large for any engine; {units.advice(self.unit)}")
         if 0.0 < abs(value) < SMALLEST:
-            raise refusal(f"is below any engine; {units.advice(self.unit)}, or 0")
+            raise refusal(f"is too small for any engine; {units.advice(self.unit)}, or 0")
         if value <= self.above:
             raise refusal(f"must be more than {units.quantity_text(self.above, self.unit)}; {units.advice(self.unit)}")
         if value >= self.below:
@@ -155,11 +155,9 @@ class Number:
         if value < self.minimum:
             raise refusal(f"must be at least {units.quantity_text(self.minimum, self.unit)}; give a larger value")
         if value > self.maximum:
-            meant = not self.unit and value <= 100.0 * self.maximum
-            or_share = f', or "{value:g} %" if per cent is meant' if meant else ""
-            raise refusal(
-                f"must be at most {units.quantity_text(self.maximum, self.unit)}; give a smaller value{or_share}"
-            )
+            is_percentage = not self.unit and value <= 100.0 * self.maximum
+            hint = f', or "{value:g} %" if per cent is meant' if is_percentage else ""
+            raise refusal(f"must be at most {units.quantity_text(self.maximum, self.unit)}; give a smaller value{hint}")
         return value
 
     def _open(self, raw: dict[str, Any]) -> Open:
@@ -178,26 +176,26 @@ class Number:
             raise refusal("has its bounds reversed; write the smaller one first")
         start = self._part(raw["start"], "start") if "start" in raw else min(max(0.0, low), high)
         if not low <= start <= high:
-            raise refusal("starts outside its bounds; move start or the bounds")
+            raise refusal("starts outside its bounds; change start or the bounds")
         return Open(low, high, start)
 
-    def _part(self, raw: Any, what: str) -> float:
+    def _part(self, raw: Any, name: str) -> float:
         try:
             return self._bounded(self._number(raw))
         except PydanticCustomError as error:
-            shown = f'"{raw}"' if isinstance(raw, str) else raw
-            raise refusal(f"{what} {shown}: {error.message()}") from None
+            text = f'"{raw}"' if isinstance(raw, str) else raw
+            raise refusal(f"{name} {text}: {error.message()}") from None
 
 
 def _without_note(text: str) -> str:
-    # rule and remedy of a note of a missing extension; empty for other texts
+    # complaint about a note of an extension that is not installed; empty for other texts
     home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
     return "" if not home or any(one.name == home for one in extensions()) else "; ".join(lack(home))
 
 
 @dataclass(frozen=True)
 class OrOpen:
-    """Pydantic field that reads a list of the type `inner`, the word "open" or the name of a list."""
+    """Pydantic field that reads a list of the type `inner`, the word "open", or the name of a list in `named`."""
 
     inner: Any
     example: str
@@ -218,8 +216,8 @@ class OrOpen:
             if raw in dict(self.named):
                 return inner(list(dict(self.named)[raw]))
             names = ", ".join(f'"{name}"' for name, _ in self.named)
-            others = f', "open" or a name: {names}' if names else ' or "open"'
-            raise refusal(f'is neither a list nor "open"; write for example {self.example}{others}')
+            alternatives = f', "open" or a name: {names}' if names else ' or "open"'
+            raise refusal(f'is neither a list nor "open"; write for example {self.example}{alternatives}')
         return inner(raw)
 
 
@@ -230,14 +228,14 @@ class ListOrSingle:
     inner: Any
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        many: Any = list[self.inner]  # type: ignore[name-defined]
-        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(many))
+        list_type: Any = list[self.inner]  # type: ignore[name-defined]
+        return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(list_type))
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        many = handler(schema)
-        return {"anyOf": [many["items"], many]}
+        list_schema = handler(schema)
+        return {"anyOf": [list_schema["items"], list_schema]}
 
     def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
         if not isinstance(raw, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
@@ -247,14 +245,14 @@ class ListOrSingle:
 
 
 def refusal(text: str) -> PydanticCustomError:
-    """Return the error of a validator: a rule, and a remedy after '; '."""
-    # braces would be read as a template
+    """Return the pydantic error for a text of rule and remedy, separated by '; '."""
+    # pydantic would read braces in a message as a template
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
 
 
 def _turning(ratio: float) -> float:
     if abs(ratio) < SLOWEST:
-        raise refusal(f"is a shaft that hardly turns; give at least {SLOWEST:g} either way")
+        raise refusal(f"is almost a standing shaft; give at least {SLOWEST:g} or at most -{SLOWEST:g}")
     return ratio
 
 
@@ -285,13 +283,13 @@ OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openabl
 Speed: TypeAlias = Annotated[float, Number("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Number("m/s", above=0.0)]
 Time: TypeAlias = Annotated[float, Number("s", above=0.0)]
-_GEARED = "is a ratio of gears, and the orders of loads jump from one ratio to the next"
+_GEARED = "is a gear ratio, and the orders of loads jump between ratios"
 Ratio: TypeAlias = Annotated[float, Number("", minimum=-100.0, maximum=100.0, closed=_GEARED), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Number("", minimum=0.0)]
 Part: TypeAlias = Annotated[float, Number("", minimum=0.0, maximum=1.0)]
 Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
 Tolerance: TypeAlias = Annotated[
-    float, Number("", above=0.0, below=1.0, closed="says how exactly things are computed, not what the engine is")
+    float, Number("", above=0.0, below=1.0, closed="sets the accuracy of the computation, not the engine")
 ]
 OpenFraction: TypeAlias = Annotated[float | Open, Number("", minimum=-10.0, maximum=10.0, openable=True)]
 NonNegativeLength: TypeAlias = Annotated[float, Number("m", minimum=0.0)]
@@ -321,9 +319,9 @@ Throws: TypeAlias = Annotated[
 _LINE, _SLUG, _SHARE, _FORMAT = r"^[^\t\n]+$", "^[a-z0-9][a-z0-9-]*$", r"^\d+(\.\d+)? ?%$", r"^(#?(\.\d)?[efg])?$"
 FORMS = {
     _LINE: "must be text on one line, without tabs",
-    _SLUG: 'names files and has small letters, digits and hyphens alone; write for example "fig-2"',
-    _SHARE: 'is no share; write for example "15 %"',
-    _FORMAT: 'is no format of numbers; write for example ".2f"',
+    _SLUG: 'must have small letters, digits and hyphens only; write for example "fig-2"',
+    _SHARE: 'must be a percentage; write for example "15 %"',
+    _FORMAT: 'must be a number format; write for example ".2f"',
 }
 """Messages about texts that do not match the pattern of a field."""
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=_LINE)]
@@ -336,28 +334,28 @@ Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
 
 
 def without_open(schema: Any) -> Any:
-    """Return a schema without open numbers at keys that do not say so."""
+    """Return a JSON schema without the alternative of open numbers at keys that do not read them."""
     if isinstance(schema, list):
-        return [without_open(one) for one in schema]
+        return [without_open(entry) for entry in schema]
     if not isinstance(schema, dict):
         return schema
     choices = schema.get("anyOf", [])
-    number = next((one for one in choices if one.get("description") == ANYWHERE), None)
+    number = next((entry for entry in choices if entry.get("description") == ANYWHERE), None)
     if number is None:
-        return {key: without_open(one) for key, one in schema.items()}
-    others = [one for one in choices if one is not number]
-    # a number has two alternatives, itself and open; pydantic adds further ones
-    first = [*others[0].get("anyOf", [others[0]]), *others[1:]]
-    rest = {key: without_open(one) for key, one in schema.items() if key != "anyOf"}
-    return dict(sorted({**({"anyOf": first} if len(first) > 1 else first[0]), **rest}.items()))
+        return {key: without_open(entry) for key, entry in schema.items()}
+    alternatives = [entry for entry in choices if entry is not number]
+    # the alternatives are the number, the open number, and further ones of pydantic
+    first = [*alternatives[0].get("anyOf", [alternatives[0]]), *alternatives[1:]]
+    remaining = {key: without_open(entry) for key, entry in schema.items() if key != "anyOf"}
+    return dict(sorted({**({"anyOf": first} if len(first) > 1 else first[0]), **remaining}.items()))
 
 
 class Table(BaseModel):
-    """TOML table with fixed keys."""
+    """TOML table with fixed keys; base of all tables of files."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
     closed: ClassVar[str] = ""
-    """Reason why no other number in it may be open, as the end of "it ..."; empty if any may."""
+    """Reason why numbers in the table may not be open, as the end of a sentence "it ..."; empty if they may."""
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -382,5 +380,5 @@ def optional(text: str, default: Any = None) -> Any:
 
 
 def with_keys(table: type[TableModel], keys: Mapping[str, Any]) -> type[TableModel]:
-    """Return a table with further keys: the type and the field of each."""
+    """Return a subclass of a table with further keys, each with its type and field."""
     return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)

@@ -43,7 +43,7 @@ class RimTable(Table):
 
 
 class FlywheelTable(Table):
-    """Everything that turns at crank speed, except pistons and rods."""
+    """Parts that turn at crank speed, without pistons and rods."""
 
     inertia: f.OpenInertia | None = f.optional("Moment of inertia of the whole flywheel, in place of a rim.")
     rim: RimTable | None = None
@@ -70,8 +70,9 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         numbers = [(key, "m", Open.from_value(getattr(table.rim, key))) for key in _SECTION]
         wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
     if crank_inertia is not None:
-        rule, shown = "is given by [flywheel] too", units.quantity_text(crank_inertia, "kg m^2")
-        raise Refused("fidelity.crank_inertia", shown, rule, "keep one: with this one loads feel the uneven speed")
+        rule, text = "is given by [flywheel] too", units.quantity_text(crank_inertia, "kg m^2")
+        remedy = "keep one; fidelity.crank_inertia also makes the crank speed uneven"
+        raise Refused("fidelity.crank_inertia", text, rule, remedy)
     return wheel, [
         decision
         for k, (key, unit, number) in enumerate(numbers, first)
@@ -80,7 +81,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
 
 
 def _rim(table: RimTable) -> Rim:
-    """Return the rim with open numbers at their start; every allowed section leaves a hole and room for arms."""
+    """Return the rim with open numbers at their start; refuse bounds that leave no hole or no space for arms."""
     diameter, width, height = (Open.from_value(getattr(table, key)) for key in _SECTION)
     hole = diameter.lower - height.upper
     if hole <= 0.0:
@@ -91,8 +92,8 @@ def _rim(table: RimTable) -> Rim:
     arms = None
     if table.arms is not None:
         if table.arms.hub_diameter >= hole:
-            shown, rule = units.quantity_text(table.arms.hub_diameter, "m"), "does not fit into the rim"
-            raise Refused("flywheel.rim.arms.hub_diameter", shown, rule, "make it smaller")
+            text, rule = units.quantity_text(table.arms.hub_diameter, "m"), "does not fit into the rim"
+            raise Refused("flywheel.rim.arms.hub_diameter", text, rule, "make it smaller")
         (rim_width, rim_depth), (hub_width, hub_depth) = table.arms.at_rim, table.arms.at_hub
         arms = Arms(table.arms.count, (rim_width, rim_depth), (hub_width, hub_depth), table.arms.hub_diameter)
     return Rim(diameter.start, width.start, height.start, table.density, table.whole, arms)
@@ -115,6 +116,6 @@ def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia
         decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
     maximum = sum(Open.from_value(table.share).upper for table in tables)
     if maximum > 1.0 + _ROUNDING:
-        rule = f"add up to {maximum:g}, and the inertia of all that turns is one"
-        raise Refused("geared_inertias", None, rule, "let shares, and the largest of open ones, add up to 1 at most")
+        rule = f"have shares with the sum {maximum:g}, more than the whole inertia"
+        raise Refused("geared_inertias", None, rule, "let shares and upper bounds of open shares sum to 1 at most")
     return tuple(inertias), decisions

@@ -40,7 +40,7 @@ class ChargeTable(Table):
 
 
 class SeiligerTable(ChargeTable):
-    """Mixed cycle, its cut-off solved for the indicated mean pressure."""
+    """Seiliger cycle (mixed heat supply); its cut-off follows from the indicated mean pressure."""
 
     makes: ClassVar = Seiliger
     model: Literal["seiliger"]
@@ -51,7 +51,7 @@ class SeiligerTable(ChargeTable):
 
 
 class WiebeTable(ChargeTable):
-    """Finite heat release, the heat solved for the indicated mean pressure."""
+    """Cycle with Wiebe heat release; the heat follows from the indicated mean pressure."""
 
     makes: ClassVar = Wiebe
     model: Literal["wiebe"]
@@ -134,12 +134,24 @@ GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable | Chambe
 
 
 def needs_bore(table: GasTable | None) -> bool:
-    """Return True if the gas acts on the bore of [engine]; chambers have their own."""
+    """Return True if the gas acts on the bore of [engine]; gas chambers have bores of their own."""
     return table is not None and not isinstance(table, ChambersTable)
 
 
 def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> GasModel | None:
-    """Return the gas model; `folder` holds the file of a trace."""
+    """Return the gas model of the engine; None without [gas].
+
+    Parameters
+    ----------
+    table
+        Table [gas].
+    folder
+        Folder of the problem file and of its traces.
+    cycle
+        Working cycle.
+    parts
+        Slider-cranks, whose chambers are checked.
+    """
     if table is None:
         return None
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
@@ -157,13 +169,14 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
 
 def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> tuple[Chamber, ...]:
     if cycle is not Cycle.TWO_STROKE:
-        raise Refused("engine.cycle", str(cycle), "has chambers that work once a turn", 'write "two-stroke"')
+        rule = "does not suit gas chambers, which work once a turn"
+        raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
     if any(not part.has_rod for part in parts):
-        raise Refused("gas.model", "chambers", "is of pistons, and a rotor has none", "take seiliger, wiebe or a trace")
-    if any(one.faces(other) for one in parts for other in parts):
-        rule = "has pistons that share a chamber, and chambers here are between a piston and a cylinder head"
-        raise Refused("engine.layout", None, rule, "list the pistons on cylinders of their own, or leave gas out")
-    chambers = tuple(_chamber(own, k, folder, parts) for k, own in enumerate(table.chambers, 1))
+        raise Refused("gas.model", "chambers", "needs pistons, and a rotor has none", "use seiliger, wiebe or trace")
+    if any(part.faces(other_part) for part in parts for other_part in parts):
+        rule = "has pistons that share a chamber, and each chamber of [gas] needs a cylinder head"
+        raise Refused("engine.layout", None, rule, "give each piston its own cylinder, or leave gas out")
+    chambers = tuple(_chamber(chamber_table, k, folder, parts) for k, chamber_table in enumerate(table.chambers, 1))
     all_different([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
     return chambers
 
@@ -172,13 +185,13 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
     where = f"gas.chambers[{k}]"
     diagrams = {key: table_of for key in ("steam", "pump", "trace") if (table_of := getattr(table, key)) is not None}
     if len(diagrams) != 1:
-        rule = "says nothing of its pressure" if not diagrams else f"is said to be {' and '.join(diagrams)}"
+        rule = "has no pressure" if not diagrams else f"has several pressures: {' and '.join(diagrams)}"
         raise Refused(where, None, rule, "give one of steam, pump and trace")
     ((key, diagram),) = diagrams.items()
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     for number in numbers:
         if number > len(parts):
-            rule = f"is none of {counted(len(parts), 'cylinder')}"
+            rule = f"is not among {counted(len(parts), 'cylinder')}"
             raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
     with blamed_on(f"{where}.{key}"):
         is_trace = key == "trace"

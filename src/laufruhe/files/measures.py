@@ -1,4 +1,4 @@
-"""[objective] and [[constraints]] of a problem file, and the measures of an engine that they name."""
+"""[objective] and [[constraints]] of a problem file, and the measures that they name."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PLACES = {
 SIDES = {"max": "at most", "min": "at least"}
 EDGES = (*SIDES, "outside")
 """Keys of the bounds of a limit."""
-# these mean nothing where stiffness depends on frequency
+# channels that need a stiffness independent of frequency
 _OF_CONSTANT_STIFFNESS = frozenset({
     channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL, channels.TORQUE_ROLL,
     channels.RAW_TORQUE_ROLL,
@@ -54,9 +54,9 @@ _ROUNDING = 1e-9
 
 
 class QuantityTable(Table):
-    """Part of a quantity that counts."""
+    """Keys that narrow a quantity."""
 
-    closed: ClassVar[str] = "says what is asked of a design, and a search would ask for what is easiest"
+    closed: ClassVar[str] = "defines the objective or a limit, not the engine"
 
     mounts: list[str] | None = None
     bearings: list[str] | None = None
@@ -121,27 +121,37 @@ class MeasureContext:
     points: tuple[OperatingPoint, ...]
 
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
-        """Return the measure of a name and its keys for this engine."""
+        """Return the measure of a quantity with the keys of its table, checked for this engine.
+
+        Parameters
+        ----------
+        name
+            Name of the quantity in the file.
+        table
+            Table with the keys that narrow it.
+        where
+            Key of the file for complaints.
+        """
         if name not in MEASURES:
             home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
             raise Refused(where, name, *(lack(home) if home else ("is no quantity", nearest(name, list(MEASURES)))))
         channel, norm = MEASURES[name]
-        key, of, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
+        key, names, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
         if not channel.needs.of(self.engine):
             raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)
         with blamed_on(where):
             channel.check_sizes(self.engine, self.points[0])
         for mount in self.engine.mounts if channel in _OF_CONSTANT_STIFFNESS else ():
             if mount.depends_on_frequency:
-                rule = f"is of one stiffness, and that of mount '{mount.name}' depends on frequency"
-                raise Refused(where, name, rule, "ask for transmissibility, mount force or mount travel")
+                rule = f"needs a constant stiffness, and that of mount '{mount.name}' depends on frequency"
+                raise Refused(where, name, rule, "use transmissibility, mount force or mount travel")
         self._check_keys(channel, table, key)
         places = next((place for place in PLACES if place in channel.keys), None)
-        at = getattr(table, places) if places else None
+        place_names = getattr(table, places) if places else None
         if places:
-            _check_known(at, channel.places(self.engine), f"{key}.{places}", PLACES[places])
+            _check_known(place_names, channel.places(self.engine), f"{key}.{places}", PLACES[places])
         measure = Measure(
-            channel, norm, at=as_tuple(at), points=as_tuple(table.operating_points), rotors=as_tuple(of),
+            channel, norm, at=as_tuple(place_names), points=as_tuple(table.operating_points), rotors=as_tuple(names),
             cases=as_tuple(table.load_cases), orders=as_tuple(table.orders),
             direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
             motions=as_tuple(table.motions),
@@ -149,16 +159,16 @@ class MeasureContext:
             wanted=1.0 if table.wanted is None else table.wanted, alternating=bool(table.alternating),
         )  # fmt: skip
         if measure.is_mass:
-            self._check_masses(measure, of, key)
+            self._check_masses(measure, names, key)
         if channel.is_placing:
             shafts = shafts_of(self.engine)
-            _check_known(of, shafts, f"{key}.of", "shaft")
+            _check_known(names, shafts, f"{key}.of", "shaft")
             if not shafts:
-                raise Refused(key, name, "counts balancer shafts, and there are none", "add one, or leave it out")
+                raise Refused(key, name, "needs balancer shafts, and there are none", "add one, or leave it out")
         return measure
 
     def _check_keys(self, channel: Channel, table: QuantityTable, where: str) -> None:
-        """Refuse keys that mean nothing for a channel, and unknown names."""
+        """Raise `Refused` for keys that do not apply to a channel, and for unknown names in them."""
         for key in (*QuantityTable.model_fields, "of"):
             value = getattr(table, key, None)
             if value == []:
@@ -166,34 +176,34 @@ class MeasureContext:
             if value is not None and key not in channel.keys:
                 shown = value if key == "of" else None
                 raise Refused(f"{where}.{key}", shown, _why_stray(key, channel), "leave it out")
-        points, cases = ([one.name for one in some] for some in (self.points, self.engine.load_cases))
+        points, cases = ([named.name for named in listed] for listed in (self.points, self.engine.load_cases))
         _check_known(table.operating_points, points, f"{where}.operating_points", "operating point")
         _check_known(table.load_cases, cases, f"{where}.load_cases", "load case")
         if "frequency" in channel.keys and channel not in _OF_OPEN_FREQUENCY:
-            remedy = "say which natural frequency about the axis is wanted"
+            remedy = "give the desired natural frequency about the axis"
             if table.frequency is None:
                 raise Refused(f"{where}.frequency", None, "is missing", remedy)
             if isinstance(table.frequency, Open):
-                rule = f"is open, and {channel} is of one frequency"
-                raise Refused(f"{where}.frequency", None, rule, f"{remedy}, or ask for the raw torque-roll residual")
+                rule = f"is open, and {channel} needs one frequency"
+                raise Refused(f"{where}.frequency", None, rule, f"{remedy}, or use the raw torque-roll residual")
         base = self.engine.cycle.base_order
         for order in table.orders or ():
-            # all that turns returns within the cycle (C6)
+            # loads repeat with the cycle (C6)
             multiple = float(round(order / base) * base)
             if abs(order - multiple) > _ROUNDING:
-                rule = f"holds {order:.10g}, and the orders of its cycle are multiples of {base}"
+                rule = f"contains {order:.10g}, and orders of this cycle are multiples of {base}"
                 raise Refused(f"{where}.orders", table.orders, rule, f"did you mean {multiple:g}?")
         if table.alternating and 0.0 in (table.orders or ()):
-            rule = "holds 0, which alternating leaves out"
-            raise Refused(f"{where}.orders", table.orders, rule, "take 0 out, or alternating")
+            rule = "contains 0, which alternating leaves out"
+            raise Refused(f"{where}.orders", table.orders, rule, "remove 0, or alternating")
 
     def _check_masses(self, measure: Measure, of: list[str] | None, where: str) -> None:
-        """Refuse an empty sum of masses, and masses without a radius."""
+        """Raise `Refused` for an empty sum of masses, and for rotors without a radius."""
         rotors = self.engine.rotors
         _check_known(of, [rotor.name for rotor in rotors], f"{where}.of", "counterweight or balancer")
         counted = counted_rotors(measure, rotors)
         if not counted and not counterweight_masses(measure, self.engine.slider_cranks):
-            raise Refused(where, measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
+            raise Refused(where, measure.name, "counts no part of this engine", "add such a part, or leave it out")
         for rotor in counted:
             try:
                 radius_of(rotor)
@@ -203,13 +213,13 @@ class MeasureContext:
 
 
 def _why_stray(key: str, channel: Channel) -> str:
-    """Return the reason why a key means nothing for a channel."""
+    """Return the reason why a key does not apply to a channel, as the end of a sentence."""
     if key == "of":
         return "is for masses and places of shafts only"
     if channel.is_mass:
         return "means nothing for a mass"
     if channel.is_load and key == "alternating":
-        return f"means nothing for {channel}: its steady part rubs as well"
+        return f"means nothing for {channel}, which includes the steady load"
     if channel.is_load and key in PLACES:
         return f"means nothing for a {channel}, which has no {PLACES[key]} of its own"
     if channel.is_load and key == "direction_weights":
@@ -217,10 +227,10 @@ def _why_stray(key: str, channel: Channel) -> str:
     return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
 
 
-def _check_known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
+def _check_known(names: list[str] | None, allowed: Sequence[str], where: str, kind: str) -> None:
     for name in names or ():
-        if name not in known:
-            raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
+        if name not in allowed:
+            raise Refused(where, name, f"is no {kind} here", nearest(name, list(allowed)) if allowed else "add it")
 
 
 def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
@@ -231,31 +241,35 @@ def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
 def objectives_of(
     tables: Sequence[ObjectiveTable] | None, scene: MeasureContext, single: Sequence[str]
 ) -> tuple[PriorityLevel, ...]:
-    """Return the objectives in order of priority; by default the mean mount force.
+    """Return the objectives in order of priority; without [objective] the mean mount force of an engine on mounts.
 
     Parameters
     ----------
+    tables
+        Tables [objective]; None without them.
+    scene
+        Engine and operating points.
     single
         Keys of the file that require a single objective.
     """
     if tables is None:
         return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
     if not tables:
-        raise Refused("objective", [], "is empty", "leave it out, or say what is to be minimised")
+        raise Refused("objective", [], "is empty", "leave it out, or add minimise")
     if len(tables) > 1 and single:
-        rule = f"needs a single objective, and there are {len(tables)} in order"
-        raise Refused(single[0], None, rule, "leave it out, or keep the first of them")
+        rule = f"needs a single objective, and there are {len(tables)}"
+        raise Refused(single[0], None, rule, "leave it out, or keep the first objective")
     ranks = []
     for k, table in enumerate(tables, 1):
         where, is_last = f"objective[{k}]" if len(tables) > 1 else "objective", k == len(tables)
         terms = _terms(table, scene, where)
         if is_last and table.within is not None:
-            raise Refused(f"{where}.within", table.within, "is for an objective that others follow", "leave it out")
+            raise Refused(f"{where}.within", table.within, "is for all objectives but the last", "leave it out")
         if not is_last and len(terms) > 1:
-            rule = "is a weighted sum before other objectives, and no limit is one"
+            rule = "is a weighted sum, which only the last objective may be"
             raise Refused(f"{where}.terms", None, rule, "put it last, or rank its parts")
         if not is_last and "max" not in terms[0].measure.channel.sides:
-            rule = "stands before other objectives, and has no largest value to limit"
+            rule = "cannot be limited from above, so only the last objective may minimise it"
             raise Refused(f"{where}.minimise", terms[0].measure.name, rule, "put it last")
         ranks.append(PriorityLevel(terms, table.within or 0.0))
     return tuple(ranks)
@@ -277,7 +291,7 @@ def _minimised(name: str, table: QuantityTable, where: str, scene: MeasureContex
     measure = scene.measure(name, table, where)
     if not measure.channel.minimised:
         remedy = f"limit it ([[constraints]], limit = '{name}'), and minimise a force, a moment or a mass"
-        raise Refused(where, name, "is not minimised but limited", remedy)
+        raise Refused(where, name, "can be limited but not minimised", remedy)
     return measure
 
 
@@ -291,10 +305,10 @@ def limits_of(tables: Sequence[ConstraintTable], scene: MeasureContext) -> tuple
         for high in numbers:
             if low.measure == high.measure and low.minimum > high.maximum:
                 lower, upper = (units.quantity_text(value, low.measure.unit) for value in (low.minimum, high.maximum))
-                both = f"'{low.name}' and '{high.name}' contradict each other"
-                said = both if low is not high else f"'{low.name}' contradicts itself"
-                rule = f"{said}: at least {lower} and at most {upper}"
-                raise Refused("constraints", None, rule, "let the limits leave room")
+                contradiction = f"'{low.name}' and '{high.name}' contradict each other"
+                subject = contradiction if low is not high else f"'{low.name}' contradicts itself"
+                rule = f"{subject}: at least {lower} and at most {upper}"
+                raise Refused("constraints", None, rule, "move the limits apart")
     return tuple(limits)
 
 
@@ -327,20 +341,24 @@ def _limit(table: ConstraintTable, where: str, scene: MeasureContext) -> Limit:
 def _bound(text: str | float, measure: Measure, where: str) -> float:
     value = measured(text, measure.unit, where)
     if value < 0.0:
-        rule = "is negative" if measure.channel.is_number else "is negative, and a norm never is"
+        rule = "is negative" if measure.channel.is_number else "is negative, and a limit on a norm cannot be"
         raise Refused(where, text, rule, "give a value of zero or more")
     return value
 
 
 def _check_unique(limits: Sequence[Limit]) -> None:
-    # refuses two limits on one side of one measure, unless their names differ; several bands are allowed
+    # two limits on one side of one measure need different names; several bands are allowed
     first: dict[tuple[Any, ...], int] = {}
     for k, limit in enumerate(limits):
         sides = (("max", limit.maximum < math.inf), ("min", limit.minimum > -math.inf), ("outside", limit.outside))
         for side in (side for side, is_given in sides if is_given):
-            other = first.setdefault((limit.measure, limit.name, side, limit.outside if side == "outside" else None), k)
-            if other != k:
-                rule = f"limits '{limit.name}' once more, beside constraints[{other + 1}] ('{limits[other].name}')"
+            previous = first.setdefault(
+                (limit.measure, limit.name, side, limit.outside if side == "outside" else None), k
+            )
+            if previous != k:
+                rule = (
+                    f"limits '{limit.name}' once more, beside constraints[{previous + 1}] ('{limits[previous].name}')"
+                )
                 remedy = "keep the tighter one, or give each a name"
                 raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
 
@@ -353,8 +371,8 @@ def limit_name(entry: Mapping[str, Any]) -> str | None:
         return None
     if table.name or table.limit not in MEASURES:
         return table.name
-    at = next((getattr(table, key) for key in PLACES if getattr(table, key)), None)
+    place_names = next((getattr(table, key) for key in PLACES if getattr(table, key)), None)
     return Measure(
-        *MEASURES[table.limit], at=as_tuple(at), points=as_tuple(table.operating_points),
+        *MEASURES[table.limit], at=as_tuple(place_names), points=as_tuple(table.operating_points),
         orders=as_tuple(table.orders), motions=as_tuple(table.motions), alternating=bool(table.alternating),
     ).name  # fmt: skip

@@ -41,7 +41,7 @@ _FIELDS = {
         ("position", "m", POSITION), ("turned", "rad", TURNED), ("damping_per_stiffness", "s", slice(LAG, LAG + 1)),
     )
 }  # fmt: skip
-# factors of the numbers of a mount when it is mirrored in y = 0
+# sign of each number of a mount after mirroring in the plane y = 0
 _MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
 _OF_ALL = ("stiffness", "loss_factor", "damping_per_stiffness")
 _DYNAMIC = ("fluid_track", "dynamic_stiffness")
@@ -66,7 +66,7 @@ class BlockTable(Table):
 
 
 class StopTable(Table):
-    """A bump stop along each of the mount's own axes; it acts in run-ups and under load cases."""
+    """Bump stop along each of the mount's own axes; it acts in run-ups and load cases."""
 
     gap: f.PositiveLength
     stiffness: f.Stiffness
@@ -154,7 +154,19 @@ class LoadCaseTable(Table):
 
 @dataclass(frozen=True)
 class MountsInput:
-    """Mounts of a file, their block, and the decisions about them."""
+    """Mounts of a file.
+
+    Attributes
+    ----------
+    mounts
+        Mounts, with joined springs in one place.
+    block
+        Block on elastic mounts; None for rigid ones.
+    numbers
+        Fourteen numbers of each elastic spring (E13).
+    decisions
+        Decisions about these numbers.
+    """
 
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
@@ -163,7 +175,17 @@ class MountsInput:
 
 
 def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsInput:
-    """Return rigid mounts, or elastic ones with the block on them."""
+    """Return the mounts of a file: rigid ones, or elastic ones with the block on them.
+
+    Parameters
+    ----------
+    table
+        Table [mounts]; None without mounts.
+    block
+        Table [block]; required for elastic mounts.
+    folder
+        Folder of the problem file and of its CSV files.
+    """
     if table is None or table.kind == "rigid":
         if block is not None:
             raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
@@ -221,7 +243,7 @@ def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy:
 def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
     none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
-    read, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
+    numbers, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
     springs = []
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         where, stop = f"mounts.places[{k + 1}]", place.stop or table.stop
@@ -232,35 +254,35 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
         laws.append(_laws(place, folder, where) if leader is None else laws[leader])
         spring = Mount(name, (0.0, 0.0, 0.0), dynamic=laws[k])
         springs.append(spring if stop is None else replace(spring, stop_gap=stop.gap, stop_stiffness=stop.stiffness))
-        read.rows.append([0.0] * NUMBERS_OF_MOUNT)
+        numbers.rows.append([0.0] * NUMBERS_OF_MOUNT)
         if leader is not None:
             keys = [key for key in followed if key in _FIELDS and (key != _AT or joined == k)]
-            read.follow(leader, keys, mirrored=place.mirror_of is not None)
+            numbers.follow(leader, keys, mirrored=place.mirror_of is not None)
         if joined != k:
-            read.follow(joined, [_AT], mirrored=False)
+            numbers.follow(joined, [_AT], mirrored=False)
         for key in _FIELDS:
             if key not in followed and (key != _AT or joined == k):
-                read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    springs = [mount_from_numbers(spring, row) for spring, row in zip(springs, read.rows, strict=True)]
+                numbers.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
+    springs = [mount_from_numbers(spring, row) for spring, row in zip(springs, numbers.rows, strict=True)]
     mounts = tuple(
         replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
         for k in sorted(set(joins))
     )
-    read.sort([j for k in sorted(set(joins)) for j, first in enumerate(joins) if first == k])
+    numbers.sort([j for k in sorted(set(joins)) for j, first in enumerate(joins) if first == k])
     with blamed_on("mounts"):
         loose = free_motion(elastic_mounting(block, mounts).modes)
     if loose:
-        remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
+        remedy = "add a mount or a stiffness there; an open stiffness may need a start above zero"
         raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
-    return MountsInput(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
+    return MountsInput(mounts, block, tuple(map(tuple, numbers.rows)), tuple(numbers.decisions))
 
 
 def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
-    # stiffness that depends on frequency (E50, E51)
+    # frequency-dependent springs (E50, E51)
     laws: list[Dynamic] = []
     if (track := place.fluid_track) is not None:
         if track.bulge_stiffness == 0.0:
-            raise Refused(f"{where}.fluid_track.bulge_stiffness", None, "is zero, and moves no fluid", "give a value")
+            raise Refused(f"{where}.fluid_track.bulge_stiffness", None, "is zero, so no fluid moves", "give a value")
         axis = _AXES.index(track.axis)
         laws.append(FluidTrack(axis, track.mass, track.bulge_stiffness, track.chamber_stiffness, track.damping))
     if place.dynamic_stiffness is not None:
@@ -277,11 +299,11 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
     if len(rows) < 2:
         raise Refused(f"{where}.file", table.file, "has fewer than two rows", "measure more frequencies")
     values = []
-    for k, (_, amount, other) in enumerate(rows, 1):
-        if by_angle and not 0.0 <= other < 180.0:
-            rule = f"has a loss angle of {other:g} deg in row {k}"
+    for k, (_, amount, second) in enumerate(rows, 1):
+        if by_angle and not 0.0 <= second < 180.0:
+            rule = f"has a loss angle of {second:g} deg in row {k}"
             raise Refused(f"{where}.file", table.file, rule, "give it from 0 to 180, or set columns")
-        value = amount * np.exp(1j * math.radians(other)) if by_angle else complex(amount, other)
+        value = amount * np.exp(1j * math.radians(second)) if by_angle else complex(amount, second)
         values.append(complex(unit * value))
     with blamed_on(f"{where}.file", table.file):
         return MeasuredStiffness(
@@ -291,31 +313,31 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
 
 def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | None:
     if place.like is not None and place.mirror_of is not None:
-        raise Refused(f"{where}.like", place.like, "is given beside mirror_of", "keep one")
+        raise Refused(f"{where}.like", place.like, "is given together with mirror_of", "keep one")
     leader = place.like or place.mirror_of
     if leader is None:
         return None
     if leader not in names[:k]:
         key = "like" if place.like else "mirror_of"
-        remedy = nearest(leader, names[:k]) if k else "define the other one first"
+        remedy = nearest(leader, names[:k]) if k else "define the other mount first"
         raise Refused(f"{where}.{key}", leader, "is no mount defined before this one", remedy)
     none_of(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
     return names.index(leader)
 
 
 def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: str) -> int:
-    """Return the index of the mount that the next mount is joined to, its own if it stands alone."""
-    k, other = len(joins), place.joined_to
-    if other is None:
+    """Return the index of the mount that the next mount is joined to; its own index if it is not joined."""
+    k, leader = len(joins), place.joined_to
+    if leader is None:
         return k
-    if other not in names[:k]:
-        remedy = nearest(other, names[:k]) if k else "define the other one first"
-        raise Refused(f"{where}.joined_to", other, "is no mount defined before this one", remedy)
-    first = joins[names.index(other)]
-    if names[first] != other:
+    if leader not in names[:k]:
+        remedy = nearest(leader, names[:k]) if k else "define the other mount first"
+        raise Refused(f"{where}.joined_to", leader, "is no mount defined before this one", remedy)
+    first = joins[names.index(leader)]
+    if names[first] != leader:
         remedy = f"name that one, '{names[first]}'"
-        raise Refused(f"{where}.joined_to", other, "is joined to another mount itself", remedy)
-    none_of(place, (_AT,), where, f"is that of '{other}' already", "leave one out")
+        raise Refused(f"{where}.joined_to", leader, "is joined to another mount itself", remedy)
+    none_of(place, (_AT,), where, f"is that of '{leader}' already", "leave one out")
     return first
 
 
@@ -327,13 +349,13 @@ def _followed(place: MountTable) -> tuple[str, ...]:
 
 @dataclass
 class _Numbers:
-    """Rows of numbers of elastic mounts, and decisions about them."""
+    """Numbers of elastic springs, one row for each, and decisions about them."""
 
     rows: list[list[float]]
     decisions: list[Decision]
 
     def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
-        """Read the values of one key of the last mount."""
+        """Set the numbers of one key in the last row, and add decisions for open values."""
         unit, numbers = _FIELDS[key]
         for number, axis, value in zip(numbers, _AXES, map(Open.from_value, values), strict=False):
             self.rows[-1][number] = value.start
@@ -341,7 +363,7 @@ class _Numbers:
             self.decisions += value.decisions(label, unit, MountDrive(len(self.rows) - 1, number, 1.0))
 
     def sort(self, order: Sequence[int]) -> None:
-        """Reorder the rows, so that springs of one place are neighbours."""
+        """Reorder the rows and the drives of decisions, so that springs of one place are neighbours."""
         self.rows = [self.rows[k] for k in order]
         new = {old: k for k, old in enumerate(order)}
         for d, decision in enumerate(self.decisions):
@@ -349,7 +371,7 @@ class _Numbers:
             self.decisions[d] = replace(decision, drives=tuple(drives))
 
     def follow(self, leader: int, keys: Sequence[str], mirrored: bool) -> None:
-        """Let keys of the last mount follow those of another."""
+        """Let some keys of the last row follow those of the row `leader`, perhaps mirrored in y = 0."""
         last = len(self.rows) - 1
         for number in (number for key in keys for number in _FIELDS[key][1]):
             gain = _MIRRORED[number] if mirrored else 1.0
@@ -363,15 +385,15 @@ class _Numbers:
 def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple[LoadCase, ...]:
     """Return the static load cases."""
     if tables and block is None:
-        rule = "needs elastic mounts, that give way"
+        rule = "needs elastic mounts"
         raise Refused("load_cases", None, rule, 'add [mounts] with kind = "elastic", and [block]')
     all_different([table.name for table in tables], "load_cases", "load cases have one name")
     cases = []
     for k, table in enumerate(tables, 1):
         if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):
-            raise Refused(f"load_cases[{k}]", table.name, "is no load", "give times_weight, torque or force")
+            raise Refused(f"load_cases[{k}]", table.name, "has no load", "give times_weight, torque or force")
         if table.place is not None and table.force is None:
-            raise Refused(f"load_cases[{k}].place", table.place, "is of no force", "give the force, or leave it out")
+            raise Refused(f"load_cases[{k}].place", table.place, "has no force", "give the force, or leave it out")
         weight, force, place = (
             (three[0], three[1], three[2]) if three else (0.0, 0.0, 0.0)
             for three in (table.times_weight, table.force, table.place)

@@ -1,4 +1,4 @@
-"""Tables within tables, as a TOML file has them: values at places, and the models of what stands there."""
+"""Nested tables of a TOML file: values at addresses, and the pydantic annotations of these addresses."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from pydantic import BaseModel
 from laufruhe.files import fields as f
 
 Place: TypeAlias = tuple[str | int, ...]
-"""Keys, and indices in lists from zero."""
+"""Address of a value: keys, and indices in lists from zero."""
 
 
 def at(node: Any, place: Sequence[Any]) -> Any:
-    """Return the value at a place; None if a table has no such key."""
+    """Return the value at an address; None if a table lacks the key."""
     for key in place:
         node = node.get(key) if isinstance(node, Mapping) else node[key]
     return node
 
 
 def put(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str, Any]:
-    """Return the tables with another value at a place; the rest is shared."""
-    whole = dict(tables)
-    here: Any = whole
+    """Return a copy of the tables with another value at an address; unchanged parts are shared."""
+    result = dict(tables)
+    table: Any = result
     for key in place[:-1]:
-        here[key] = here[key].copy()
-        here = here[key]
-    here[place[-1]] = value
-    return whole
+        table[key] = table[key].copy()
+        table = table[key]
+    table[place[-1]] = value
+    return result
 
 
 def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
-    """Yield all values in tables with their places, outer ones first."""
+    """Yield (address, value) of all values in nested tables, outer ones first."""
     left = deque[tuple[Place, Any]]([((), tables)])
     while left:
         place, node = left.popleft()
@@ -44,12 +44,12 @@ def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
 
 
 def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
-    """Yield all texts in tables with their places."""
+    """Yield (address, text) of all texts in nested tables."""
     return ((place, node) for place, node in inside(tables) if isinstance(node, str))
 
 
 def plain(raw: Any, depth: int) -> Any:
-    """Return a copy with lists for tuples and arrays and numbers for NumPy's, down to a depth."""
+    """Return a copy down to a depth, with tuples and NumPy values replaced by lists and plain numbers."""
     if isinstance(raw, Mapping) and depth:
         return {key: plain(value, depth - 1) for key, value in raw.items()}
     if isinstance(raw, list | tuple) and depth:
@@ -58,39 +58,39 @@ def plain(raw: Any, depth: int) -> Any:
 
 
 def number_at(model: type[BaseModel], path: Sequence[str | int]) -> f.Number | None:
-    """Return the field that reads the number at a path; None if a text, a count, a list or a choice stands there."""
+    """Return the field that reads the number at a path of a model; None for a text, count, list or choice."""
     leaves = (leaf for annotation in annotations_at(model, path) for leaf in _leaves(annotation))
     return next((leaf for leaf in leaves if isinstance(leaf, f.Number)), None)
 
 
 def annotations_at(model: type[BaseModel], path: Sequence[str | int]) -> list[Any]:
-    """Return the annotations at a path; none if the models have no such key."""
-    here: list[Any] = [model]
+    """Return the annotations at a path of a model; empty if there is no such key."""
+    annotations: list[Any] = [model]
     for part in path:
-        here = [inner for annotation in here for inner in _inside(annotation, part)]
-    return here
+        annotations = [inner for annotation in annotations for inner in _inside(annotation, part)]
+    return annotations
 
 
 def tables_on(model: type[BaseModel], path: Sequence[str | int]) -> list[type[f.Table]]:
-    """Return the models of the tables on the way to a path, the outermost first."""
+    """Return the models of all tables that contain a path, the outermost first."""
     leaves = (leaf for k in range(len(path)) for note in annotations_at(model, path[:k]) for leaf in _leaves(note))
     return [leaf for leaf in leaves if isinstance(leaf, type) and issubclass(leaf, f.Table)]
 
 
 def _inside(annotation: Any, part: str | int) -> list[Any]:
-    """Return the annotations that one part of a path may lead to."""
+    """Return the annotations of one key or index within an annotation."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         field = annotation.model_fields.get(str(part))
         return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
     if get_origin(annotation) is list:
         return list(get_args(annotation))
     if isinstance(annotation, f.ListOrSingle):
-        # a list, or its one table alone
+        # a list, or a single table without a list
         return [annotation.inner, *_inside(annotation.inner, part)]
     if isinstance(annotation, f.OrOpen):
         return _inside(annotation.inner, part)
     # annotated types and their notes, or the members of a union
-    return [inner for one in get_args(annotation) for inner in _inside(one, part)]
+    return [inner for member in get_args(annotation) for inner in _inside(member, part)]
 
 
 def _leaves(annotation: Any) -> Iterator[Any]:

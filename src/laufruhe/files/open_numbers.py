@@ -1,7 +1,7 @@
 """Open numbers at any address of a problem file, and the decisions about them.
 
 Keys with known dependences read `{ between = [low, high] }` themselves. Other open numbers are read here: the file is
-read with their start, and the engine is assembled again for every other value.
+read with their start values, and the engine is built again for each other value.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _TOGETHER = ("bank_angle", "split_pin_angle")
 
 
 def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decision, ...]]:
-    """Return the tables with the start of every open number that no key reads, and the decisions about these."""
+    """Return the tables with open numbers that no key reads replaced by their start, and the decisions about them."""
     closed, decisions = dict(tables), list[Decision]()
     for place, node in inside(tables):
         if not isinstance(node, dict) or "between" not in node or not annotations_at(file_model(), place):
@@ -38,13 +38,13 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
         if reason:
             raise Refused(key_path(place), node, f"cannot be left open: it {reason}", "give a number")
         if number is None:
-            rule = "cannot be left open: it is no number with a unit but a count, a name or a choice"
-            raise Refused(key_path(place), node, rule, "give one, and compare others in a study")
-        own = number_read(replace(number, openable=True), place, node)
-        assert isinstance(own, f.Open)
+            rule = "cannot be left open: it is a count, a name or a choice, not a physical number"
+            raise Refused(key_path(place), node, rule, "give a value, and compare others in a study")
+        open_number = number_read(replace(number, openable=True), place, node)
+        assert isinstance(open_number, f.Open)
         drive = AddressDrive(place, number.unit)
-        closed = put(closed, place, drive.written(own.start))
-        decisions += own.decisions(_name(tables, place), number.unit, drive)
+        closed = put(closed, place, drive.written(open_number.start))
+        decisions += open_number.decisions(_name(tables, place), number.unit, drive)
     return closed, tuple(decisions)
 
 
@@ -56,20 +56,22 @@ NOTE = Note("open numbers", without_open, _with_decisions)
 
 
 def _name(tables: Mapping[str, Any], place: Place) -> str:
-    # path of a number in studies and `with_values`: entries of lists by name, or counted from 1
+    # path of a number as in studies: entries of lists by name, or counted from 1
     parts = list[str]()
-    here: Any = tables
+    node: Any = tables
     for key in place:
-        entry = here[key]
+        entry = node[key]
         name = entry.get("name") if isinstance(key, int) and isinstance(entry, dict) else None
-        alone = isinstance(name, str) and "." not in name and sum(one.get("name") == name for one in here) == 1
-        parts.append(str(name) if alone else str(key + 1) if isinstance(key, int) else key)
-        here = entry
+        is_unique = (
+            isinstance(name, str) and "." not in name and sum(sibling.get("name") == name for sibling in node) == 1
+        )
+        parts.append(str(name) if is_unique else str(key + 1) if isinstance(key, int) else key)
+        node = entry
     return ".".join(parts)
 
 
 def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
-    """Return True if the key of an openable number cannot decide it in this engine."""
+    """Return True if the key can read an open number in general, but not in this engine."""
     engine = tables.get("engine", {})
     if place[0] == "engine" and place[1] in (*_TOGETHER, "throws"):
         kind = LAYOUTS.get(engine.get("layout"))

@@ -20,7 +20,7 @@ from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
 MOST_POINTS = 200
-"""Largest number of operating points: each takes 14 MB and a fifth of a second on four mounts."""
+"""Largest number of operating points; each takes 14 MB and 0.2 s on four mounts."""
 SAME_SPEED = 0.01
 """Relative difference of speeds within which rows of a fuel table belong together."""
 
@@ -46,7 +46,7 @@ class OperatingPointTable(Table):
 class FrictionTable(Table):
     """Friction mean effective pressure, measured in a CSV file or given, with its uncertainty."""
 
-    closed: ClassVar[str] = "is of a measurement"
+    closed: ClassVar[str] = "describes a measurement, not the engine"
 
     file: str | None = f.optional("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
     kind: Literal["fuel", "motoring"] = "fuel"
@@ -60,16 +60,20 @@ class FrictionTable(Table):
 
 
 class Brake:
-    """Conversion of loads at the brake into indicated mean pressures.
+    """Conversion of loads at the brake into indicated mean pressures by [friction].
 
     Attributes
     ----------
+    table
+        Table [friction].
     displacement
         Displacement of the engine [m3].
+    turns
+        Turns of the crank in one cycle.
     said
-        Sentences about the loads converted so far, for the report.
+        Sentences for the report, one for each converted load.
     tests
-        Measurements behind these loads.
+        Measurements behind the converted loads.
     """
 
     def __init__(self, table: FrictionTable, folder: Path, displacement: float, cycle: Cycle) -> None:
@@ -82,7 +86,7 @@ class Brake:
         self._rows = [] if table.file is None else self._read(table.file, folder)
 
     def _read(self, file: str, folder: Path) -> list[tuple[float, ...]]:
-        """Return rows of speed [rad/s], mean pressure [Pa] and fuel."""
+        """Return the rows of the file: speed [rad/s], mean pressure [Pa] and, for kind fuel, fuel."""
         names = ("speed", "load", "fuel")[: 3 if self.table.kind == "fuel" else 2]
         speed = measured(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
         text, unit = f"1 {self.table.load_unit}", self.table.load_unit
@@ -94,7 +98,7 @@ class Brake:
         for k, row in enumerate(rows, 1):
             if not all(map(math.isfinite, row)):
                 raise Refused("friction.file", file, f"has a number in row {k} that is not finite", "leave it out")
-        return [(n * speed, p * load, *rest) for n, p, *rest in rows]
+        return [(n * speed, p * load, *remaining) for n, p, *remaining in rows]
 
     def pressure(self, torque: float) -> float:
         """Return the mean pressure of a torque at the brake [Pa] (W1)."""
@@ -105,22 +109,22 @@ class Brake:
         friction = self._friction(speed, where)
         pressures = friction.indicated(brake, self.table.deviations)
         if pressures[0] <= brake:
-            rule = f"is off by as much as {units.quantity_text(friction.deviation, 'Pa')}, more than it is itself"
-            raise Refused(
-                "friction", units.quantity_text(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
-            )
-        lowest, middle, maximum, loss, off = (
+            rule = f"is less than its uncertainty, {units.quantity_text(friction.deviation, 'Pa')} times deviations"
+            remedy = "measure more points, or lower friction.deviations"
+            raise Refused("friction", units.quantity_text(friction.mean, "Pa"), rule, remedy)
+        lowest, middle, maximum, loss, deviation = (
             f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation)
         )
         self.said.append(
             f"Indicated mean pressure at {where} {middle} bar, {lowest} to {maximum} bar: {1e-5 * brake:.4g} bar at "
-            f"the brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
+            f"the brake and {loss} bar of friction, {self.table.deviations:g} deviations of {deviation} bar to either "
+            "side."
         )
         if self._rows:
             is_motored = self.table.kind == "motoring"
             x, y = zip(*(row[:2] if is_motored else row[1:] for row in self._readings(speed)), strict=True)
-            at = speed if is_motored else brake
-            self.tests.append(FrictionTest(where, is_motored, x, y, at, friction, self.table.deviations))
+            load = speed if is_motored else brake
+            self.tests.append(FrictionTest(where, is_motored, x, y, load, friction, self.table.deviations))
         return pressures
 
     def _readings(self, speed: float) -> list[tuple[float, ...]]:
@@ -131,29 +135,43 @@ class Brake:
     def _friction(self, speed: float, where: str) -> Friction:
         if self.table.fmep is not None:
             return Friction(self.table.fmep, self.table.deviation or 0.0)
-        own = self._readings(speed)
+        readings = self._readings(speed)
         with blamed_on("friction.file", self.table.file or ""):
             if self.table.kind == "motoring":
-                return motoring_friction([row[0] for row in own], [row[1] for row in own], speed)
-            if len(own) < FEWEST:
-                at = units.quantity_text(speed, "rad/s")
-                rule = f"has {len(own)} points at {at} of {where}, and a line takes {FEWEST}"
+                return motoring_friction([row[0] for row in readings], [row[1] for row in readings], speed)
+            if len(readings) < FEWEST:
+                speed_text = units.quantity_text(speed, "rad/s")
+                rule = f"has {len(readings)} rows at {speed_text}, the speed of {where}, and a fit needs {FEWEST}"
                 raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")
-            return willans_friction([row[1] for row in own], [row[2] for row in own])
+            return willans_friction([row[1] for row in readings], [row[2] for row in readings])
 
 
 def operating_points(
     tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
     brake: Brake | None,
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
-    """Return the operating points; `gas` is the gas of points that give no load of their own."""
+    """Return the operating points of a file.
+
+    Parameters
+    ----------
+    tables
+        Tables [[operating_points]].
+    gas
+        Gas of [gas], for points that give no load; None without gas.
+    cycle
+        Working cycle.
+    stroke
+        Stroke, which turns a mean piston speed into a crank speed [m]; None without pistons.
+    brake
+        Conversion of loads at the brake; None without [friction].
+    """
     points = []
     for k, table in enumerate(tables, 1):
         where = f"operating_points[{k}]"
         speeds = _speeds(table, stroke, where)
         for speed in speeds:
-            shown = units.quantity_text(speed, "rad/s", 6)
-            name = (f"{table.name} {shown}" if len(speeds) > 1 else table.name) if table.name else shown
+            speed_text = units.quantity_text(speed, "rad/s", 6)
+            name = (f"{table.name} {speed_text}" if len(speeds) > 1 else table.name) if table.name else speed_text
             loads = _loads(table, speed, brake, where, name)
             for suffix, imep in loads:
                 load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
@@ -167,7 +185,7 @@ def operating_points(
 
 
 def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tuple[float, ...]:
-    """Return a single speed, or equal steps over a range [rad/s]."""
+    """Return the speeds of a table [rad/s]: one, or equal steps over a range."""
     one_of(table, where, "speed", "mean_piston_speed")
     if table.speed is None and stroke is None:
         raise Refused(f"{where}.mean_piston_speed", None, "means nothing without pistons", "give the speed")
@@ -187,16 +205,17 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
 def _loads(
     table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
 ) -> list[tuple[str, float | None]]:  # fmt: skip
-    """Return suffixes of the name with indicated mean pressures [Pa]: three of a load at the brake."""
+    """Return name suffixes with indicated mean pressures [Pa]: three for a load at the brake with uncertainty."""
     keys = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
     if len(keys) > 1 or (table.motored and keys[1:]):
         raise Refused(f"{where}.{keys[0]}", None, f"is given beside {keys[1]}", "keep one")
     if table.bmep is None and table.brake_torque is None:
         return [("", table.imep)]
     if brake is None:
-        raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", "say what is lost between gas and brake")
+        remedy = "add [friction], which gives the loss between gas and brake"
+        raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", remedy)
     if table.motored or not table.gas:
-        raise Refused(f"{where}.{keys[0]}", None, "is for engines that burn fuel", "leave it out")
+        raise Refused(f"{where}.{keys[0]}", None, "needs combustion at this operating point", "leave it out")
     bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
     lowest, middle, largest = brake.indicated(bmep, speed, name)
     if lowest == largest:
@@ -206,7 +225,7 @@ def _loads(
 
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:
     if table.motored and table.imep is not None:
-        rule = "is given to a motored engine, which burns nothing"
+        rule = "is given for a motored point, which has no combustion"
         raise Refused(f"{where}.imep", None, rule, "leave imep or motored out")
     if not table.gas:
         return None

@@ -40,7 +40,7 @@ _OPENABLE = ("throws", "firing_order", "bank_angle", "split_pin_angle")
 class IntervalsTable(Table):
     """Bounds on the crank angle from each firing to the next."""
 
-    closed: ClassVar[str] = "is a limit, and a search would relax it"
+    closed: ClassVar[str] = "is a limit of the search"
 
     min: f.Angle | None = None
     max: f.Angle | None = None
@@ -50,7 +50,7 @@ class IntervalsTable(Table):
 class PhasingTable(Table):
     """Search of open throws, firing orders and shafts."""
 
-    closed: ClassVar[str] = "is a limit, or says how a search goes"
+    closed: ClassVar[str] = "is a limit or a setting of the search"
 
     phases: Annotated[int, Field(ge=1, le=96)] | None = f.optional(
         "Equal steps of a turn on which throws may stand; by default those of even firing."
@@ -78,34 +78,46 @@ def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
 def open_phasing(
     engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
 ) -> Problem:
-    """Return the problem with the first design that its phasing allows, and with the phasing."""
+    """Return the problem with open phasing; its engine is the first candidate that the phasing allows.
+
+    Parameters
+    ----------
+    engine
+        Table [engine] with open throws, firing order or bank angles.
+    shafts
+        Tables [[balancer_shafts]], some of them perhaps optional.
+    table
+        Table [phasing]; None for its defaults.
+    assemble
+        Function that returns the problem of an engine without open phasing.
+    """
     table = table or PhasingTable()
     for key in _OPENABLE:
         if key not in engine.kind.openable and _has_open(engine.value_of(key)):
-            others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
-            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
+            allowed = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
+            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {allowed}")
     counts = [count for _, count in cylinder_counts(engine)]
     counts += [len(engine.slider_cranks)] if engine.kind.is_free else []
     if not counts:
-        raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
+        raise Refused("engine.cylinders", None, "is missing, and open throws do not give the number", "add it")
     cycle, count, bounds = cycle_of(engine), counts[0], None
     if isinstance(engine.throws, list) and engine.listed_throws is None:
         bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
-    # a layout that leaves its throws no choice
+    # a layout that fixes its throws
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
     throws = fixed.throws if fixed else engine.listed_throws
 
     def realise(candidate: Candidate) -> Problem:
-        built = engine
+        closed_engine = engine
         if engine.kind.openable:
             order = None if candidate.firing_order is None else list(candidate.firing_order)
             throws = list(candidate.throws) if engine.kind.takes("throws") else None
             bank, split = candidate.bank_angle, candidate.split_pin
-            built = _closed(engine, count, bank, split, throws=throws, firing_order=order)
+            closed_engine = _closed(engine, count, bank, split, throws=throws, firing_order=order)
         try:
-            return without_shafts(assemble(built, candidate.without_gas), candidate.left_out)
+            return without_shafts(assemble(closed_engine, candidate.without_gas), candidate.left_out)
         except Refused as refusal:
-            # a design of a search is no fault of the file
+            # an impossible candidate of a search is not a fault of the file
             raise ModelError(str(refusal)) from refusal
 
     phasing = Phasing(
@@ -134,11 +146,11 @@ def open_phasing(
     # the smooth program of uneven throws needs an even speed (S19)
     if phasing.continuous and problem.fidelity.is_uneven:
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
-        rule = "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one"
+        rule = "makes the crank speed uneven, and uneven throws are optimised at even speed only"
         raise Refused("fidelity.crank_inertia", inertia, rule, "leave it out, or fix the throws")
     if engine.kind.fires_evenly and problem.depends_on_firing_order:
-        rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
-        raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
+        rule = f"cannot be open in layout '{engine.layout}' while a measure is of a load inside the crankcase"
+        raise Refused("engine.throws", None, rule, "fix the throws, or measure loads on the block")
     return problem
 
 
@@ -172,14 +184,14 @@ def _intervals(table: IntervalsTable | None, engine: EngineTable, cycle: Cycle, 
         return Intervals(0.0, cycle.angle) if is_free else Intervals(even - spread, even + spread)
     low = table.min if table.min is not None else 0.0
     high = table.max if table.max is not None else cycle.angle
-    away = table.largest_deviation
-    if table.min is None and table.max is None and away is None:
-        raise Refused("phasing.intervals", None, "says nothing", "give min, max or largest_deviation")
-    if away is not None:
-        if away < 0.0:
-            where, shown = "phasing.intervals.largest_deviation", units.quantity_text(away, "rad")
-            raise Refused(where, shown, "is negative", "give 0 for even firing")
-        low, high = max(low, even - away), min(high, even + away)
+    deviation = table.largest_deviation
+    if table.min is None and table.max is None and deviation is None:
+        raise Refused("phasing.intervals", None, "is empty", "give min, max or largest_deviation")
+    if deviation is not None:
+        if deviation < 0.0:
+            where, text = "phasing.intervals.largest_deviation", units.quantity_text(deviation, "rad")
+            raise Refused(where, text, "is negative", "give 0 for even firing")
+        low, high = max(low, even - deviation), min(high, even + deviation)
     return Intervals(low, high)
 
 
@@ -199,12 +211,12 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
             raise Refused(f"{where}.optional", None, rule, "make both optional")
         if not shaft.optional:
             continue
-        joined = [group for group in sets if any(other.name in leaders for other in group)]
-        merged = [other for group in joined for other in group] + [shaft]
+        joined = [group for group in sets if any(member.name in leaders for member in group)]
+        merged = [member for group in joined for member in group] + [shaft]
         sets = [group for group in sets if group not in joined] + [merged]
     for key in ("most_shafts", "most_shaft_mass"):
         if getattr(table, key) is not None and not sets:
-            rule = "limits optional shafts, and none is"
+            rule = "limits optional shafts, and there are none"
             raise Refused(f"phasing.{key}", None, rule, "set optional = true on a shaft")
     return ShaftChoice(
         tuple(tuple(shaft.name for shaft in group) for group in sets),
@@ -215,29 +227,29 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
 
 
 def _check(phasing: Phasing, engine: EngineTable) -> None:
-    """Refuse keys that exclude each other."""
+    """Raise `Refused` for keys of phasing that exclude each other."""
     kind, count = engine.kind, phasing.cylinders
     if kind.fires_evenly and phasing.continuous:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
-        rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
+        rule = f"allows uneven firing, and layout '{engine.layout}' fires evenly"
         raise Refused(where, None, rule, 'write throws = "open", without intervals')
     for angle in ("bank_angle", "split_pin_angle"):
         if phasing.throws is not None and Open.from_value(engine.value_of(angle)).is_open:
-            rule = "is open beside throws that are given, and is decided with open ones only"
+            rule = "is open while throws are given, and needs open throws"
             remedy = f'write throws = "open" and cylinders = {count}, or fix the angle'
             raise Refused(f"engine.{angle}", None, rule, remedy)
     both_open = all(isinstance(engine.value_of(key), Open) for key in ("bank_angle", "split_pin_angle"))
     if not phasing.continuous and both_open:
-        rule = "is open beside bank_angle, and even firing binds only their sum"
+        rule = "is open together with bank_angle, and even firing fixes only their sum"
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
         remedy = f"fix one of the two, or let the firing be uneven: {uneven}"
         raise Refused("engine.split_pin_angle", None, rule, remedy)
-    throws, rest = divmod(count, kind.cylinders_per_throw)
-    if rest:
+    throws, remainder = divmod(count, kind.cylinders_per_throw)
+    if remainder:
         rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"
         raise Refused("engine.cylinders", count, rule, "give one that is")
     if isinstance(engine.throws, list) and len(engine.throws) != throws:
-        raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "let them agree")
+        raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "make the numbers agree")
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         rule = "allows even firing alone, and throws between bounds fire unevenly"
@@ -247,7 +259,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
 
 
 def _first(phasing: Phasing) -> Candidate:
-    """Return the design as given: throws in the order of their cylinders."""
+    """Return the candidate for the design as given."""
     lowest = (phasing.bank and phasing.bank[0], phasing.split and phasing.split[0])
     for geometry in phasing.geometries or (lowest,):
         layout = phasing.layout(*geometry)
@@ -272,9 +284,9 @@ def _first(phasing: Phasing) -> Candidate:
 
 
 def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
-    # given firing order, or that of the most even intervals; None if these throws cannot fire so
-    given = phasing.firing_order
-    orders = lap_orders(phasing.cycle, layout, throws) if given is None else [given]
+    # the given firing order, or the one with the most even intervals; None if these throws allow none
+    fixed_order = phasing.firing_order
+    orders = lap_orders(phasing.cycle, layout, throws) if fixed_order is None else [fixed_order]
     allowed = []
     for order in itertools.islice(orders, MOST_ORDERS):
         intervals = intervals_of(phasing.cycle, firing_turns(layout, throws, order))
@@ -286,13 +298,13 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
 def _closed(
     engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **keys: list[Any] | None
 ) -> EngineTable:
-    # of throws, firing order and angles, these alone are given
+    # [engine] with these throws, firing order and angles and no others
     update = {"cylinders": count, "throws": None, "firing_order": None, "bank_angle": bank, "split_pin_angle": split}
     return engine.model_copy(update=update | keys)
 
 
 def without_shafts(problem: Problem, shafts: Collection[str]) -> Problem:
-    """Return the problem without some shafts, their rotors and decisions."""
+    """Return the problem without the named shafts, their rotors and decisions."""
     if not shafts:
         return problem
     gone = {rotor.name for rotor in problem.engine.rotors if rotor.shaft.name in shafts}

@@ -36,7 +36,7 @@ Throws: TypeAlias = tuple[Throw, ...]
 
 @dataclass(frozen=True)
 class ExtensionContext:
-    """Context in which the table of an extension is read.
+    """Data of a file that the reader passes to the table of an extension.
 
     Attributes
     ----------
@@ -67,16 +67,17 @@ class Key:
     annotation
         Type of its value: a subclass of `Table`, or a list of one.
     read
-        Function that adds the table to a problem, which has engine, operating points and decisions, but no objective
-        and limits yet.
+        Function of table, problem and context that returns the problem with the table. The problem has engine,
+        operating points and decisions, but no objective and limits yet.
     numbers
-        Function that returns the labels of parts of the table in results, and their places in the file.
+        Function of the table that returns the names of its parts in results, and their addresses in the file.
     single
         True if it requires a single objective.
     adds
-        Function that returns slider-cranks and throws with what the table adds to them, before rotors are placed.
+        Function of table, slider-cranks, throws and bearings that returns slider-cranks and throws with its additions,
+        before rotors are placed.
     always
-        True if it is read without its table too, before other keys, because it finds open numbers in other tables.
+        True if `read` is called without the table too, and before other keys, to find open numbers in other tables.
     """
 
     name: str
@@ -90,16 +91,16 @@ class Key:
 
 @dataclass(frozen=True)
 class Note:
-    """Note that a file may write at any number.
+    """Note that a file may add to any number, such as a tolerance.
 
     Attributes
     ----------
     name
-        Name in words.
+        Name of the notes.
     part
-        Function that returns tables without such notes, and the notes, false if there are none.
+        Function of the tables that returns them without such notes, and the notes; these are false if there are none.
     put
-        Function of notes, problem, file and tables without notes, that returns the problem with the notes.
+        Function of notes, problem, file and tables without notes that returns the problem with the notes.
     """
 
     name: str
@@ -108,9 +109,9 @@ class Note:
 
 
 class SearchTable(Table):
-    """Extent of a search if the problem is not convex."""
+    """Settings of searches for problems that are not convex."""
 
-    closed: ClassVar[str] = "says how a search goes, not what the engine is"
+    closed: ClassVar[str] = "is a setting of the search, not of the engine"
 
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)
@@ -123,7 +124,7 @@ class SearchTable(Table):
 
 
 class ProblemFile(Table):
-    """A whole problem file."""
+    """Problem file."""
 
     title: str = Field(min_length=1)
     source: str = ""
@@ -164,5 +165,5 @@ EXTENSION_KEYS: Mapping[str, Key] = extended("keys", Key, ())
 @cache
 def file_model() -> type[ProblemFile]:
     """Return the model of a problem file with the tables of extensions."""
-    added: dict[str, Any] = {key.name: (key.annotation | None, None) for key in EXTENSION_KEYS.values()}
-    return create_model("ProblemFile", __base__=ProblemFile, __doc__=ProblemFile.__doc__, __module__=__name__, **added)
+    keys: dict[str, Any] = {key.name: (key.annotation | None, None) for key in EXTENSION_KEYS.values()}
+    return create_model("ProblemFile", __base__=ProblemFile, __doc__=ProblemFile.__doc__, __module__=__name__, **keys)

@@ -1,7 +1,7 @@
-"""[quantities] of a problem file: numbers that several numbers of the file follow, one class each.
+"""[quantities] of a problem file: numbers that determine several other numbers of the file.
 
-A quantity sets the numbers that follow it before the engine is assembled. An open quantity is a decision like any
-number of the file.
+Each quantity has a class. It sets the numbers that follow from it before the engine is built. An open quantity is a
+decision like any number of the file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from laufruhe.problem.decision import AddressDrive
 
 
 class Quantity(ABC):
-    """Number that several numbers of the file follow.
+    """Number of the file that determines several other numbers.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Quantity(ABC):
     words
         Description for editors.
     follow
-        Places of the numbers that follow it, and the SI unit of each.
+        Addresses of the numbers that follow from it, with the SI unit of each.
     """
 
     name: ClassVar[str]
@@ -42,21 +42,21 @@ class Quantity(ABC):
 
     @abstractmethod
     def values(self, value: float, given: Mapping[Place, float]) -> Mapping[Place, float]:
-        """Return the numbers that follow [SI] from the quantity and from what the file gives for them."""
+        """Return the numbers that follow from the value of the quantity and from their values in the file [SI]."""
 
 
 class StrokeOverBore(Quantity):
-    """Ratio of stroke to bore at the displacement that the file gives."""
+    """Ratio of stroke to bore at constant displacement."""
 
     name = "stroke_over_bore"
     words = "Ratio of stroke to bore; both follow at the displacement that engine.stroke and engine.bore give."
     follow: ClassVar[Mapping[Place, str]] = {("engine", "stroke"): "m", ("engine", "bore"): "m"}
 
     def values(self, value: float, given: Mapping[Place, float]) -> Mapping[Place, float]:
-        """Return stroke and bore: s b^2 stays, s = value b."""
+        """Return stroke s and bore b with s / b = value and s b^2 as in the file [m]."""
         stroke, bore = given["engine", "stroke"], given["engine", "bore"]
-        own = math.cbrt(stroke * bore**2 / value)
-        return {("engine", "stroke"): value * own, ("engine", "bore"): own}
+        new_bore = math.cbrt(stroke * bore**2 / value)
+        return {("engine", "stroke"): value * new_bore, ("engine", "bore"): new_bore}
 
 
 QUANTITIES: Mapping[str, Quantity] = extended("quantities", Quantity, (StrokeOverBore(),))
@@ -72,12 +72,12 @@ QuantitiesTable = create_model(
 
 
 def followed(tables: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the tables with every number that follows a quantity of [quantities] in its place.
+    """Return the tables with all numbers that follow from [quantities] set.
 
     Raises
     ------
     Refused
-        If a number that has to follow is not given, or cannot be read.
+        If a number that must follow is missing in the file or cannot be read.
     """
     quantities = tables.get("quantities")
     if not isinstance(quantities, Mapping):
@@ -98,8 +98,8 @@ def _given(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> flo
     except (TypeError, KeyError, IndexError, AttributeError):
         number = None
     if number is None or isinstance(number, Mapping | list):
-        rule = f"follows quantities.{name}, and is not given as a number"
-        raise Refused(key_path(place), number, rule, "give it, or leave the quantity out")
+        rule = f"must be a number, because it follows from quantities.{name}"
+        raise Refused(key_path(place), number, rule, "give a number, or leave the quantity out")
     value = number_read(f.Number(unit), place, number)
     assert isinstance(value, float)
     return value

@@ -50,12 +50,17 @@ _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202
 
 
 def load(source: str | Path | Mapping[str, Any]) -> Problem:
-    """Read and check a problem file, its text, or its tables.
+    """Return the problem of a file, of the text of a file, or of its tables.
+
+    Parameters
+    ----------
+    source
+        Path; text, if it contains a line feed or "="; or tables as nested mappings.
 
     Raises
     ------
     InputError
-        With one line for everything wrong: file, key, value, rule, remedy.
+        With one line for each fault: file, key, value, rule, remedy.
     """
     return load_tables(*tables_and_path(source))
 
@@ -82,17 +87,19 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     try:
         with in_file(path):
             closed, parts = dict(tables), {}
-            # an open number may have a note of an extension beside its bounds
+            # notes are removed in reverse order, because an open number may have a note of an extension
             for note in reversed(notes()):
                 closed, parts[note] = note.part(closed)
             file = file_model().model_validate(followed(closed))
             problem = _of_file(file, path)
 
-            def finished(own: Problem, candidate: Candidate | None) -> Problem:
-                own = replace(own, rebuild=partial(_rebuilt, closed, path, candidate))
+            def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
+                problem_of_star = replace(problem_of_star, rebuild=partial(_rebuilt, closed, path, candidate))
                 for note in notes():
-                    own = note.put(parts[note], own, file, closed) if parts[note] else own
-                return own
+                    problem_of_star = (
+                        note.put(parts[note], problem_of_star, file, closed) if parts[note] else problem_of_star
+                    )
+                return problem_of_star
 
             if any(parts.values()):
                 phasing = problem.phasing
@@ -111,7 +118,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 
 @cache
 def notes() -> tuple[Note, ...]:
-    """Return the notes that numbers of a file may have, in the order in which they are applied."""
+    """Return the kinds of notes that numbers of a file may have, in the order of their application."""
     return tuple(extended("notes", Note, (open_numbers.NOTE,)).values())
 
 
@@ -122,8 +129,8 @@ def display_path(path: Path) -> Path:
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
-        rule = "are known of throws that are given, and engine.throws is open"
-        raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
+        rule = "need given throws, and engine.throws is open"
+        raise Refused("geared_inertias", None, rule, "fix the throws, or leave geared_inertias out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
@@ -131,7 +138,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
 
 
 def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
-    # problem of a file after one of the functions of `edits`
+    # problem after one of the functions of `edits`
     with in_file(origin.path):
         tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
     return load_tables(tables, origin.path)
@@ -140,7 +147,7 @@ def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
 def _rebuilt(
     tables: Mapping[str, Any], path: Path, candidate: Candidate | None, changes: Mapping[Place, str | float]
 ) -> Drawing:
-    """Return the drawing of a file with other numbers, of one star if stars are open."""
+    """Return the drawing of a file with other numbers at some addresses; of one candidate if stars are open."""
     fidelity = tables.get("fidelity", {})
     if fidelity.get("kinematics") == "auto":
         options = {key: value for key, value in fidelity.items() if key not in ("kinematics", "tolerance")}
@@ -148,21 +155,23 @@ def _rebuilt(
     for place, value in changes.items():
         tables = put(tables, place, value)
     try:
-        built = _of_file(file_model().model_validate(followed(tables)), path)
-        if candidate is not None and built.phasing is not None:
-            built = built.phasing.realise(candidate)
+        rebuilt = _of_file(file_model().model_validate(followed(tables)), path)
+        if candidate is not None and rebuilt.phasing is not None:
+            rebuilt = rebuilt.phasing.realise(candidate)
     except (ValidationError, Refused, ModelError) as error:
         values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
         faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
-        why = " and ".join(map(str, faults))
-        raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
-    return Drawing(built.engine, built.points, built.decisions, built.mount_numbers)
+        faults_text = " and ".join(map(str, faults))
+        raise ModelError(
+            f"this engine cannot be built, {values}: {faults_text}; narrow its bounds or tolerances"
+        ) from None
+    return Drawing(rebuilt.engine, rebuilt.points, rebuilt.decisions, rebuilt.mount_numbers)
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file with unchecked keys; `InputError` if it is none.
+    """Return the tables of a TOML file with unchecked keys; `InputError` if it cannot be read.
 
-    `-` is standard input. An engine of the catalogue is written out in the tables.
+    The path `-` is standard input. An engine of the catalogue is written out in the tables.
     """
     if path == STDIN:
         return _whole(_parsed(_standard_input(), display_path(path)), display_path(path))
@@ -186,15 +195,15 @@ def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
 
 
 def _check_shape(tables: dict[str, Any], path: Path) -> None:
-    """Refuse texts with control characters, and tables that are too deep or too long."""
+    """Raise `InputError` for control characters in texts, and for tables that are too deep or too long."""
     for place, node in inside(tables):
         where = key_path(place)
         if len(place) > DEEPEST:
             raise refused(where, "", f"is nested more than {DEEPEST} deep", "flatten it", path)
         strange = _UNSEEN.search("".join(text for text in (*place[-1:], node) if isinstance(text, str)))
         if strange is not None:
-            rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
-            raise refused(where, "", rule, "take it out; a path has / in place of \\", path)
+            rule = f"contains U+{ord(strange.group()):04X}, which is not a printable character"
+            raise refused(where, "", rule, "remove it; in a path write / for \\", path)
         if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
             maximum = f"at most {MOST_ENTRIES} are read"
             raise refused(where or "file", "", f"has {len(node)} entries", maximum, path)
@@ -222,8 +231,8 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(path), (toml_complaint(content, error),)) from None
     except ValueError:
-        # the only error that is no TOMLDecodeError
-        raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
+        # the parser raises a plain ValueError only for integers with thousands of digits
+        raise _unreadable(path, "contains a whole number of thousands of digits", "shorten it") from None
 
 
 def is_study(path: Path) -> bool:
@@ -236,14 +245,14 @@ def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
 
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
-    """Return the problem of a file with this [engine]."""
+    """Return the problem of a file with this table [engine], which has no open throws, firing order or bank angles."""
     loaded = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
     cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in loaded))
     bearings = bearings_of(one_by_one(file.main_bearings, throws), cylinders)
     keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
     for key in keys:
-        if (own := getattr(file, key.name)) is not None:
-            cylinders, throws = key.adds(own, cylinders, throws, bearings)
+        if (key_table := getattr(file, key.name)) is not None:
+            cylinders, throws = key.adds(key_table, cylinders, throws, bearings)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
@@ -273,10 +282,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
     )
-    given = ExtensionContext(file, table, throws, path.parent)
+    context = ExtensionContext(file, table, throws, path.parent)
     for key in keys:
         if key.always or getattr(file, key.name) is not None:
-            problem = key.read(getattr(file, key.name), problem, given)
+            problem = key.read(getattr(file, key.name), problem, context)
     scene = MeasureContext(problem.engine, points)
     ranks = objectives_of(file.objective, scene, file.single)
     problem = replace(
@@ -294,32 +303,36 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     if file.friction is None:
         return None
     if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):
-        remedy = "give one a bmep or a brake_torque, or leave it out"
-        raise Refused("friction", None, "serves no operating point", remedy)
+        remedy = "give an operating point bmep or brake_torque, or leave [friction] out"
+        raise Refused("friction", None, "is used by no operating point", remedy)
     if any(part.swept.piston.bore is None for part in cylinders):
-        raise Refused("engine.bore", None, "is missing, and a load at the brake is over the displacement", "add it")
+        raise Refused("engine.bore", None, "is missing, and a load at the brake needs the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 
 def _check_decisions(problem: Problem) -> None:
-    """Refuse open numbers without effect or objective, too many, and those that rename operating points."""
-    decisions, without_effect = problem.decisions, "is open, and nothing of this engine follows it"
+    """Raise `Refused` for open numbers without effect or objective, too many, or that rename operating points."""
+    decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
     if len(decisions) > MOST_OPEN:
-        remedy = "fix some, or let some follow others"
-        raise Refused(decisions[MOST_OPEN].name, None, f"is open beside {MOST_OPEN} other numbers", remedy)
+        remedy = "fix some, or couple some to others"
+        raise Refused(decisions[MOST_OPEN].name, None, f"is open in addition to {MOST_OPEN} other numbers", remedy)
     for decision in decisions:
         if not any(drive.acts for drive in decision.drives):
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
     if decisions and not problem.objective:
-        raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
-    given, names = (problem.engine, problem.points, problem.mount_numbers), [point.name for point in problem.points]
+        raise Refused("objective", None, "is missing while numbers are open", "add [objective] with minimise")
+    as_given, names = (problem.engine, problem.points, problem.mount_numbers), [point.name for point in problem.points]
     for decision in decisions:
-        drawn = list[Drawing]()
+        drawings = list[Drawing]()
         for bound in (decision.lower, decision.upper) if decision.address_drives else ():
             with suppress(ModelError):
-                drawn.append(problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives}))
-        if len(drawn) > 1 and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
+                drawings.append(
+                    problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives})
+                )
+        if len(drawings) > 1 and all(
+            (drawing.engine, drawing.points, drawing.mount_numbers) == as_given for drawing in drawings
+        ):
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
-        if any([point.name for point in own.points] != names for own in drawn):
-            rule = f"is open, and the speeds follow by which operating points are called, {', '.join(names)}"
+        if any([point.name for point in drawing.points] != names for drawing in drawings):
+            rule = f"is open and changes the speeds that name the operating points ({', '.join(names)})"
             raise Refused(decision.name, None, rule, "give each operating point a name, and leave up_to out")

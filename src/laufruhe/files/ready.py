@@ -22,16 +22,16 @@ _LIST, _OTHER = "uses.csv", "other uses"
 
 @dataclass(frozen=True)
 class Ready:
-    """Ready problem or study.
+    """Ready problem or study of the package.
 
     Attributes
     ----------
     use
-        Use that it is an example of.
+        Application that it is an example of.
     path
         File in the package.
     needs
-        Names of files beside it that it refers to.
+        Names of further files in its folder that it refers to.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Ready:
 
 @cache
 def folder() -> Path:
-    """Return the folder of the files: in the package, or in the repository beside the source."""
+    """Return the folder of the ready files, in the package or in the repository."""
     return next(place for place in (_PACKAGE / "problems", _PACKAGE.parents[1] / "problems") if place.is_dir())
 
 
@@ -75,19 +75,19 @@ def ready_named(name: str) -> Ready:
 
 
 def copies(names: Iterable[str]) -> dict[str, str]:
-    """Return the texts of ready problems by file name, with the files that they need and the schemas for editors."""
+    """Return the texts of ready problems by file name, with the files that they need and schemas for editors."""
     texts: dict[str, str] = {}
     left = [ready_named(name) for name in names]
     while left:
-        one = left.pop(0)
-        texts.setdefault(one.path.name, f"{schema_line(one.is_study)}\n{one.path.read_text(encoding='utf-8')}")
-        texts.setdefault(*schema_file(one.is_study))
-        for other in (name for name in one.needs if name not in texts):
-            known = ready().get(other.removesuffix(".toml"))
-            if known is not None:
-                left.append(known)
+        entry = left.pop(0)
+        texts.setdefault(entry.path.name, f"{schema_line(entry.is_study)}\n{entry.path.read_text(encoding='utf-8')}")
+        texts.setdefault(*schema_file(entry.is_study))
+        for needed in (name for name in entry.needs if name not in texts):
+            problem_entry = ready().get(needed.removesuffix(".toml"))
+            if problem_entry is not None:
+                left.append(problem_entry)
             else:
-                texts[other] = (folder() / other).read_text(encoding="utf-8")
+                texts[needed] = (folder() / needed).read_text(encoding="utf-8")
     return texts
 
 

@@ -94,20 +94,23 @@ class RotorList:
     decisions: list[Decision] = field(default_factory=list)
 
     def add(self, rotor: Rotor, where: str) -> None:
-        """Add a rotor with a new name."""
+        """Add a rotor; raise `Refused` at the key `where` if its name is in use."""
         if any(other.name == rotor.name for other in self.rotors):
             raise Refused(where, rotor.name, "is the name of another unbalance", "give each its own name")
         self.rotors.append(rotor)
 
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
-        """Add a decision about the place of rotors along an axis if it is open; rotors without size do not follow."""
+        """Add a decision about the position of rotors along an axis (0 = x, 1 = y, 2 = z) if it is open.
+
+        Rotors without an unbalance do not follow.
+        """
         sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
         sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
         drives = (PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
         self.decisions += Open.from_value(place).decisions(name, "m", *drives)
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
-        """Let a rotor follow the decision about another one."""
+        """Let the unbalance of a rotor follow that of another one, `source`, times gain, or mirrored."""
         for k, decision in enumerate(self.decisions):
             for drive in decision.rotor_drives:
                 if drive.rotor == source:
@@ -120,7 +123,17 @@ class RotorList:
 def counterweights(
     tables: Sequence[CounterweightTable], cylinders: Sequence[SliderCrank], throws: Sequence[Throw], into: RotorList
 ) -> None:
-    """Add counterweights on shafts with throws: opposite every throw, or single ones."""
+    """Add the counterweights of a file to a list of rotors: opposite each throw, or single ones.
+
+    Parameters
+    ----------
+    tables
+        Tables [[counterweights]].
+    cylinders, throws
+        Slider-cranks and throws of the engine.
+    into
+        List that receives rotors and decisions.
+    """
     pins = []
     for throw in throws:
         parts = [cylinders[k] for k in throw.cylinders]
@@ -129,23 +142,23 @@ def counterweights(
         pins.append(_Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating, throw.shaft))
     for k, table in enumerate(tables, 1):
         where = f"counterweights[{k}]"
-        own = [pin for pin in pins if pin.shaft.name == table.shaft]
+        pins_of_shaft = [pin for pin in pins if pin.shaft.name == table.shaft]
         if table.shaft == EVERY and table.factor_key is not None:
-            own = pins
-        elif not own and table.shaft != CRANKSHAFT.name:
+            pins_of_shaft = pins
+        elif not pins_of_shaft and table.shaft != CRANKSHAFT.name:
             names = list(dict.fromkeys(pin.shaft.name for pin in pins))
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
         if table.factor_key is not None:
             if not all(part.is_balanced_by_share for part in cylinders):
-                rule = "is a share of a mass at a crank pin, and the ram of a swinging yoke does not move as one"
-                raise Refused(f"{where}.{table.factor_key}", None, rule, "give the weight an unbalance, or a mass")
-            _opposite_throws(table, own, where, into)
+                rule = "needs pistons on crank pins, and the ram of a swinging yoke moves differently"
+                raise Refused(f"{where}.{table.factor_key}", None, rule, "give an unbalance or a mass")
+            _opposite_throws(table, pins_of_shaft, where, into)
         else:
-            _single_counterweight(table, own, where, into)
+            _single_counterweight(table, pins_of_shaft, where, into)
 
 
 def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
-    """Refuse balance factors that follow from open masses."""
+    """Raise `Refused` with this rule if a counterweight has a balance factor, for files with open masses."""
     for k, weight in enumerate(weights, 1):
         if weight.factor_key is not None:
             remedy = "give the counterweights a mass, or fix the other"
@@ -154,7 +167,7 @@ def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
 
 @dataclass(frozen=True)
 class _Pin:
-    """Unbalances that a counterweight opposite one throw has to balance [kg m] (eq. 13)."""
+    """Throw with the unbalances that an opposite counterweight has to balance [kg m] (eq. 13)."""
 
     x: float
     angle: float
@@ -165,8 +178,8 @@ class _Pin:
 
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     key = table.factor_key or FACTORS[0]
-    others = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
-    none_of(table, others, where, f"cannot stand beside {key}", "leave one of them out")
+    excluded = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
+    none_of(table, excluded, where, f"cannot stand beside {key}", "leave one of them out")
     fraction, drives = Open.from_value(getattr(table, key)), []
     for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
         pin = _pin(pins, number, f"{where}.throws")
@@ -201,30 +214,32 @@ def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where
 
 
 def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> None:
-    """Add balancer shafts and their unbalances; coupled ones follow earlier ones."""
+    """Add the unbalances of balancer shafts to a list of rotors; coupled ones follow earlier ones."""
     names = [table.name for table in tables]
     for k, table in enumerate(tables):
         where = f"balancer_shafts[{k + 1}]"
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
             raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
         with blamed_on(f"{where}.ratio"):
-            shaft = Shaft(table.name, table.ratio, *(Open.from_value(along).start for along in table.position))
+            shaft = Shaft(
+                table.name, table.ratio, *(Open.from_value(coordinate).start for coordinate in table.position)
+            )
         for j, unbalance in enumerate(table.unbalances):
-            at = f"{where}.unbalances[{j + 1}]"
-            name = name_of_unbalance(table.name, [own.name for own in table.unbalances], j)
+            key = f"{where}.unbalances[{j + 1}]"
+            name = name_of_unbalance(table.name, [unbalance_table.name for unbalance_table in table.unbalances], j)
             if unbalance.coupled is not None:
-                _follow(name, unbalance, unbalance.coupled, shaft, at, into)
+                _follow(name, unbalance, unbalance.coupled, shaft, key, into)
             else:
                 rotor = Rotor(name, Open.from_value(unbalance.x).start, 0j, shaft, Role.BALANCER, unbalance.radius)
-                _place(rotor, unbalance, 0.0, at, into)
+                _place(rotor, unbalance, 0.0, key, into)
             into.move(f"{name}.x", [name], 0, unbalance.x)
-        built = [rotor.name for rotor in into.rotors if rotor.shaft == shaft]
-        for axis, along in enumerate(table.position, start=1):
-            into.move(f"{table.name}.{'xyz'[axis]}", built, axis, along)
+        rotors_of_shaft = [rotor.name for rotor in into.rotors if rotor.shaft == shaft]
+        for axis, coordinate in enumerate(table.position, start=1):
+            into.move(f"{table.name}.{'xyz'[axis]}", rotors_of_shaft, axis, coordinate)
 
 
 def name_of_unbalance(shaft: str, names: Sequence[str | None], j: int) -> str:
-    """Return the name of the j-th unbalance of a shaft in results; a single unnamed one has that of the shaft."""
+    """Return the name of the j-th unbalance of a shaft in results; a single unnamed one has the name of the shaft."""
     return shaft if len(names) == 1 and names[0] is None else f"{shaft}.{names[j] or j + 1}"
 
 
@@ -247,7 +262,10 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
 
 
 def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: RotorList) -> None:
-    """Add a rotor with its size and angle, and the decision about it if these are open."""
+    """Add a rotor with size and angle of its table, and a decision if these are open.
+
+    `reference` is the angle from which the angle of the table counts [rad].
+    """
     one_of(table, where, "unbalance", "mass")
     key, size, gain = "unbalance", Open.from_value(table.unbalance), 1.0
     if table.mass is not None:
@@ -264,21 +282,21 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
 
 
 def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
-    """Return the convex set of an unbalance with an open angle."""
+    """Return the set of an unbalance with open size and angle; it must be convex."""
     if not size.is_open:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)
     if size.lower > 0.0:
         smallest, rule = (
             units.quantity_text(size.lower, _UNITS[key]),
-            "is a least size above zero while the angle is open",
+            "is a smallest size above zero while the angle is open",
         )
         raise Refused(f"{where}.{key}", smallest, rule, "let the size start at zero, or fix the angle")
     low, high = angle.bounds
     if high - low >= math.tau * (1.0 - 1e-9):
         return Sector(size.upper, (low, low + math.tau))
     if high - low > math.pi * (1.0 + 1e-9):
-        shown = f"{math.degrees(low):g} to {math.degrees(high):g} deg"
-        rule, remedy = "leaves out a sector of less than half a turn", "open it by at most 180 deg, or wholly"
-        raise Refused(f"{where}.angle", shown, rule, remedy)
+        text = f"{math.degrees(low):g} to {math.degrees(high):g} deg"
+        rule, remedy = "spans more than 180 deg but no full turn", "open it by at most 180 deg, or by 360 deg"
+        raise Refused(f"{where}.angle", text, rule, remedy)
     return Sector(size.upper, (low, high))

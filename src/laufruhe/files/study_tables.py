@@ -1,4 +1,4 @@
-"""Tables of study files: cases and swept quantities, and paths into the tables of a problem file."""
+"""Tables of study files: cases and sweeps, and paths such as engine.rod_ratio into the tables of a problem file."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ MOST_POINTS = 100_000
 _DIGITS = 12
 
 
-def _single(given: object) -> object:
-    if given is not None and not isinstance(given, bool | int | float | str):
+def _single(raw: object) -> object:
+    if raw is not None and not isinstance(raw, bool | int | float | str):
         raise refusal("is neither a number nor a text; write one of them")
-    return given
+    return raw
 
 
-def _single_as_list(given: object) -> object:
-    return [_single(each) for each in given] if isinstance(given, list) else _single(given)
+def _single_as_list(raw: object) -> object:
+    return [_single(entry) for entry in raw] if isinstance(raw, list) else _single(raw)
 
 
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
@@ -84,41 +84,41 @@ def at(tables: dict[str, Any], where: str) -> Any:
 
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
-    """Return tables with another value at a path, `Refused` if there is none; the rest is shared."""
+    """Return a copy of tables with another value at a path; `Refused` if there is no such path."""
     return nested.put(tables, keys_of(tables, where), value)
 
 
 def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return tables updated by others: nested tables are joined in turn, anything else is replaced."""
-    both = [key for key, one in changes.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
-    return {**tables, **changes, **{key: joined(tables[key], changes[key]) for key in both}}
+    """Return tables updated by others: nested tables are merged recursively, other values are replaced."""
+    merged = [key for key, change in changes.items() if isinstance(change, dict) and isinstance(tables.get(key), dict)]
+    return {**tables, **changes, **{key: joined(tables[key], changes[key]) for key in merged}}
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     """Return the keys and indices of a path; `Refused` if the problem has no such quantity."""
-    here: Any = tables
+    node: Any = tables
     keys = []
     parts = parts_of(where)
     for k, part in enumerate(parts):
-        options = _options(here)
+        options = _options(node)
         if part not in options:
-            remedy = _remedy(tables, here, parts, k)
+            remedy = _remedy(tables, node, parts, k)
             raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this problem", remedy)
         keys.append(options[part])
-        here = here[options[part]]
+        node = node[options[part]]
     return tuple(keys)
 
 
-def _remedy(tables: dict[str, Any], here: Any, parts: Sequence[str], k: int) -> str:
+def _remedy(tables: dict[str, Any], node: Any, parts: Sequence[str], k: int) -> str:
     # remedy for a path that fails at its part `k`
     for path in _paths(tables):
-        rest = iter(path)
-        if path[-1] == parts[-1] and all(part in rest for part in parts):
+        remaining = iter(path)
+        if path[-1] == parts[-1] and all(part in remaining for part in parts):
             return f"write the whole path, {'.'.join(path)}"
-    if not (options := list(_options(here))):
+    if not (options := list(_options(node))):
         return "name a number of the problem file"
-    known = isinstance(here, dict) and field_at(".".join(parts)) is not None
-    return nearest(parts[k], options, "write it into the problem file first" if known else "")
+    is_known = isinstance(node, dict) and field_at(".".join(parts)) is not None
+    return nearest(parts[k], options, "write it into the problem file first" if is_known else "")
 
 
 def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -129,23 +129,23 @@ def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
 
 
 def parts_of(where: str) -> list[str]:
-    """Return the parts of a path; the name of a limit may contain points, as that of order 0.5."""
+    """Return the parts of a path between points; the name of a limit may itself contain points, as in order 0.5."""
     parts = where.split(".")
     if parts[0] == "constraints" and parts[-1] in SIDES and len(parts) > 3:
         return [parts[0], ".".join(parts[1:-1]), parts[-1]]
     return parts
 
 
-def _options(here: Any) -> dict[str, Any]:
-    # keys of a table or a list by name; entries of a list also counted from one
-    if isinstance(here, dict):
-        return {key: key for key in here}
-    if isinstance(here, list):
-        # limits have a name, given or not
-        tables = [entry if isinstance(entry, dict) else {} for entry in here]
-        names = [one.get("name") or (limit_name(one) if "limit" in one else None) for one in tables]
+def _options(node: Any) -> dict[str, Any]:
+    # keys or indices by their names; entries of lists also by numbers from one
+    if isinstance(node, dict):
+        return {key: key for key in node}
+    if isinstance(node, list):
+        # limits without a name have a default one
+        tables = [entry if isinstance(entry, dict) else {} for entry in node]
+        names = [table.get("name") or (limit_name(table) if "limit" in table else None) for table in tables]
         named = {name: k for k, name in enumerate(names) if isinstance(name, str) and names.count(name) == 1}
-        return {**{str(k + 1): k for k in range(len(here))}, **named}
+        return {**{str(k + 1): k for k in range(len(node))}, **named}
     return {}
 
 
@@ -156,9 +156,18 @@ def field_at(where: str) -> f.Number | None:
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """Swept quantity: its path, its values as in the problem file, and these as numbers unless they are labels.
+    """Swept quantity with its values.
 
-    The unit is that of the study file; "1" for plain numbers, "" for labels.
+    Attributes
+    ----------
+    quantity
+        Path in the problem file.
+    values
+        Values as in a problem file.
+    unit
+        Unit of the study file; "1" for plain numbers, "" for labels.
+    numbers
+        Values as numbers in this unit; None for labels.
     """
 
     quantity: str
@@ -168,13 +177,13 @@ class SweepAxis:
 
     @property
     def name(self) -> str:
-        """Name in reports: the end of the path; an index goes with its list, a side with its limit."""
+        """Name in reports: the last part of the path, with the list of an index or the limit of a side."""
         *before, last = parts_of(self.quantity.replace("_", " "))
         if before and last.isdigit():
             return f"{before[-1]} {last}"
         if before[:1] == ["constraints"]:
-            of = f"limit {before[1]}" if before[1].isdigit() else before[1]
-            return f"{of}, {SIDES.get(last, last)}"
+            limit = f"limit {before[1]}" if before[1].isdigit() else before[1]
+            return f"{limit}, {SIDES.get(last, last)}"
         return last
 
     def by_value(self) -> dict[Value, float]:
@@ -186,24 +195,38 @@ def axis_of(sweep: SweepTable) -> SweepAxis:
     """Return the values of a sweep with their unit; `Refused` if there are fewer than two, or equal ones."""
     spaced = (sweep.first, sweep.last, sweep.points)
     if sweep.values is None:
-        values, given = _spaced(sweep), "points"
+        values, key = _spaced(sweep), "points"
     elif any(value is not None for value in (*spaced, sweep.spacing)):
         raise Refused("values", None, "are given beside from, to, points or spacing", "give one or the other")
     else:
-        values, given = tuple(sweep.values), "values"
+        values, key = tuple(sweep.values), "values"
     if len(values) < 2:
         rule = "holds one value, which is no sweep" if values else "is empty"
-        raise Refused(given, list(values), rule, "give two values or more, or leave the sweep out")
-    unit, numbers = _measured(sweep.quantity, values, given)
+        raise Refused(key, list(values), rule, "give two values or more, or leave the sweep out")
+    unit, numbers = _measured(sweep.quantity, values, key)
     # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
     if len(set(numbers if numbers is not None else map(str, values))) < len(values):
-        raise Refused(given, list(values), "names a value twice", "name each once")
+        raise Refused(key, list(values), "names a value twice", "name each once")
     return SweepAxis(sweep.quantity, values, unit, numbers)
 
 
 @dataclass(frozen=True)
 class Span:
-    """Range from which a quantity is drawn, in the unit of the study file."""
+    """Range of a quantity that is drawn at random.
+
+    Attributes
+    ----------
+    quantity
+        Path in the problem file.
+    unit
+        Unit of the study file; "1" for plain numbers.
+    low, high
+        Ends of the range in this unit.
+    is_log
+        True if the logarithm is uniform.
+    is_text
+        True if a problem file gives the value as text with its unit.
+    """
 
     quantity: str
     unit: str
@@ -213,12 +236,12 @@ class Span:
     is_text: bool
 
     def numbers(self, shares: Any) -> Any:
-        """Return numbers at fractions of the range, 0 to 1."""
+        """Return numbers in the range at fractions of it from 0 to 1, an array of any shape."""
         low, high = self.low, self.high
         return low * (high / low) ** shares if self.is_log else low + (high - low) * shares
 
     def value(self, number: float) -> Value:
-        """Return a number as a problem file has it."""
+        """Return a number as it is written in a problem file."""
         if not self.is_text:
             return float(number)
         return f"{float(number)!r}" if self.unit == "1" else f"{float(number)!r} {self.unit}"
@@ -231,7 +254,7 @@ def span_of(drawn: DrawnTable) -> Span:
 
 def _span(quantity: str, first: Value, last: Value, spacing: str | None) -> Span:
     for key, end in (("from", first), ("to", last)):
-        # one by one, so that the wrong one is named
+        # each end separately, so that complaints name the wrong one
         _measured(quantity, (end,), key)
     unit, numbers = _measured(quantity, (first, last), "from")
     if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
@@ -270,30 +293,30 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
     return tuple(texts) if span.unit == "1" else tuple(f"{text} {span.unit}" for text in texts)
 
 
-def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
+def _measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, tuple[float, ...] | None]:
     """Return the unit of the first value, and all values in it; None for labels."""
     field = field_at(quantity)
     numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     # a whole number may be beyond all floats
     plain = [float(value) if abs(value) <= sys.float_info.max else math.inf for value in numbers]
     if not all(map(math.isfinite, plain)):
-        raise Refused(given, list(values), "is not finite", "give numbers")
+        raise Refused(key, list(values), "is not finite", "give numbers")
     texts = [value for value in values if isinstance(value, str)]
     limited = units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None
-    wanted = limited if field is None else field.unit
-    if wanted is None or len(plain) + len(texts) < len(values):
+    unit_needed = limited if field is None else field.unit
+    if unit_needed is None or len(plain) + len(texts) < len(values):
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
         return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
-    si = [measured(text, wanted, given) for text in texts]
+    si = [measured(text, unit_needed, key) for text in texts]
     if plain:
-        raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
+        raise Refused(key, list(values), "mixes numbers with and without a unit", "write all alike")
     unit = units.unit_of(texts[0])
-    one = units.parse(f"1 {unit}", wanted)
-    return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in si)
+    unit_value = units.parse(f"1 {unit}", unit_needed)
+    return unit or "1", tuple(float(f"{number / unit_value:.{_DIGITS}g}") for number in si)
 
 
 def _is_limit(quantity: str) -> bool:
-    # the dimension of a side of a limit follows from its text alone
+    # the model fixes no dimension for a side of a limit; its text does
     parts = parts_of(quantity)
     return parts[0] == "constraints" and parts[-1] in SIDES

@@ -1,4 +1,4 @@
-"""TOML text: tables written as a file, and the rules that the text of a file breaks."""
+"""TOML text: writer of tables, and clear complaints about text that is not TOML."""
 
 from __future__ import annotations
 
@@ -46,48 +46,53 @@ _TOKEN = re.compile(
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Return the text of a file that reads as these tables."""
+    """Return the text of a TOML file with these tables."""
     return "\n".join(_lines(tables, ())).strip("\n") + "\n"
 
 
 def _lines(table: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[str]:
-    """Yield lines of values first, then those of tables and lists of tables; an open number stays on one line."""
+    """Yield the lines of a table: values first, then inner tables; open numbers stay on one line."""
     lists = {key: value if isinstance(value, list) else [value] for key, value in table.items()}
     inner = {
         key: tables
         for key, tables in lists.items()
-        if tables and all(isinstance(one, Mapping) and "between" not in one for one in tables)
+        if tables
+        and all(isinstance(table_of_list, Mapping) and "between" not in table_of_list for table_of_list in tables)
     }
     yield from (f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items() if key not in inner)
     for key, tables in inner.items():
         path = (*above, key)
         name = ".".join(map(toml_key, path))
-        for one in tables:
-            yield from ("", f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]", *_lines(one, path))
+        for table_of_list in tables:
+            yield from (
+                "",
+                f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]",
+                *_lines(table_of_list, path),
+            )
 
 
 def toml_key(key: str) -> str:
-    """Return a key as a file has it, in quotes if it needs them."""
+    """Return a key as written in TOML, in quotes if necessary."""
     return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
 
 
 def toml_value(value: Any) -> str:
-    """Return a value on one line."""
+    """Return a value as TOML on one line."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{toml_key(key)} = {toml_value(one)}' for key, one in value.items())} }}"
+        return f"{{ {', '.join(f'{toml_key(key)} = {toml_value(entry)}' for key, entry in value.items())} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(toml_value, value))}]"
     return repr(value)
 
 
 def line_deeper_than(depth: int, text: str) -> int | None:
-    """Return the first line, from one, with more open brackets or parts of a key; None if there is none.
+    """Return the first line, from one, with more than `depth` open brackets or parts of a key; None if there is none.
 
-    The parser takes memory with the square of the number of a key's parts.
+    The memory of the parser grows with the square of the number of parts of a key.
     """
     brackets = 0
     for token in _TOKEN.finditer(text):
@@ -98,20 +103,20 @@ def line_deeper_than(depth: int, text: str) -> int | None:
 
 
 def toml_complaint(content: bytes, error: tomllib.TOMLDecodeError) -> Complaint:
-    """Return the complaint about a file that is no TOML: line and column, rule and remedy."""
+    """Return the complaint about a file that is not TOML: line and column, rule and remedy."""
     text = content.decode("utf-8-sig").replace("\r\n", "\n")
     match = _AT.match(str(error))
     message, line, column = match.groups(default="0") if match else (str(error), "0", "0")
     offset = len(text.rstrip())
     if int(line):
-        offset = sum(len(one) + 1 for one in text.split("\n")[: int(line) - 1]) + int(column) - 1
+        offset = sum(len(text_line) + 1 for text_line in text.split("\n")[: int(line) - 1]) + int(column) - 1
     offset, rule, remedy = _fault(text, offset, message)
     where = f"line {text.count(chr(10), 0, offset) + 1}, column {offset - text.rfind(chr(10), 0, offset)}"
     return Complaint(where, "", f"is no TOML: {rule}", remedy)
 
 
 def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
-    """Return place, rule and remedy of the fault at which the parser stopped with a message."""
+    """Return offset, rule and remedy of the fault for which the parser stopped at an offset with a message."""
     begin = text.rfind("\n", 0, offset) + 1
     line, ahead = (text[start:].partition("\n")[0] for start in (begin, offset))
     value, ahead = line.partition("=")[2].partition("#")[0].strip(), ahead.strip()
@@ -161,20 +166,20 @@ def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
 
 
 def _repeated(line: str, earlier: Sequence[str], message: str) -> tuple[str, str]:
-    """Return rule and remedy of a key or table that is given twice."""
+    """Return rule and remedy for a key or table that is given twice: in `line`, and in the lines before."""
 
     def numbers(form: re.Pattern[str]) -> list[int]:
-        matches = ((k, form.match(one)) for k, one in enumerate(earlier, 1))
+        matches = ((k, form.match(text_line)) for k, text_line in enumerate(earlier, 1))
         return [k for k, match in matches if match and match.group(1) == name]
 
     if head := _HEAD.match(line):
         name = head.group(1)
-        shown, remedy = f"[{name}]", f"join the two, or write [[{name}]] for each of several"
+        name_text, remedy = f"[{name}]", f"join the two, or write [[{name}]] for each of several"
         lines = numbers(_HEAD)
     else:
         entries = map(_ENTRY.match, (line, *reversed(earlier)))
         entry = next(filter(None, entries), None)
-        name = shown = entry.group(1) if entry else "a key"
+        name = name_text = entry.group(1) if entry else "a key"
         remedy, lines = "keep one of them", numbers(_ENTRY)
     if message.startswith("Duplicate"):
         return f"{message.rpartition('key ')[2]} stands twice in one table", remedy
@@ -184,4 +189,4 @@ def _repeated(line: str, earlier: Sequence[str], message: str) -> tuple[str, str
     if not head and not _ENTRY.match(line):
         # a value of several lines is read to its end
         lines = lines[:-1]
-    return f"{shown} is given twice" + (f", before in line {lines[-1]}" if lines else ""), remedy
+    return f"{name_text} is given twice" + (f", before in line {lines[-1]}" if lines else ""), remedy

@@ -1,8 +1,7 @@
-"""Norms of many designs at once, from rows that are linear in a few numbers per design (F12).
+"""Norms of many designs at once, from rows that are linear in a few numbers of each design (F12).
 
-The work is one matrix product and two passes over its result.
-Designs go through in blocks that stay in the cache; what a block holds is fixed by the
-shapes alone, so results do not depend on the number of threads.
+The work is one matrix product and two passes over its result. Designs are processed in blocks that fit in the cache.
+The size of a block depends on the shapes only, so results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -18,51 +17,68 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, Norm
 
 CACHE_BYTES = 1 << 19
-"""Of the block of rows that one thread works on."""
+"""Size of the block of rows that one thread works on [bytes]."""
 _LEAST_BLOCK = 16
 _PARTS_OF_COMPLEX = 2
 
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """Norm N(f . R) for many f, R of shape (components, features, k)."""
+    """Norm of the rows f . R of many designs.
+
+    Attributes
+    ----------
+    norm
+        Norm of rows.
+    rows
+        Matrix R, shape (components, features, k); the features f of a design have the shape (features,).
+    grid
+        Weights and grouping of the k rows.
+    """
 
     norm: Norm
     rows: Array
     grid: Grid
 
     def values(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """Return the norm of every design from features (designs, features).
+        """Return the norm of each design, shape (designs,), from features, shape (designs, features).
 
-        One block of rows takes `cache_bytes`; `threads` are worked on at the same time.
+        Parameters
+        ----------
+        features
+            Features of each design.
+        threads
+            Number of threads, each with one block of rows.
+        cache_bytes
+            Size of a block.
         """
         components, _, k = self.rows.shape
         block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
-        out = np.empty(len(features))
+        norms = np.empty(len(features))
         starts = range(0, len(features), block)
         if not self.norm.is_monotone_in_lengths:
             for start in starts:
                 own = slice(start, start + block)
-                out[own] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[own]))
-            return out
+                norms[own] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[own]))
+            return norms
 
-        def work(own: Sequence[int]) -> None:
+        def work(block_starts: Sequence[int]) -> None:
             product, lengths = np.empty((block, components * k)), np.empty((block, k))
-            for start in own:
+            for start in block_starts:
                 part = features[start : start + block]
-                found = np.matmul(part, self._matrix, out=product[: len(part)])
-                size = self._lengths(found, lengths[: len(part)])
-                out[start : start + block] = self.norm.norm_from_lengths(size, self.grid.weights)
+                products = np.matmul(part, self._matrix, out=product[: len(part)])
+                size = self._lengths(products, lengths[: len(part)])
+                norms[start : start + block] = self.norm.norm_from_lengths(size, self.grid.weights)
 
         if threads <= 1 or len(starts) <= 1:
             work(starts)
         else:
             with ThreadPoolExecutor(threads) as pool:
                 list(pool.map(work, (starts[k::threads] for k in range(threads))))
-        return out
+        return norms
 
     def value(self, features: Array) -> float:
-        """Return the norm of one design from features (n,)."""
+        """Return the norm of one design from its features, shape (features,)."""
         if not self.norm.is_monotone_in_lengths:
             return self.norm.value(self.grid, np.einsum("cfk,f->kc", self.rows, features))
         return float(self.norm.norm_from_lengths(self._lengths(np.dot(features, self._matrix)), self.grid.weights))
@@ -73,16 +89,16 @@ class BatchNorm:
         order = (1, 2, 0) if components == _PARTS_OF_COMPLEX else (1, 0, 2)
         return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
 
-    def _lengths(self, product: Array, out: Array | None = None) -> Array:
+    def _lengths(self, product: Array, output: Array | None = None) -> Array:
         """Return the row lengths of every design, shape (..., k); overwrites the products."""
         components, _, k = self.rows.shape
         if components == 1:
-            return np.absolute(product, out=out)
+            return np.absolute(product, out=output)
         if components == _PARTS_OF_COMPLEX:
-            # one pass over the numbers in place of four
-            return np.absolute(product.view(np.complex128), out=out)
+            # one pass over the numbers, not four
+            return np.absolute(product.view(np.complex128), out=output)
         np.multiply(product, product, out=product)
-        total = np.add(product[..., :k], product[..., k : 2 * k], out=out)
+        total = np.add(product[..., :k], product[..., k : 2 * k], out=output)
         for j in range(2, components):
             np.add(total, product[..., j * k : (j + 1) * k], out=total)
         return np.sqrt(total, out=total)

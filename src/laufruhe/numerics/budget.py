@@ -1,4 +1,4 @@
-"""Time limit of a search: one deadline for all its loops, which stop there with the best result so far."""
+"""Time limit of a search: one deadline for all its loops, which then stop with the best result so far."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from contextvars import ContextVar
 from typing import TypeVar
 
 T = TypeVar("T")
-# reading of the clock at which time is over
+# deadline on the monotonic clock [s]
 _until: ContextVar[float] = ContextVar("until", default=math.inf)
 
 
 @contextmanager
 def limit_time(seconds: float | None) -> Iterator[None]:
-    """Limit the work within to some seconds, and to those left outside; None sets no further limit."""
-    own = math.inf if seconds is None else time.monotonic() + seconds
-    before = _until.set(min(_until.get(), own))
+    """Limit the work in the block to some seconds and to the enclosing limit; None adds no limit."""
+    deadline = math.inf if seconds is None else time.monotonic() + seconds
+    before = _until.set(min(_until.get(), deadline))
     try:
         yield
     finally:
@@ -27,7 +27,7 @@ def limit_time(seconds: float | None) -> Iterator[None]:
 
 @contextmanager
 def minimum_time(seconds: float) -> Iterator[None]:
-    """Give work within at least some seconds: a result needs it."""
+    """Give the work in the block at least some seconds, even beyond the enclosing limit."""
     before = _until.set(max(_until.get(), time.monotonic() + seconds))
     try:
         yield
@@ -36,17 +36,17 @@ def minimum_time(seconds: float) -> Iterator[None]:
 
 
 def seconds_left() -> float:
-    """Return the seconds left; infinite without a limit."""
+    """Return the seconds until the deadline; infinite without a limit."""
     return _until.get() - time.monotonic()
 
 
 def is_time_over() -> bool:
-    """Return True if the time is over."""
+    """Return True if the deadline is over."""
     return seconds_left() <= 0.0
 
 
 def until_time_limit(items: Iterable[T]) -> Iterator[T]:
-    """Yield the first piece, and further ones while time is left."""
+    """Yield the first item, and further ones while time is left."""
     for k, item in enumerate(items):
         if k and is_time_over():
             return
@@ -54,7 +54,7 @@ def until_time_limit(items: Iterable[T]) -> Iterator[T]:
 
 
 def timed_rounds(maximum: int) -> Iterator[int]:
-    """Yield numbers of optional rounds while time is left."""
+    """Yield 0 ... maximum - 1 while time is left."""
     for k in range(maximum):
         if is_time_over():
             return

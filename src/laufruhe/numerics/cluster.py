@@ -1,4 +1,4 @@
-"""A Dask cluster as an executor, by the address of its scheduler."""
+"""Dask cluster as an executor, by the address of its scheduler."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 ANSWERS, PATIENCE = 10.0, 60.0
-"""Seconds in which a scheduler has to answer at first; and the first worker has to come, or a lost scheduler again."""
+"""Time limits [s]: for the first answer of a scheduler; for the first worker, and for a lost scheduler to return."""
 
 
 class Cluster(Executor):
-    """Workers of a `distributed.Client`."""
+    """Executor on the workers of a `distributed.Client`."""
 
     def __init__(self, client: Any) -> None:
         from distributed.scheduler import KilledWorker
@@ -28,13 +28,13 @@ class Cluster(Executor):
         self.losses = (KilledWorker,)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Schedule a call; it waits while the scheduler is away."""
+        """Schedule a call; it waits while the scheduler does not answer."""
         if self._client.status in ("closing", "closed"):
             raise RuntimeError("the connection is closed")
-        asked, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
-        # a call that nobody waits for is given up
-        answer.add_done_callback(lambda done: asked.cancel() if done.cancelled() else None)
-        asked.add_done_callback(partial(_tell, answer))
+        call, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
+        # cancelling the future cancels the call
+        answer.add_done_callback(lambda done: call.cancel() if done.cancelled() else None)
+        call.add_done_callback(partial(_tell, answer))
         return answer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -43,8 +43,8 @@ class Cluster(Executor):
     @property
     def count(self) -> int:
         """Number of threads of all workers."""
-        known = self._client.scheduler_info(n_workers=-1)["workers"].values()
-        return max(sum(int(worker["nthreads"]) for worker in known), 1)
+        workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
+        return max(sum(int(worker["nthreads"]) for worker in workers), 1)
 
     @property
     def gone(self) -> str:
@@ -52,42 +52,42 @@ class Cluster(Executor):
         return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
 
 
-def _tell(answer: Future[Any], asked: Any) -> None:
+def _tell(answer: Future[Any], call: Any) -> None:
     if not answer.set_running_or_notify_cancel():
         return
     try:
-        answer.set_result(asked.result(PATIENCE))
+        answer.set_result(call.result(PATIENCE))
     except Exception as error:
-        is_its_own = asked.status == "error"
+        is_its_own = call.status == "error"
         answer.set_exception(error if is_its_own else CancelledError(str(error)))
 
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """Connect to the scheduler at an address such as tcp://10.0.0.1:8786, and yield its workers.
+    """Connect to the scheduler at an address such as tcp://10.0.0.1:8786, and yield an executor on its workers.
 
     Raises
     ------
     InputError
-        If Dask is not installed, or nobody answers there.
+        If Dask is not installed, or no scheduler answers.
     SolverError
-        If no worker comes.
+        If no worker connects in time.
     """
     try:
         from distributed import Client
     except ImportError:
         rule, remedy = "needs Dask, which is not installed", "pip install 'laufruhe[cluster]'"
         raise InputError("laufruhe", (Complaint("--scheduler", address, rule, remedy),)) from None
-    # what is lost and found again is told by who asked for it
+    # the caller reports losses itself
     for name in ("distributed", "distributed.client"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     try:
         Client(address, set_as_default=False, timeout=ANSWERS).close()
         client = Client(address, set_as_default=False, timeout=PATIENCE)
     except (OSError, ValueError, TypeError) as error:
-        why = str(error).partition(":")[0] or type(error).__name__
+        reason = str(error).partition(":")[0] or type(error).__name__
         complaint = Complaint(
-            "--scheduler", address, f"does not answer ({why})", "name a running one, as dask scheduler says it"
+            "--scheduler", address, f"does not answer ({reason})", "name a running one, as dask scheduler says it"
         )
         raise InputError("laufruhe", (complaint,)) from None
     try:

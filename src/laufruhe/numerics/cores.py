@@ -1,4 +1,4 @@
-"""Processors to share work among, and processes that end with their parent."""
+"""Number of processors, and processes that end with their parent."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import signal
 from contextlib import suppress
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Variables by which a process begins whose linear algebra takes one thread: on matrices as small as ours more only
-wait in a loop, which takes twice the processor time, and sums depend on how many they are."""
+"""Environment variables that limit linear algebra to one thread. On small matrices more threads double the processor
+time, and sums would depend on their number."""
 _DEATH_SIGNAL = 1
 
 
@@ -19,7 +19,7 @@ def processors() -> int:
 
 
 def end_with_parent(parent: int) -> None:
-    """End this process with its parent, where the system can (Linux)."""
+    """Let the system end this process together with its parent (Linux only)."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:

@@ -11,101 +11,102 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, Indices
 
 SAME = 1e-13
-"""Share of a radius by which a point may stand outside a ball that holds it."""
-# what is added to products of points that coincide or lie in a line: a share of squares, and where these vanish
+"""Relative tolerance of a radius within which a point counts as inside."""
+# regularisation of the linear system for points that coincide or are collinear: relative, and absolute
 _FLAT, _NOTHING = 1e-15, 1e-290
 
 
 @dataclass(frozen=True, eq=False)
 class EnclosingBalls:
-    """Smallest enclosing ball of each set.
+    """Smallest enclosing ball of each of several sets of points in d dimensions.
 
     Attributes
     ----------
     radii
-        Shape (sets,).
+        Radius of each ball, shape (sets,).
     centres
-        Shape (sets, d).
-    inside
-        Points that hold a ball, some of them more than once, shape (sets, d + 1).
+        Centre of each ball, shape (sets, d).
+    support
+        Indices of the support points of each ball, shape (sets, d + 1); fewer than d + 1 points are repeated.
     shares
-        Of these in the centre, shape (sets, d + 1); none is negative, and they add up to one.
+        Weights with which the support points make the centre, shape (sets, d + 1); not negative, with sum one.
     """
 
     radii: Array
     centres: Array
-    inside: Indices
+    support: Indices
     shares: Array
 
 
 def enclosing_balls(points: Array) -> EnclosingBalls:
-    """Return the smallest enclosing balls of points, shape (sets, k, d).
+    """Return the smallest enclosing balls of sets of points, shape (sets, k, d).
 
-    The farthest point joins those that hold a ball, and the ball of these few is found by trying every choice of them
-    that has it. Radii grow with every round, so it ends.
+    Each round adds the point farthest from the centre to the support points and takes the smallest ball of these, by
+    enumeration. Radii grow with every round, so the loop ends.
     """
     sets, count, d = points.shape
     units = np.abs(points).max(axis=(1, 2), initial=0.0)
     scaled = points / np.where(units > 0.0, units, 1.0)[:, None, None]
-    every = np.arange(sets)
+    all_sets = np.arange(sets)
     radii, shares = np.zeros(sets), np.zeros((sets, d + 1))
     shares[:, 0] = 1.0
     middle = 0.5 * (scaled.min(axis=1) + scaled.max(axis=1))
-    inside = np.repeat(_squares(scaled, middle).argmax(axis=1)[:, None], d + 1, axis=1)
-    centres = scaled[every, inside[:, 0]]
-    left = every
+    support = np.repeat(_squares(scaled, middle).argmax(axis=1)[:, None], d + 1, axis=1)
+    centres = scaled[all_sets, support[:, 0]]
+    active = all_sets
     for _ in range(count):
-        far = _squares(scaled[left], centres[left])
-        farthest = far.argmax(axis=1)
-        outside = np.sqrt(far[np.arange(len(left)), farthest]) > radii[left] * (1.0 + SAME)
-        more = outside & (inside[left] != farthest[:, None]).all(axis=1)
-        left, farthest = left[more], farthest[more]
-        if not len(left):
+        squares = _squares(scaled[active], centres[active])
+        farthest = squares.argmax(axis=1)
+        outside = np.sqrt(squares[np.arange(len(active)), farthest]) > radii[active] * (1.0 + SAME)
+        unsolved = outside & (support[active] != farthest[:, None]).all(axis=1)
+        active, farthest = active[unsolved], farthest[unsolved]
+        if not len(active):
             break
-        few = np.concatenate([inside[left], farthest[:, None]], axis=1)
-        chosen, radii[left], centres[left], shares[left] = _of_few(scaled[left[:, None], few])
-        inside[left] = np.take_along_axis(few, chosen, axis=1)
-    return EnclosingBalls(radii * units, centres * units[:, None], inside, shares)
+        candidates = np.concatenate([support[active], farthest[:, None]], axis=1)
+        selection, radii[active], centres[active], shares[active] = _of_few(scaled[active[:, None], candidates])
+        support[active] = np.take_along_axis(candidates, selection, axis=1)
+    return EnclosingBalls(radii * units, centres * units[:, None], support, shares)
 
 
 def _squares(points: Array, centres: Array) -> Array:
-    away = points - centres[:, None]
-    return np.asarray(np.einsum("skd,skd->sk", away, away))
+    offsets = points - centres[:, None]
+    return np.asarray(np.einsum("skd,skd->sk", offsets, offsets))
 
 
 def _of_few(points: Array) -> tuple[Indices, Array, Array, Array]:
-    """Return the ball of d + 2 points, the last of which is outside the ball of the others and so on its surface.
+    """Return support indices, radii, centres and shares of the balls of d + 2 points, shape (sets, d + 2, d).
 
-    Of the centres between some of them it is the one from which the farthest is nearest.
+    The last point lies outside the ball of the others, so it is a support point. Among the circumcentres of all subsets
+    with it, the centre is the one whose farthest point is nearest.
     """
     sets, count, d = points.shape
-    chosen, shares = np.full((sets, d + 1), count - 1), np.zeros((sets, d + 1))
-    radii, centres, left = np.full(sets, np.inf), np.zeros((sets, d)), np.arange(sets)
+    support, shares = np.full((sets, d + 1), count - 1), np.zeros((sets, d + 1))
+    radii, centres, active = np.full(sets, np.inf), np.zeros((sets, d)), np.arange(sets)
     done = np.zeros(sets, dtype=bool)
     for size in range(2, d + 2):
         choices = _choices(count, size)
-        given = points[left]
-        corners = given[:, choices]
+        remaining = points[active]
+        corners = remaining[:, choices]
         parts = np.maximum(_centre_shares(corners), 0.0)
         parts /= parts.sum(axis=2, keepdims=True)
         middles = np.einsum("sck,sckd->scd", parts, corners)
-        away = given[:, None] - middles[:, :, None]
-        apart = np.sqrt(np.einsum("sckd,sckd->sck", away, away))
-        outside = apart.max(axis=2)
-        best = outside.argmin(axis=1)
-        row = np.arange(len(left))
-        better = outside[row, best] < radii[left]
-        now, best, row = left[better], best[better], row[better]
-        radii[now], centres[now] = outside[row, best], middles[row, best]
-        shares[now], chosen[now] = 0.0, count - 1
-        shares[now, :size], chosen[now, :size] = parts[row, best], choices[best]
-        # a ball whose own points are as far as any is the smallest
-        own = apart[row[:, None], best[:, None], choices[best]].min(axis=1)
-        done[now] = outside[row, best] <= own * (1.0 + SAME)
-        left = np.flatnonzero(~done)
-        if not len(left):
+        offsets = remaining[:, None] - middles[:, :, None]
+        distances = np.sqrt(np.einsum("sckd,sckd->sck", offsets, offsets))
+        farthest = distances.max(axis=2)
+        best = farthest.argmin(axis=1)
+        row = np.arange(len(active))
+        better = farthest[row, best] < radii[active]
+        improved, best, row = active[better], best[better], row[better]
+        radii[improved], centres[improved] = farthest[row, best], middles[row, best]
+        shares[improved], support[improved] = 0.0, count - 1
+        shares[improved, :size], support[improved, :size] = parts[row, best], choices[best]
+        # a ball whose support points are as far as any point is the smallest
+        support_distance = distances[row[:, None], best[:, None], choices[best]].min(axis=1)
+        done[improved] = farthest[row, best] <= support_distance * (1.0 + SAME)
+        active = np.flatnonzero(~done)
+        if not len(active):
             break
-    return chosen, radii, centres, shares
+    return support, radii, centres, shares
 
 
 @cache
@@ -115,10 +116,10 @@ def _choices(count: int, size: int) -> Indices:
 
 
 def _centre_shares(points: Array) -> Array:
-    apart = points[..., 1:, :] - points[..., :1, :]
-    products = apart @ apart.swapaxes(-1, -2)
+    edges = points[..., 1:, :] - points[..., :1, :]
+    products = edges @ edges.swapaxes(-1, -2)
     squares = np.einsum("...kk->...k", products).copy()
-    size = apart.shape[-2]
+    size = edges.shape[-2]
     products += (_FLAT * squares.sum(axis=-1) + _NOTHING)[..., None, None] * np.eye(size)
     shares = 0.5 * np.linalg.solve(products, squares[..., None])[..., 0]
     return np.concatenate([1.0 - shares.sum(axis=-1, keepdims=True), shares], axis=-1)

@@ -1,9 +1,8 @@
-"""Angles as exact fractions of a turn, so that a crank star that cancels gives zero.
+"""Angles as exact fractions of a turn, so that sums that cancel over a crank star are exactly zero.
 
-Crank throws, banks and firing intervals are rational parts of a turn. Products of
-such an angle with an order stay rational, and their sines and cosines are read from
-one table whose entries mirror each other to the last bit. Sums over a star then
-cancel exactly, or to a rounding of their own terms, which is flushed to zero.
+Crank throws, banks and firing intervals are rational fractions of a turn, and so are their products with orders. Their
+sines and cosines come from one table that is symmetric to the last bit. A sum over a star then cancels exactly, or to
+a rounding error that is set to zero.
 """
 
 from __future__ import annotations
@@ -28,23 +27,23 @@ Turn: TypeAlias = Fraction | float
 def as_turn(angle: float) -> Turn:
     """Return an angle [rad] in turns, exact if it is a rounded rational.
 
-    A float within four roundings of a fraction with a denominator of at most 20 000
-    is taken for that fraction; any other stays a float.
+    A float within four rounding errors of a fraction with a denominator of at most 20 000 becomes this fraction; any
+    other stays a float.
     """
-    turns = angle / math.tau
-    nearest = Fraction(turns).limit_denominator(MAX_DENOMINATOR)
-    return nearest if abs(float(nearest) - turns) <= 4 * _EPS * max(abs(turns), 1.0) else turns
+    turn = angle / math.tau
+    nearest = Fraction(turn).limit_denominator(MAX_DENOMINATOR)
+    return nearest if abs(float(nearest) - turn) <= 4 * _EPS * max(abs(turn), 1.0) else turn
 
 
-def reduced_turn(turn: Turn, whole: int) -> Turn:
-    """Reduce turns to 0 ... whole; a rounding below whole is zero."""
-    rest = turn % whole
-    return rest if whole - rest > SAME_TURN else Fraction(0)
+def reduced_turn(turn: Turn, period: int) -> Turn:
+    """Return an angle in turns reduced to 0 ... period; a rounding error below the period is zero."""
+    remainder = turn % period
+    return remainder if period - remainder > SAME_TURN else Fraction(0)
 
 
 @lru_cache(maxsize=4096)
 def direction(angle: float) -> Turn:
-    """Return an angle [rad] in turns within one turn: equal for equal directions."""
+    """Return an angle [rad] in turns, reduced to one turn: equal for equal directions."""
     return reduced_turn(as_turn(angle), 1)
 
 
@@ -57,14 +56,13 @@ def angle_of(turn: Turn) -> float:
 def cis(turn: Turn) -> complex:
     """Return e^{2 pi i turn}, with every symmetry of the circle exact to the last bit.
 
-    A Fraction is exact at multiples of 1/8 and 1/12 turn, and mirrors exactly in the
-    axes and the diagonals.
+    For a Fraction the value is exact at multiples of 1/8 and 1/12 turn, and symmetric about axes and diagonals.
     """
     if not isinstance(turn, Fraction):
         return complex(math.cos(math.tau * turn), math.sin(math.tau * turn))
-    eighths, rest = divmod(turn % 1, Fraction(1, 8))
+    eighths, remainder = divmod(turn % 1, Fraction(1, 8))
     odd = eighths % 2 == 1
-    small = Fraction(1, 8) - rest if odd else rest
+    small = Fraction(1, 8) - remainder if odd else remainder
     cosine, sine = _first_octant(small)
     if odd:
         cosine, sine = sine, cosine
@@ -85,68 +83,67 @@ def _first_octant(turn: Fraction) -> tuple[float, float]:
 @lru_cache(maxsize=256)
 def _roots(denominator: int) -> NDArray[np.complex128]:
     # `cis` of every fraction, in eighths of 1 / denominator
-    eighths, rest = np.divmod(8 * np.arange(denominator), denominator)
-    small = np.where(eighths % 2 == 1, denominator - rest, rest)
+    eighths, remainder = np.divmod(8 * np.arange(denominator), denominator)
+    small = np.where(eighths % 2 == 1, denominator - remainder, remainder)
     angles = (math.tau * (small / (8.0 * denominator))).tolist()
     cosines, sines = np.array([(math.cos(angle), math.sin(angle)) for angle in angles]).T
     for exact, share in ((Fraction(1, 12), 12 * small == 8 * denominator), (Fraction(1, 8), small == denominator)):
         cosines[share], sines[share] = _first_octant(exact)
-    across, up = np.where(eighths % 2 == 1, (sines, cosines), (cosines, sines))
+    across, along = np.where(eighths % 2 == 1, (sines, cosines), (cosines, sines))
     table = np.empty(denominator, dtype=complex)
-    table.real = np.choose(eighths // 2, [across, -up, -across, up])
-    table.imag = np.choose(eighths // 2, [up, across, -up, -across])
+    table.real = np.choose(eighths // 2, [across, -along, -across, along])
+    table.imag = np.choose(eighths // 2, [along, across, -along, -across])
     table.setflags(write=False)
     return table
 
 
 def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Return e^{2 pi i m t} for every multiple m and turn t.
+    """Return e^{2 pi i m t} for each multiple m and angle t.
 
     Parameters
     ----------
     turns
-        Angles as parts of a turn, length n.
+        Angles as fractions of a turn, length n.
     multiples
-        Integers, length m (orders in units of the lowest order).
+        Integers, shape (m,): orders as multiples of the base order.
 
     Returns
     -------
-    Array of shape (m, n). Exact turns give table values, others plain exponentials.
+    Shape (m, n). Exact fractions give table values, floats plain exponentials.
     """
-    out = np.empty((len(multiples), len(turns)), dtype=complex)
+    waves = np.empty((len(multiples), len(turns)), dtype=complex)
     for column, turn in enumerate(turns):
         if isinstance(turn, Fraction) and turn.denominator <= MAX_DENOMINATOR:
             index = (multiples * (turn.numerator % turn.denominator)) % turn.denominator
-            out[:, column] = _roots(turn.denominator)[index]
+            waves[:, column] = _roots(turn.denominator)[index]
         else:
-            out[:, column] = np.exp(2j * np.pi * ((multiples * float(turn)) % 1.0))
-    return out
+            waves[:, column] = np.exp(2j * np.pi * ((multiples * float(turn)) % 1.0))
+    return waves
 
 
 def star_sum(
     weights: NDArray[np.float64], turns: Sequence[Turn], multiples: NDArray[np.int64]
 ) -> NDArray[np.complex128]:
-    """Sum over a star, sum_k w_k e^{2 pi i m t_k}, with true zeros.
+    """Return the sums over a star sum_k w_k e^{2 pi i m t_k}, with exact zeros.
 
     Parameters
     ----------
     weights
-        Shape (n, c): c real weights of each of n members.
+        Real weights of each of n members in c components, shape (n, c).
     turns
-        Length n, the members' angles as parts of a turn.
+        Angles of the members as fractions of a turn, length n.
     multiples
-        Length m.
+        Integers, shape (m,).
 
     Returns
     -------
-    Shape (m, c). A real or imaginary part below the rounding of its own sum,
-    (n + 2) eps sum |w|, cannot be told from zero and is zero.
+    Shape (m, c). Real and imaginary parts below the rounding error of their sum, (n + 2) eps sum |w|, are zero.
     """
     return _star_sum(phasors(turns, multiples), weights)
 
 
 def star_orders(weights: NDArray[np.float64], turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
-    """Return `star_sum` of the multiples 0 ... count - 1; phasors of the same turns are cached."""
+    """Return `star_sum` for the multiples 0 ... count - 1, shape (count, c), with cached phasors."""
     return _star_sum(_waves(turns, count), weights)
 
 
@@ -162,8 +159,11 @@ def _star_sum(waves: NDArray[np.complex128], weights: NDArray[np.float64]) -> ND
 
 
 def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) -> NDArray[np.complex128]:
-    """Sum the values (n, c) of each index, shape (largest + 1, c); sums below their rounding are zero."""
-    # every sum as a product with zeros and ones: a few values cost a few calls
+    """Return the sum of the values (n, c) with equal index, shape (largest index + 1, c).
+
+    Sums below their rounding error are zero.
+    """
+    # products with matrices of zeros and ones take less time than loops
     members, roundings = _members(indices)
     parts = values.view(float)
     return _flushed(members @ parts, roundings @ np.abs(parts) @ _both_parts(values.shape[1]))

@@ -10,12 +10,12 @@ from pathlib import Path
 try:
     import fcntl
 except ImportError:
-    # a system without locks: what a killed run leaves behind stays, and two runs at once are not told apart
+    # systems without file locks: concurrent runs are not detected, and files of killed runs remain
     fcntl = None  # type: ignore[assignment]
 
 
 _KEPT: set[int] = set()
-"""Handles of folders that this process keeps."""
+"""File handles of the folders that this process has locked."""
 
 
 def _let_go() -> None:
@@ -29,7 +29,11 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool | None]:
-    """Lock a folder; yield True if locked, False if another process holds it (without `wait`), None if unknown."""
+    """Lock a folder for the block.
+
+    Yields True if it is locked, False if another process has locked it (without `wait`), None if the system has no
+    locks.
+    """
     if fcntl is None:
         yield None
         return

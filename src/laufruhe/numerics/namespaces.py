@@ -1,8 +1,7 @@
-"""The maths namespaces that generic kernels take: NumPy for numbers, CasADi for symbols.
+"""Namespaces of maths functions for formulas that work with NumPy numbers and with CasADi symbols.
 
-A kernel calls `lib.sin`, `lib.matrix` and the like and works by `@`, `*`, `+` and `.T` on
-what they return, so that one formula serves both. `np.*` on symbols is wrong without an
-error in places, and CasADi is imported when first asked for.
+A formula takes a namespace `lib`, calls `lib.sin` or `lib.matrix`, and combines results by `@`, `*`, `+` and `.T`.
+Functions of `np` on symbols may be wrong without an error. CasADi is imported at first use.
 """
 
 from __future__ import annotations
@@ -15,13 +14,13 @@ import numpy as np
 
 
 class Maths(Protocol):
-    """Functions that a kernel may call."""
+    """Functions that a formula may call."""
 
     def sin(self, x: Any, /) -> Any:
-        """Sine."""
+        """Return the sine."""
 
     def cos(self, x: Any, /) -> Any:
-        """Cosine."""
+        """Return the cosine."""
 
     def matrix(self, rows: Sequence[Sequence[Any]], /) -> Any:
         """Return a matrix from rows of scalars."""
@@ -46,7 +45,7 @@ NUMBERS: Maths = _Numbers()
 
 @cache
 def symbols() -> Maths:
-    """Return the namespace of CasADi's SX, MX and DM."""
+    """Return the namespace for CasADi's SX, MX and DM."""
     import casadi as ca
 
     class Symbols:
@@ -57,5 +56,5 @@ def symbols() -> Maths:
         def matrix(rows: Sequence[Sequence[Any]], /) -> Any:
             return ca.vertcat(*(ca.horzcat(*row) for row in rows))
 
-    found: Maths = Symbols()
-    return found
+    namespace: Maths = Symbols()
+    return namespace

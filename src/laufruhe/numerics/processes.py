@@ -1,7 +1,7 @@
-"""Processes of this machine as an executor, each an interpreter of its own or a forked copy of this process.
+"""Executor on processes of this machine: new Python interpreters, or forked copies of this process.
 
-The executor forks no threaded process and does not import the caller's main module, so it works from any script,
-notebook or test. A process that dies takes with it the one call that it was at; the next call gets a new one.
+It never forks a process with threads and does not import the caller's main module, so it works from any script,
+notebook or test. If a process dies, its current call fails with `WorkerDied`, and the next call starts a new process.
 """
 
 from __future__ import annotations
@@ -34,15 +34,15 @@ _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
 
 
 def call_by_name(name: str, *args: Any) -> Any:
-    """Call a function by its address `package.module:function`, which the caller then need not import."""
+    """Call a function by its address `package.module:function`, so that the caller need not import it."""
     return resolve_name(name)(*args)
 
 
 def _fork(child: Callable[[], object], detached: bool = False) -> int:
-    """Start a copy of this process that runs `child` and ends, and return its process number.
+    """Start a forked copy of this process that runs `child` and ends; return its process number.
 
-    Signals are blocked meanwhile, so that neither process is ended in place of the other. A detached copy has a
-    session of its own, and the default handlers of signals.
+    Signals are blocked during the fork, so that each reaches the right process. A detached copy has its own session
+    and the default signal handlers.
     """
     parent, blocked = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
     pid = os.fork()
@@ -63,16 +63,19 @@ def _fork(child: Callable[[], object], detached: bool = False) -> int:
 
 @contextmanager
 def run_concurrently(work: Callable[[], T], pays: bool = True) -> Iterator[Callable[[], T]]:
-    """Run `work` in a forked copy of this process, and yield a function that waits for its answer.
+    """Run `work` in a forked copy of this process, and yield a function that waits for its result.
 
-    Where nothing can be forked, the work is done first; where the copy dies, it is done when the answer is asked for.
+    If this process cannot be forked, `work` runs here before the block. If the copy dies, it runs here when the result
+    is requested.
 
     Parameters
     ----------
+    work
+        Function without arguments; its result must be picklable.
     pays
         True if the work takes longer than a fork, some milliseconds.
     """
-    # the other thread of a process that serves holds nothing that a copy needs
+    # the listener thread of a worker holds no lock that a copy needs
     if not (pays and processors() > 1 and hasattr(os, "fork") and (_SERVES or ForkedWorker.is_possible())):
         done = work()
         yield lambda: done
@@ -104,20 +107,20 @@ def run_concurrently(work: Callable[[], T], pays: bool = True) -> Iterator[Calla
 
 
 def fork_map(work: Callable[[int], T], count: int) -> list[T]:
-    """Return work(0) ... work(count - 1): in a process that serves, a forked copy does each but the first."""
+    """Return work(0) ... work(count - 1); in a worker process, forked copies compute all but the first."""
     with ExitStack() as stack:
-        others = [stack.enter_context(run_concurrently(partial(work, k), _SERVES)) for k in range(1, count)]
-        return [work(0), *(answer() for answer in others)]
+        pending = [stack.enter_context(run_concurrently(partial(work, k), _SERVES)) for k in range(1, count)]
+        return [work(0), *(answer() for answer in pending)]
 
 
 class WorkerDied(BrokenExecutor):
-    """The process of a call has ended without an answer."""
+    """Death of the process of a call before its result."""
 
 
 class ForkedWorker:
-    """A forked copy of this process that serves calls, with all that this process has imported.
+    """Forked copy of this process that runs calls, with all modules of this process imported.
 
-    Only a process without other threads can be forked: their locks would never be released.
+    Only a process with one thread can be forked: in the copy, locks of other threads would never be released.
     """
 
     def __init__(self) -> None:
@@ -128,7 +131,7 @@ class ForkedWorker:
         def child() -> None:
             os.close(self_calls)
             os.close(self_answers)
-            # in a fresh context: neither listener nor executor of this process reach it
+            # a new context, without the progress listener and executor of this process
             Context().run(_serve, parent, os.fdopen(calls, "rb"), os.fdopen(answers, "wb"))
 
         self.pid = _fork(child, detached=True)
@@ -145,7 +148,7 @@ class ForkedWorker:
 
     @classmethod
     def several(cls, count: int) -> tuple[ForkedWorker, ...]:
-        """Return `count` copies to share work that this process has begun; none where a library may have threads."""
+        """Return `count` forked copies of this process; none if it, or one of its libraries, may have threads."""
         try:
             threads = len(os.listdir("/proc/self/task"))
         except OSError:
@@ -153,12 +156,12 @@ class ForkedWorker:
         return tuple(cls() for _ in range(count if threads == 1 and cls.is_possible() else 0))
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill the process."""
         if not self._is_over:
             os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        """Wait until it has ended."""
+        """Wait until the process has ended."""
         if not self._is_over:
             self._is_over = True
             os.waitpid(self.pid, 0)
@@ -168,14 +171,16 @@ _Child: TypeAlias = subprocess.Popen[bytes] | ForkedWorker
 
 
 class Processes(Executor):
-    """Up to `count` processes, started as calls come, and ended with the executor or its process.
+    """Executor on up to `count` processes, which start with the first calls and end with the executor.
 
-    Each has one thread for linear algebra, and ignores Ctrl-C: the owner of the executor ends them.
+    Each process uses one thread for linear algebra and does not receive Ctrl-C; the owner of the executor ends them.
 
     Parameters
     ----------
+    count
+        Largest number of processes; by default the number of processors.
     first
-        Processes that exist already, `count` at most.
+        Existing processes to use first, at most `count`.
     """
 
     def __init__(self, count: int | None = None, first: Sequence[ForkedWorker] = ()) -> None:
@@ -204,12 +209,12 @@ class Processes(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when all calls are answered, or at once with `cancel_futures`."""
+        """End the processes when all calls are done, or at once with `cancel_futures`."""
         with self._lock:
             self._closed = True
             children, tenders = tuple(self._children), tuple(self._tenders)
         if cancel_futures:
-            # a worker may take the last call meanwhile
+            # a worker thread may take the last call at the same time
             with suppress(Empty):
                 while True:
                     call = self._calls.get_nowait()
@@ -229,17 +234,17 @@ class Processes(Executor):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # after an error nobody waits for the other calls
+        # after an error nobody needs the other results
         self.shutdown(cancel_futures=kind is not None)
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Return the numbers of the processes that run."""
+        """Numbers of the running processes."""
         with self._lock:
             return tuple(child.pid for child in self._children)
 
     def _tend(self) -> None:
-        """Hand call after call to one process, from the thread that it ends with."""
+        """Pass calls to one process one after another, and end it with this thread."""
         child: _Child | None = None
         while (call := self._calls.get()) is not None:
             future, request = call
@@ -250,7 +255,7 @@ class Processes(Executor):
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
                     self._end(child)
                     child = None
-                    died = WorkerDied("a process that was at work has died; is there memory enough?")
+                    died = WorkerDied("a worker process died during a call; check that there is enough memory")
                     died.__cause__ = error
                     future.set_exception(died)
                 else:
@@ -283,7 +288,7 @@ class Processes(Executor):
             child.kill()
             child.wait()
             for stream in (child.stdin, child.stdout):
-                # what was not written any more
+                # closing flushes data that the dead process cannot read
                 with suppress(OSError):
                     if stream is not None:
                         stream.close()
@@ -299,7 +304,7 @@ def _exchange(child: _Child, request: bytes) -> tuple[bool, Any]:
 
 
 def serve(parent: int) -> None:
-    """Answer calls from standard input on standard output, until the parent process is gone."""
+    """Run calls from standard input and write their results to standard output, until the parent process ends."""
     _serve(parent, sys.stdin.buffer, os.fdopen(os.dup(1), "wb"))
 
 
@@ -317,7 +322,7 @@ def _serve(parent: int, requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
 
 
 def _listen(requests: IO[bytes], calls: SimpleQueue[bytes]) -> None:
-    # in a thread of its own, so that the end of the parent ends a call too
+    # runs in its own thread, so that the end of the parent ends a running call too
     while True:
         try:
             calls.put(pickle.load(requests))

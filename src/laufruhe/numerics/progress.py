@@ -1,4 +1,4 @@
-"""Progress of a search: how far it is, its best value, and its bound."""
+"""Progress of a search: number of finished pieces, best value, and lower bound."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Step:
-    """Report of progress.
+    """One report of the progress of a search.
 
     Attributes
     ----------
     within
-        Searches that this one is part of, the outermost first.
+        Names of the enclosing searches, the outermost first.
     what
-        Name of the counted pieces.
+        Name of the pieces that are counted, such as starts or boxes.
     done, whole
-        Number of pieces; `whole` is zero where the total is not known.
+        Number of finished pieces and of all pieces; `whole` is zero if the total is unknown.
     value, bound
         Best value and lower bound so far, in the unit of the objective; infinite where not known.
     """
@@ -38,8 +38,8 @@ class Step:
     @property
     def gap(self) -> float:
         """Relative gap between value and bound; NaN where either is not known, or the value is zero."""
-        known = math.isfinite(self.value) and math.isfinite(self.bound) and self.value
-        return max(self.value - self.bound, 0.0) / abs(self.value) if known else math.nan
+        is_known = math.isfinite(self.value) and math.isfinite(self.bound) and self.value
+        return max(self.value - self.bound, 0.0) / abs(self.value) if is_known else math.nan
 
 
 Listener: TypeAlias = Callable[[Step], None]
@@ -49,7 +49,7 @@ _within: ContextVar[tuple[str, ...]] = ContextVar("within", default=())
 
 @contextmanager
 def progress_listener(listener: Listener | None) -> Iterator[None]:
-    """Send the progress of searches within to a listener, or to nobody."""
+    """Send progress reports of the work in the block to a listener, or to nobody."""
     before = _listener.set(listener)
     try:
         yield
@@ -59,7 +59,7 @@ def progress_listener(listener: Listener | None) -> Iterator[None]:
 
 @contextmanager
 def search_scope(what: str) -> Iterator[None]:
-    """Name the search that all searches within are part of."""
+    """Name the search that encloses all searches in the block."""
     before = _within.set((*_within.get(), what))
     try:
         yield
@@ -70,14 +70,14 @@ def search_scope(what: str) -> Iterator[None]:
 def report_progress(
     what: str, done: int = 0, whole: int = 0, value: float = math.inf, bound: float = -math.inf
 ) -> None:
-    """Report how far a search is; parameters as in `Step`."""
+    """Send a report to the listener, if there is one; parameters as in `Step`."""
     listener = _listener.get()
     if listener is not None:
         listener(Step(_within.get(), what, done, whole, value, bound))
 
 
 def with_progress(what: str, items: Sequence[T]) -> Iterator[T]:
-    """Yield pieces of work, and report each before it is begun."""
+    """Yield items, and report the number of finished ones before each; `what` is their name."""
     for k, item in enumerate(items):
         report_progress(what, k, len(items))
         yield item

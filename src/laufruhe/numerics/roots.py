@@ -1,4 +1,4 @@
-"""Bisection, without a library that loads longer than a small problem takes."""
+"""Bisection, without a library whose import takes longer than a small problem."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
 
     Parameters
     ----------
+    function
+        Function that never falls.
     below, above
-        Where it is not above zero, and where it is.
+        Arguments with a value of at most zero, and with a value above zero.
     """
     for _ in range(_MOST_HALVINGS):
         middle = 0.5 * (below + above)
@@ -27,7 +29,12 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
 
 
 def bisect_property(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
-    """Bisect to the end of a property that holds from a start on: last place known to hold, first known not to."""
+    """Bisect the interval where a property ends: it holds at `start` and not at `end`.
+
+    Returns
+    -------
+    Last argument where the property holds and first where it does not, after `halvings` halvings.
+    """
     for _ in range(halvings):
         middle = 0.5 * (start + end)
         start, end = (middle, end) if holds(middle) else (start, middle)

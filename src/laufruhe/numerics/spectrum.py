@@ -17,23 +17,23 @@ from laufruhe.numerics.exact_angles import Turn, phasors
 from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, find_kinks, join_kinks
 
 MOST_SIGNAL_KINKS = 24
-"""Of one function that are taken out in closed form."""
+"""Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
 JUMP_OFFSET = 1e-3 * SAME_ANGLE
-"""Angle behind a step at which kinks are read [rad]: far over its rounding, and far under what a signal feels."""
+"""Angle behind a jump at which samples are taken [rad]: above its rounding error, without effect on smooth parts."""
 MOST_WAVES = 9
-"""Coefficients of a signal that is sampled wave by wave."""
+"""Largest number of coefficients of a signal that is sampled by a matrix product in place of a transform."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
-"""Orders are told apart to a thousandth of crank speed."""
+"""Steps in one order: orders that round to the same thousandth of crank speed are equal."""
 
 # The C library hands pages of every array over 128 kB back to the system, and gets them anew for the next, until one
 # of a few MB was given back: samples of a cycle take half the time after that.
 np.empty(1 << 20)
 
 
-def orders_equal(orders: ArrayLike, wanted: ArrayLike) -> NDArray[np.bool_]:
-    """Return a mask of the orders that are among those wanted; the one rule of equal orders."""
-    return np.isin(_thousandths(orders), _thousandths(wanted))
+def orders_equal(orders: ArrayLike, selection: ArrayLike) -> NDArray[np.bool_]:
+    """Return the mask of orders that equal one of `selection`, shape of `orders`; the only rule of equal orders."""
+    return np.isin(_thousandths(orders), _thousandths(selection))
 
 
 def _thousandths(orders: ArrayLike) -> NDArray[np.float64]:
@@ -47,16 +47,16 @@ def as_order(order: float) -> Fraction:
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """f(phi) = Re sum_j c_j e^{i j b phi}, b the lowest order (C8).
+    """Periodic signal f(phi) = Re sum_j c_j e^{i j b phi}, with phi the crank angle [rad] and b the base order (C8).
 
     Attributes
     ----------
     base
-        The lowest order b: 1 for a period of one turn, 1/2 for a four-stroke cycle.
+        Base order b: 1 for a period of one turn, 1/2 for a four-stroke cycle. All orders are multiples of it.
     coefficients
-        Shape (n, ...): c_j of order j b, j = 0 ... n-1, of a signal of any shape.
+        Complex coefficient c_j of order j b, j = 0 ... n - 1, shape (n, ...); trailing axes are those of the signal.
     kinks
-        Of a signal whose derivatives jump: its orders from n on are those of the kinks (L5a).
+        Jumps of value and derivatives; orders from n on are those of the kinks (L5a). None for a smooth signal.
     """
 
     base: Fraction
@@ -70,7 +70,7 @@ class Spectrum:
 
     @cached_property
     def smooth(self) -> Spectrum:
-        """The signal without its kinks."""
+        """Signal less the closed form of its kinks."""
         if self.kinks is None:
             return self
         return Spectrum(
@@ -78,15 +78,23 @@ class Spectrum:
         )
 
     def shift(self, turn: Turn, angle: float) -> Spectrum:
-        """Return the signal shifted later by an angle [rad], also given as a share of its period."""
-        turns = phasors([-turn], np.arange(len(self.coefficients)))
-        moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
+        """Return the signal delayed by a crank angle.
+
+        Parameters
+        ----------
+        turn
+            Delay as a fraction of the period.
+        angle
+            The same delay [rad].
+        """
+        phases = phasors([-turn], np.arange(len(self.coefficients)))
+        coefficients = self.coefficients * phases.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         kinks = None if self.kinks is None else self.kinks.shift(angle).folded(self.period, 1)
-        return Spectrum(self.base, moved, kinks)
+        return Spectrum(self.base, coefficients, kinks)
 
     @property
     def series(self) -> Spectrum:
-        """The signal without closed-form kinks: averages of it are exact, samples near a kink are not."""
+        """Signal of the listed orders alone, without kinks: its averages are exact, its samples near a kink are not."""
         return self if self.kinks is None else Spectrum(self.base, self.coefficients)
 
     @property
@@ -95,103 +103,102 @@ class Spectrum:
         return np.zeros(0) if self.kinks is None else self.kinks.peak_angles
 
     def with_coefficients(self, coefficients: NDArray[np.complex128]) -> Spectrum:
-        """Return the signal with other coefficients."""
+        """Return the signal with other coefficients, shape (n, ...), and the same kinks."""
         return Spectrum(self.base, coefficients, self.kinks)
 
     def mapped(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
-        """Return the signal through a real linear map of values, a function of arrays (n, ...)."""
+        """Return the signal after a real linear map of its values, a function of arrays (n, ...)."""
         kinks = None if self.kinks is None else self.kinks.mapped(linear)
         return Spectrum(self.base, linear(self.coefficients), kinks)
 
     def averaged(self, step: float) -> Spectrum:
-        """Average under a triangle of half-width `step` [rad]: sinc^2 times each order (P7)."""
+        """Return the signal averaged under a triangle of half-width `step` [rad]: sinc^2 times each order (P7)."""
         share = np.sinc(self.orders * step / math.tau) ** 2
         return Spectrum(self.base, self.coefficients * share.reshape(-1, *(1,) * (self.coefficients.ndim - 1)))
 
     @property
     def orders(self) -> NDArray[np.float64]:
-        """Orders of the coefficients, multiples of crank speed."""
+        """Orders of the coefficients as multiples of crank speed, shape (n,)."""
         return np.asarray(np.arange(len(self.coefficients)) * float(self.base))
 
     def at(self, order: float) -> NDArray[np.complex128]:
-        """Return the coefficient of one order; zero if the signal has none."""
-        found = np.flatnonzero(orders_equal(self.orders, order))
-        return np.asarray(self.coefficients[found].sum(axis=0))
+        """Return the coefficient of one order, shape (...); zero if the signal does not have this order."""
+        indices = np.flatnonzero(orders_equal(self.orders, order))
+        return np.asarray(self.coefficients[indices].sum(axis=0))
 
     def with_orders(self, orders: ArrayLike) -> Spectrum:
-        """Return the signal with every other order at zero."""
+        """Return the part of the signal with these orders; coefficients of all others are zero."""
         counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         return Spectrum(self.base, np.where(counted, self.coefficients, 0.0))
 
     @property
     def without_mean(self) -> Spectrum:
-        """The signal less its mean over the period (M7); kinks have no mean."""
+        """Signal less its mean over the period (M7); kinks have no mean."""
         return self.with_coefficients(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
 
-    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
         """Return values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
 
-        Orders above half the number of samples are folded, not dropped: every
-        value is that of the whole series at its angle.
+        Orders above half the number of samples are folded, so every value is that of the complete series.
 
         Parameters
         ----------
-        behind
-            Angle behind a step at which kinks are read [rad]. Parts of a sum have to agree on the side of a jump,
-            which rounding decides otherwise: `JUMP_OFFSET` is enough.
+        offset
+            Angle by which kinks are evaluated later than each step [rad]. With `JUMP_OFFSET` all terms of a sum take
+            the same side of a jump that lies on a step; with zero, rounding decides.
         """
         if self.kinks is not None:
-            angles = self.period * np.arange(samples) / samples + behind
+            angles = self.period * np.arange(samples) / samples + offset
             return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
         if len(self.coefficients) <= MOST_WAVES:
             # a product with few waves takes less time than a transform
             flat = self.coefficients.reshape(len(self.coefficients), -1)
-            found = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
-            return np.asarray(found.reshape(samples, *self.coefficients.shape[1:]))
+            values = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
+            return np.asarray(values.reshape(samples, *self.coefficients.shape[1:]))
         if len(self.coefficients) <= samples // 2 + 1:
             # no order is over half the number of samples, so none is folded
             half = np.asarray(0.5 * self.coefficients, dtype=complex)
-            # what is its own mirror image counts once
+            # orders that are their own mirror image count once
             half[:: max(samples // 2, 1) if samples % 2 == 0 else samples] *= 2.0
             return _transformed(half, samples)
         folded = np.zeros((samples, *self.coefficients.shape[1:]), dtype=complex)
         for start in range(0, len(self.coefficients), samples):
             block = self.coefficients[start : start + samples]
             folded[: len(block)] += block
-        # of a real signal half of the folded orders say all
+        # half of the folded orders determine a real signal
         first = samples // 2 + 1
         half = folded[:first] + folded[-np.arange(first) % samples].conj()
         return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return values at any crank angles [rad], shape (len(angles), ...)."""
+        """Return the signal at crank angles [rad], shape (len(angles), ...)."""
         smooth = self.smooth.coefficients
-        used = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
-        waves = np.exp(1j * np.outer(angles, self.orders[used]))
-        found = np.asarray(np.tensordot(waves, smooth[used], axes=(1, 0)).real)
-        return found if self.kinks is None else found + self.kinks.values(angles, self.period)
+        nonzero = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
+        waves = np.exp(1j * np.outer(angles, self.orders[nonzero]))
+        values = np.asarray(np.tensordot(waves, smooth[nonzero], axes=(1, 0)).real)
+        return values if self.kinks is None else values + self.kinks.values(angles, self.period)
 
     @property
     def integral(self) -> Spectrum:
-        """Integral over the crank angle of the alternating part, without a mean."""
-        whole = np.zeros_like(self.coefficients)
-        whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
-        return Spectrum(self.base, whole, None if self.kinks is None else self.kinks.shift(0.0, 1))
+        """Integral of the alternating part over the crank angle, with mean zero."""
+        integrated = np.zeros_like(self.coefficients)
+        integrated[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
+        return Spectrum(self.base, integrated, None if self.kinks is None else self.kinks.shift(0.0, 1))
 
     @property
     def derivative(self) -> Spectrum:
-        """Derivative by the angle; where the signal jumps, that of its orders alone."""
+        """Derivative by the crank angle; for a signal with jumps of value, that of the listed orders alone."""
         steep = (self.coefficients.T * (1j * self.orders)).T
         if self.kinks is None or self.kinks.jumps[:, 0].any():
             return Spectrum(self.base, steep)
         return Spectrum(self.base, steep, self.kinks.derivative)
 
     def padded(self, count: int) -> Spectrum:
-        """Return the signal with at least `count` coefficients."""
+        """Return the signal with at least `count` coefficients; further ones are those of its kinks, or zero."""
         return self + Spectrum(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
 
     def with_finer_base(self, base: Fraction) -> Spectrum:
-        """Return the same signal counted in a finer lowest order."""
+        """Return the same signal with a smaller base order, of which the present one is a multiple."""
         factor = self.base / base
         if factor.denominator != 1:
             raise ValueError(f"{base} does not divide {self.base}")
@@ -206,18 +213,18 @@ class Spectrum:
     @cached_property
     def step(self) -> int:
         """Greatest common divisor of the indices of nonzero coefficients; zero for a constant."""
-        used = np.logical_or.reduce(self.coefficients.reshape(len(self.coefficients), -1), axis=1)
-        return gcd(*used.nonzero()[0].tolist())
+        nonzero = np.logical_or.reduce(self.coefficients.reshape(len(self.coefficients), -1), axis=1)
+        return gcd(*nonzero.nonzero()[0].tolist())
 
     def repeat_order(self, also: tuple[Fraction, ...] = ()) -> Fraction:
-        """Return the lowest order of the shortest period that also holds some further orders."""
+        """Return the base order of the shortest period of the signal and of further orders `also`."""
         orders, step = [order for order in also if order > 0], self.step
         if step:
             orders.append(self.base * step)
         return common_base(orders or [Fraction(1)])
 
     def with_base(self, base: Fraction) -> Spectrum:
-        """Return the signal over another period of it, with lowest order `base`."""
+        """Return the same signal with another base order, whose period must be a period of the signal."""
         if base is self.base or base == self.base:
             return self
         fine, step = self, multiple_of_base(base, self.base)
@@ -227,7 +234,7 @@ class Spectrum:
         return Spectrum(base, fine.coefficients[::step], kinks)
 
     def truncated(self, highest: float) -> Spectrum:
-        """Return the signal without orders above `highest`; it keeps its kinks only with all orders."""
+        """Return the signal without orders above `highest`; without its kinks too if any order is dropped."""
         count = int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))
         return self if count == len(self.coefficients) else Spectrum(self.base, self.coefficients[:count])
 
@@ -240,20 +247,20 @@ class Spectrum:
             a, b = b, a
         total = a.coefficients.astype(complex)
         if b.kinks is not None and len(a.coefficients) > len(b.coefficients):
-            # kinks have orders beyond those that are listed
-            further = b.kinks.coefficients(len(total), float(b.base))
-            total[len(b.coefficients) :] += further[len(b.coefficients) :]
+            # kinks have orders beyond the listed ones
+            beyond = b.kinks.coefficients(len(total), float(b.base))
+            total[len(b.coefficients) :] += beyond[len(b.coefficients) :]
         total[: len(b.coefficients)] += b.coefficients
         return Spectrum(a.base, total, join_kinks([a.kinks, b.kinks]))
 
 
 class Mapped(Spectrum):
-    """Signal through a real linear map to more components: samples of the source are mapped.
+    """Signal as a real linear map of a source with fewer components; the map is applied when values are needed.
 
     Attributes
     ----------
     source, linear
-        The signal, and the map as a function of arrays (n, ...).
+        Source signal, and the map as a function of arrays (n, ...).
     """
 
     source: Spectrum
@@ -278,26 +285,26 @@ class Mapped(Spectrum):
 
     @property
     def step(self) -> int:
-        """Step of the source."""
+        """Greatest common divisor of the indices of nonzero coefficients of the source."""
         return self.source.step
 
     @property
     def series(self) -> Spectrum:
-        """The signal without closed-form kinks."""
+        """Signal of the listed orders alone, without kinks."""
         return Mapped(self.source.series, self.linear)
 
     @property
     def without_mean(self) -> Spectrum:
-        """The signal less its mean over the period."""
+        """Signal less its mean over the period."""
         return Mapped(self.source.without_mean, self.linear)
 
     def with_base(self, base: Fraction) -> Spectrum:
-        """Return the signal over another period."""
+        """Return the same signal with another base order."""
         return Mapped(self.source.with_base(base), self.linear)
 
-    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
         """Return samples of the source, mapped."""
-        return self.linear(self.source.sample(samples, behind))
+        return self.linear(self.source.sample(samples, offset))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Spectrum, (self.base, self.coefficients, self.kinks)
@@ -305,17 +312,17 @@ class Mapped(Spectrum):
 
 @lru_cache(maxsize=32)
 def _waves(count: int, samples: int) -> NDArray[np.float64]:
-    turns = np.outer(np.arange(samples), np.arange(count)) % samples
-    waves = np.exp(2j * math.pi * np.arange(samples) / samples)[turns]
+    steps = np.outer(np.arange(samples), np.arange(count)) % samples
+    waves = np.exp(2j * math.pi * np.arange(samples) / samples)[steps]
     return np.concatenate([waves.real, -waves.imag], axis=1)
 
 
 def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:
-    out = np.empty((samples, *half.shape[1:]))
+    values = np.empty((samples, *half.shape[1:]))
     if half.ndim > 1:
-        out = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
-    np.fft.irfft(half, samples, axis=0, norm="forward", out=out)
-    return out
+        values = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
+    np.fft.irfft(half, samples, axis=0, norm="forward", out=values)
+    return values
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
@@ -323,27 +330,27 @@ def _common(a: Fraction, b: Fraction) -> Fraction:
 
 
 def multiple_of_base(order: Fraction, base: Fraction) -> int:
-    """Return an order as a multiple of a lowest order; zero if it is no whole multiple."""
-    whole, rest = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
-    return 0 if rest else whole
+    """Return the whole number order / base; zero if the quotient is not whole."""
+    multiple, remainder = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
+    return 0 if remainder else multiple
 
 
 def common_base(orders: Sequence[Fraction]) -> Fraction:
-    """Return the largest lowest order that all these are multiples of."""
+    """Return the largest base order of which all these orders are multiples."""
     return reduce(_common, orders)
 
 
 def stacked_coefficients(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
-    """Return a common lowest order of spectra and `bases`, and all coefficients, shape (spectra, n, ...)."""
+    """Return the common base order of spectra and `bases`, and all coefficients in it, shape (spectra, n, ...)."""
     base = common_base([*bases, *(spectrum.base for spectrum in spectra)])
     series = [spectrum.with_finer_base(base).coefficients for spectrum in spectra]
-    whole = max(map(len, series))
+    count = max(map(len, series))
     sides = ((0, 0),) * (series[0].ndim - 1)
-    return base, np.array([np.pad(part, ((0, whole - len(part)), *sides)) for part in series])
+    return base, np.array([np.pad(part, ((0, count - len(part)), *sides)) for part in series])
 
 
 def base_of(orders: Sequence[float]) -> Fraction:
-    """Return the largest lowest order of the positive orders; one without any."""
+    """Return the largest base order of the positive orders; 1 if there are none."""
     return common_base([as_order(order) for order in orders if order > 0.0] or [Fraction(1)])
 
 
@@ -366,11 +373,15 @@ def spectrum_with_kinks(
     Parameters
     ----------
     signal
-        From angles (n,) [rad] to values (n, ...).
+        Function of angles (n,) [rad] that returns values (n, ...).
     samples
-        Steps over the period.
+        Number of samples over the period.
+    base
+        Base order, 2 pi over the period.
     breaks
-        Angles where a derivative may jump, shape (k,) [rad]; the strongest kinks are taken out.
+        Angles where a derivative may jump, shape (k,) [rad].
+    maximum
+        Largest number of kinks in closed form: the strongest ones.
     """
     period = math.tau / float(base)
     angles = period * np.arange(samples) / samples
@@ -379,11 +390,11 @@ def spectrum_with_kinks(
         kinks = kinks.strongest(maximum)
     if kinks is None:
         return spectrum_of(signal(angles), base)
-    # a step on a jump is taken behind it
-    behind = angles + SAME_ANGLE
-    rest = spectrum_of(signal(behind) - kinks.values(behind, period), base)
-    turned = np.exp(-1j * SAME_ANGLE * rest.orders).reshape(-1, *(1,) * (rest.coefficients.ndim - 1))
-    smooth = rest.coefficients * turned
+    # samples on a jump are taken on its later side
+    later = angles + SAME_ANGLE
+    remainder = spectrum_of(signal(later) - kinks.values(later, period), base)
+    delay = np.exp(-1j * SAME_ANGLE * remainder.orders).reshape(-1, *(1,) * (remainder.coefficients.ndim - 1))
+    smooth = remainder.coefficients * delay
     return Spectrum(base, smooth + kinks.coefficients(len(smooth), float(base)), kinks)
 
 
@@ -400,7 +411,7 @@ def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
     Shape (...): the semi-major axis.
     """
     total = np.sum(np.abs(coefficient) ** 2, axis=-1)
-    # a load on a resonance that nothing damps is infinite, and so is its amplitude
+    # an undamped resonance has infinite coefficients and an infinite amplitude
     finite = np.where(np.isfinite(total)[..., None], coefficient, 0.0)
     alternating = np.abs(np.sum(finite**2, axis=-1))
     return np.asarray(np.sqrt(0.5 * (total + alternating)))

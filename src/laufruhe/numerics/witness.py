@@ -1,8 +1,8 @@
-"""Known designs as witnesses of bounds: a lower bound above the value of a design that exists is an error.
+"""Check of lower bounds by witnesses: a bound above the value of a known design is an error.
 
-Bounds are raw: nobody lowers one to a value. Each is compared with what is known, and what contradicts is reported
-to the solve that asked, which then withholds its proof. Where nobody collects reports, and wherever the environment
-has LAUFRUHE_STRICT, the error is raised.
+Bounds are never lowered to the value of a design. Each is compared with known values, and a contradiction is reported
+to the current solve, which then gives no certificate. Without a collector of reports, or with LAUFRUHE_STRICT in the
+environment, the error is raised.
 """
 
 from __future__ import annotations
@@ -15,39 +15,49 @@ from contextvars import ContextVar
 from laufruhe.errors import BoundError
 
 EXCESS = 1e-9
-"""Relative excess of a bound over a value that is a rounding."""
+"""Relative excess of a bound over a value that counts as rounding error."""
 STRICT = "LAUFRUHE_STRICT"
-"""Environment variable; where it is set, a contradiction is raised."""
+"""Environment variable; if it is set, a contradiction is raised at once."""
 
 _reports: ContextVar[list[BoundError] | None] = ContextVar("reports", default=None)
 
 
-def is_over(bound: float, value: float, nothing: float = 0.0) -> bool:
-    """Return whether a bound lies over a value, or is no number.
+def is_over(bound: float, value: float, zero_level: float = 0.0) -> bool:
+    """Return True if a lower bound exceeds the value of a known design, or is NaN.
 
     Parameters
     ----------
-    nothing
-        Difference that counts as zero.
+    zero_level
+        Absolute difference that counts as zero, in the unit of the bound.
     """
-    return not bound <= value + EXCESS * abs(value) + nothing
+    return not bound <= value + EXCESS * abs(value) + zero_level
 
 
-def check_bound(what: str, bound: float, value: float, nothing: float = 0.0) -> bool:
-    """Return whether a bound agrees with the value of a design that it is of; report it where it does not."""
-    if not is_over(bound, value, nothing):
+def check_bound(what: str, bound: float, value: float, zero_level: float = 0.0) -> bool:
+    """Return True if a lower bound does not exceed the value of a known design; else report the contradiction.
+
+    Parameters
+    ----------
+    what
+        Name of the proof.
+    bound, value
+        Lower bound, and value of the design, in the same unit.
+    zero_level
+        Absolute difference that counts as zero, in that unit.
+    """
+    if not is_over(bound, value, zero_level):
         return True
     report(BoundError(what, bound, value))
     return False
 
 
 def report(error: BoundError) -> None:
-    """Tell the solve that asked of a contradiction.
+    """Report a contradiction to the collector of the current solve.
 
     Raises
     ------
     BoundError
-        Where nobody collects reports, or the environment is strict.
+        Without a collector, or with LAUFRUHE_STRICT in the environment.
     """
     reports = _reports.get()
     if reports is None or os.environ.get(STRICT):
@@ -57,7 +67,7 @@ def report(error: BoundError) -> None:
 
 @contextmanager
 def collected() -> Iterator[list[BoundError]]:
-    """Collect the contradictions that are reported within."""
+    """Yield a list that collects the contradictions reported in the block."""
     reports: list[BoundError] = []
     before = _reports.set(reports)
     try:

@@ -1,10 +1,10 @@
-"""Executors of pieces of work: processes of this machine, a cluster, or any other executor.
+"""Concurrent maps over pieces of work, on processes of this machine, a cluster, or any other executor.
 
-All concurrent work goes through here: points of studies, problems of a trade, boxes, stars, starts. The executor
-changes how long a search takes, never what it finds.
+All concurrent work uses this module: points of studies, problems of a trade, boxes, stars, starts. The executor changes
+the time of a search, never its result.
 
-`Speculation` works out the likely next steps of a search ahead. One process still decides which step follows, and
-takes the answer that others may have made already, so answers, their order and proofs are the same to the last bit.
+`Speculation` computes likely next steps of a search ahead of time. The main process alone decides which step follows
+and takes a result that is ready, so results, their order and proofs are the same to the last bit.
 """
 
 from __future__ import annotations
@@ -31,23 +31,23 @@ T = TypeVar("T")
 A = TypeVar("A")
 
 AHEAD = 3
-"""Pieces that are submitted at once for each worker, so that none waits for the next one."""
+"""Number of pieces submitted in advance for each worker, so that no worker waits."""
 LOSSES = 3
-"""Times that one piece may be lost with its worker before the piece is to blame."""
+"""Number of times that one piece may be lost with its worker before the search fails."""
 WORTH_PROCESSES = 4.0
-"""Processor seconds of work that pay for starting processes."""
+"""Work for which starting processes pays [s of processor time]."""
 LONGEST_WAIT = 1e9
 
 _current: ContextVar[Executor | None] = ContextVar("current", default=None)
 
 
 class SerialExecutor(Executor):
-    """Executor without workers: `submit` returns when the call is done."""
+    """Executor in this thread: `submit` runs the call before it returns."""
 
     count = 1
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Do the call."""
+        """Run the call, and return its future."""
         future: Future[T] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -60,16 +60,16 @@ SERIAL = SerialExecutor()
 
 
 class TimeIsOver(SolverError):
-    """The time limit was reached before all pieces were done."""
+    """End of the time limit before all pieces were done."""
 
 
 class WorkersGone(SolverError):
-    """Loss of all workers, or of every worker that had one piece."""
+    """Loss of all workers, or of each worker that worked on a certain piece."""
 
 
 @contextmanager
 def working_on(executor: Executor | None) -> Iterator[None]:
-    """Hand the pieces of all work within to an executor; with None each search starts processes as it needs."""
+    """Use an executor for all concurrent work in the block; with None each search starts its own processes."""
     before = _current.set(executor)
     try:
         yield
@@ -78,7 +78,7 @@ def working_on(executor: Executor | None) -> Iterator[None]:
 
 
 def current_executor() -> Executor | None:
-    """Return the executor of `working_on`, or None."""
+    """Return the executor of the enclosing `working_on`, or None."""
     return _current.get()
 
 
@@ -94,29 +94,29 @@ def executor_for(maximum: int | None = None) -> Iterator[Executor]:
 
 
 def _import(*_: Callable[..., object], libraries: Sequence[str] = ()) -> None:
-    # unpickling the works has imported their modules already
+    # unpickling the arguments has imported their modules
     for name in libraries:
         import_module(name)
 
 
 @contextmanager
 def worker_pool(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Iterator[None]:
-    """Start processes at once for searches that follow one another, and end them with the last one.
+    """Start processes for all searches in the block, and end them after it.
 
-    Nothing is started where an executor is current, or there is one processor.
+    No process is started if there is a current executor, or only one processor.
 
     Parameters
     ----------
     works
-        Functions that the processes will be asked for.
+        Functions that the processes will run; their modules are imported at once.
     libraries
-        Names of what these import late.
+        Names of modules that these functions import late.
     """
     workers = processors()
     if _current.get() is not None or workers == 1:
         yield
         return
-    # a copy has imported all that the search needs, and begins at once
+    # a forked copy has imported all modules of this process
     pool = Processes(workers, ForkedWorker.several(workers))
     try:
         for _ in range(workers):
@@ -128,34 +128,40 @@ def worker_pool(*works: Callable[..., object], libraries: Sequence[str] = ()) ->
 
 
 def worker_count(executor: Executor | None = None) -> int:
-    """Return how many pieces an executor does side by side: the given one, the current one, or processes."""
+    """Return the number of workers of an executor, by default of the current one, else the number of processors."""
     executor = _current.get() if executor is None else executor
     if executor is None:
         return processors()
-    known = getattr(executor, "count", None) or getattr(executor, "_max_workers", None)
-    return known if isinstance(known, int) else processors()
+    workers = getattr(executor, "count", None) or getattr(executor, "_max_workers", None)
+    return workers if isinstance(workers, int) else processors()
 
 
 def unordered_map(
     work: Callable[[T], A], pieces: Iterable[T], executor: Executor, patient: bool = False
 ) -> Generator[tuple[int, A], None, None]:
-    """Yield (number, answer) of every piece as it comes; raise the error of the first piece that fails.
+    """Yield (index, result) of each piece in the order of completion; raise the error of the first that fails.
 
-    Pieces are taken as workers become free. A piece that is lost with its worker is submitted again.
+    A piece that is lost with its worker is submitted again.
 
     Parameters
     ----------
+    work
+        Function of one piece, picklable.
+    pieces
+        Arguments, taken as workers become free.
+    executor
+        Executor that runs the calls.
     patient
-        At the time limit (`laufruhe.numerics.budget`) wait for pieces that were begun, and drop the others.
+        True to wait at the time limit (`laufruhe.numerics.budget`) for running pieces and to drop the others.
 
     Raises
     ------
     TimeIsOver
         At the time limit, unless patient.
     WorkersGone
-        If a piece is lost again and again, or no worker is left.
+        If one piece is lost `LOSSES` times, or no worker is left.
     """
-    rest = enumerate(until_time_limit(pieces) if patient else pieces)
+    remaining = enumerate(until_time_limit(pieces) if patient else pieces)
     pending: dict[Future[Answer[A]], tuple[int, T, int]] = {}
 
     def submit(number: int, piece: T, losses: int = 0) -> None:
@@ -167,8 +173,8 @@ def unordered_map(
 
     try:
         while True:
-            while len(pending) < AHEAD * worker_count(executor) and (following := next(rest, None)) is not None:
-                submit(*following)
+            while len(pending) < AHEAD * worker_count(executor) and (next_piece := next(remaining, None)) is not None:
+                submit(*next_piece)
             if not pending:
                 return
             seconds = LONGEST_WAIT if patient and is_time_over() else min(max(seconds_left(), 0.0), LONGEST_WAIT)
@@ -192,47 +198,51 @@ def unordered_map(
 
 
 def ordered_map(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
-    """Return the answers in the order of the pieces, as many as time allows.
+    """Return the results of work(piece) in the order of the pieces, up to the time limit.
 
-    The time of the first pieces decides whether processes are started.
+    The first pieces run here; their time decides whether processes are started for the others.
 
     Parameters
     ----------
+    work
+        Function of one piece, picklable.
+    pieces
+        Arguments.
     what
-        Name of the pieces in reports of progress.
+        Name of the pieces in progress reports.
     """
     began, answers = time.process_time(), list[A]()
     for piece in until_time_limit(pieces):
-        rest = len(pieces) - len(answers)
-        pays = (time.process_time() - began) * rest > WORTH_PROCESSES * len(answers)
+        remaining = len(pieces) - len(answers)
+        pays = (time.process_time() - began) * remaining > WORTH_PROCESSES * len(answers)
         if answers and pays and worker_count() > 1 and seconds_left() > WORTH_PROCESSES:
             break
         report_progress(what, len(answers), len(pieces))
         answers.append(work(piece))
     if answers and len(answers) < len(pieces) and not is_time_over():
         later: dict[int, A] = {}
-        others = pieces[len(answers) :]
+        remaining_pieces = pieces[len(answers) :]
         with (
-            executor_for(min(len(others), worker_count())) as executor,
-            closing(unordered_map(work, others, executor, patient=True)) as results,
+            executor_for(min(len(remaining_pieces), worker_count())) as executor,
+            closing(unordered_map(work, remaining_pieces, executor, patient=True)) as results,
         ):
             for number, answer in results:
                 later[number] = answer
                 report_progress(what, len(answers) + len(later), len(pieces))
-        # at the time limit, those before the first piece without an answer
+        # at the time limit, the results before the first missing one
         answers += [later[number] for number in takewhile(later.__contains__, count())]
     return answers
 
 
 class Answer(NamedTuple, Generic[A]):
-    """An answer with the contradictions that its worker met, which no other channel brings out of its process."""
+    """Result of a piece with the contradictions of bounds that its worker process has collected."""
 
     answer: A
     reports: tuple[BoundError, ...]
 
 
 def _answer_of(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
-    # runs in the worker, which starts no workers itself
+    # runs in the worker, which starts no workers of its own
     with limit_time(until - time.time()), working_on(SERIAL), collected() as reports:
         answer = work(piece)
     return Answer(answer, tuple(reports))
@@ -245,12 +255,15 @@ def _reported(answer: Answer[A]) -> A:
 
 
 def _workers_gone(executor: Executor, error: BaseException) -> WorkersGone:
-    text = getattr(executor, "gone", "a worker was killed again and again")
+    text = getattr(executor, "gone", "workers died repeatedly")
     return WorkersGone(f"{text} ({error})" if str(error) else str(text))
 
 
 class Speculation(Generic[T, A]):
-    """Answers to one kind of step, some made ahead; processes start once the search has taken `worth` seconds."""
+    """Results of one kind of step of a search, some computed ahead of time.
+
+    Processes start once the search has taken `worth` seconds.
+    """
 
     def __init__(self, work: Callable[[T], A], worth: float) -> None:
         self._work, self._worth = work, worth
@@ -262,12 +275,12 @@ class Speculation(Generic[T, A]):
         self.hits = 0
 
     def prefetch(self, steps: Iterable[tuple[Hashable, T]]) -> None:
-        """Begin steps that may follow, the likeliest first, as many as workers are free."""
+        """Submit likely next steps (key, step), the likeliest first, up to the number of free workers."""
         executor = self._executor or self._workers()
         if executor is None:
             return
         new = ((key, step) for key, step in steps if key not in self._pending)
-        # without workers, and for steps that cannot be pickled, `result` does the work
+        # without workers, and for steps that cannot be pickled, `result` computes the step
         with suppress(RuntimeError, OSError):
             begun: list[Future[Any]] = [*self._starting, *self._pending.values()]
             free = worker_count(executor) - sum(not future.done() for future in begun)
@@ -281,32 +294,32 @@ class Speculation(Generic[T, A]):
             return None
         if current is None:
             current = self._processes = Processes()
-            # no step waits for a process that still starts
+            # count starting processes as busy, so that no step waits for one
             self._starting = [current.submit(_import, self._work) for _ in range(worker_count(current))]
         self._executor = current
         return current
 
     def result(self, key: Hashable, step: T) -> A:
-        """Return the answer to a step, made ahead or now."""
+        """Return the result of a step: the prefetched one of this key, else computed now."""
         future = self._pending.pop(key, None)
         if future is None:
             return self._work(step)
         try:
             answer = future.result()
         except Exception:
-            # a step that was lost with its worker; an error of the step itself comes again here
+            # the worker was lost, or the step fails again here with its own error
             return self._work(step)
         self.hits += 1
         return _reported(answer)
 
     def discard(self) -> None:
-        """Drop the steps that were begun and are not needed any more."""
+        """Cancel all prefetched steps."""
         for future in self._pending.values():
             future.cancel()
         self._pending.clear()
 
     def end(self) -> None:
-        """Drop all steps, and end the processes that were started for them."""
+        """Cancel all prefetched steps, and end the processes started for them."""
         self.discard()
         if self._processes is not None:
             self._processes.shutdown(cancel_futures=True)
@@ -314,15 +327,17 @@ class Speculation(Generic[T, A]):
 
 @contextmanager
 def speculation(work: Callable[[T], A], worth: float = WORTH_PROCESSES) -> Iterator[Speculation[T, A]]:
-    """Yield the speculation of one search; its processes end with it.
+    """Yield a `Speculation` for one search; its processes end with the block.
 
     Parameters
     ----------
+    work
+        Function of one step, picklable.
     worth
-        Seconds that a search has taken when processes are started for it.
+        Time of the search after which processes are started [s].
     """
-    ahead = Speculation(work, worth)
+    prefetched = Speculation(work, worth)
     try:
-        yield ahead
+        yield prefetched
     finally:
-        ahead.end()
+        prefetched.end()

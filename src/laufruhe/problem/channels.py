@@ -1,7 +1,7 @@
-"""Channels: quantities of a design that measures are taken of (M1-M5, E6-E15).
+"""Channels: quantities of a design, such as mount force, that measures evaluate (M1-M5, E6-E15).
 
-A channel of a load is a function from the loads at an operating point to a signal, one of a block on its mounts a
-function to numbers. Each channel has the keys that narrow it and the sides that may be limited.
+The channel of a load returns a signal from the loads at an operating point. Other channels return numbers of the
+design. Each channel lists the keys that may narrow it in a file, and the sides that a limit may have.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
-"""Inverse of the sizes that bear a load, shape (places,) or (places, d)."""
+"""Function that returns the factor of each place on its load, shape (places,) or (places, d), such as 1 / area."""
 FlywheelFunction: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
@@ -43,11 +43,19 @@ OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
 def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
-    """Return the function of a load inside the crankcase, which depends on the moving parts alone."""
+    """Return a function from loads to a signal inside the crankcase, which depends on the moving parts only.
+
+    Parameters
+    ----------
+    name
+        Name of the load in the error without moving parts.
+    signal
+        Function of the engine with these moving parts and of the loads.
+    """
 
     def inside_load(loads: PointLoads) -> Spectrum:
         if loads.moving is None:
-            raise ValueError(f"of a wrench alone there is no {name}")
+            raise ValueError(f"{name} needs the moving parts, and only the wrench is known")
         return signal(loads.moving, loads)
 
     return inside_load
@@ -60,9 +68,9 @@ class Need:
     Attributes
     ----------
     of
-        Function that returns this part of an engine, false if it is missing.
+        Function that returns this part of an engine, or a false value if it is missing.
     what, remedy
-        Texts of the complaint about a file without it.
+        Name of the part and remedy, for the complaint about a file without it.
     """
 
     of: Callable[[Engine], object]
@@ -101,43 +109,47 @@ def channel_named(name: str) -> Channel:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """Quantity of a design.
+    """Quantity of a design. Optional attributes are None, empty or False unless they apply.
 
     Attributes
     ----------
     name, unit
         Name in files and reports; SI unit.
     keys
-        Keys that narrow it in a file.
+        Keys that may narrow it in a file.
     needs
         Part that the engine must have.
     sides
-        Sides that a limit may have.
+        Sides that a limit may have: "min", "max", "outside".
     minimised
         True if it may be an objective.
     depends_on_loads
-        True unless a number is known not to depend on the excitation of the block.
+        False if it certainly does not depend on the loads that excite the block.
     flywheel_value
-        Function of measure and design that returns the value as a function of the flywheel, for channels of it.
+        For channels of the flywheel: function of measure and design that returns their value as a function of the
+        flywheel.
     depends_on_torque
-        True if it contains the torque of the crank, which depends on other decisions than the flywheel too.
+        True if it depends on the crank torque, and so on other decisions than the flywheel.
     size_value
-        Value as a function of an engine, for channels of its sizes alone, monotone in each size.
+        For channels of sizes alone: their value as a function of the engine, monotone in each size.
     case_vectors
-        Function of a block in static balance, shape (mounts, 3), whose largest length is a channel of load cases.
+        For channels of load cases: function of the static balance of a case that returns vectors, shape (mounts, 3);
+        the value is their largest length.
     simulation
-        Module that simulates it if there is no expression: `peaks` for searches of mounts, `boxes` for bounds.
-    missed
-        Relative error of peaks between the steps of a simulation, as a function of the engine.
+        Package that simulates a channel without a closed form: `peaks` for searches of mounts, `boxes` for bounds.
+    peak_error
+        Relative error of the peaks between the time steps of a simulation, as a function of the engine.
     axis_residual
-        Residual of turning about the torque-roll axis as a mode, for channels of it.
+        For channels of the torque-roll axis: function of block and frequency band that returns the residual of a
+        rotation about the axis as a natural mode.
     places
-        Function that returns the names of its places, by which a file may narrow it; empty for the block.
+        Function of the engine that returns the names of its places; empty for loads on the block.
     title, place
-        Titles of the table and its column of places that every report shows for a load at even speed; empty if it is
-        shown on request only.
+        Title and place column of the table in every report for a load at even speed; empty if it is shown on request
+        only.
     span
-        Function that returns the smallest and largest values while shafts move between their places in two engines.
+        For distances of shafts: function of measure and two engines that returns (smallest, largest) values while the
+        shafts move between their places in the two engines.
     """
 
     name: str
@@ -153,7 +165,7 @@ class Channel:
     case_vectors: Callable[[Any], Any] | None = None
     axis_residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual] | None = None
     simulation: str = ""
-    missed: Callable[[Engine], float] = lambda _: 0.0
+    peak_error: Callable[[Engine], float] = lambda _: 0.0
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     title: str = ""
     place: str = ""
@@ -168,7 +180,7 @@ class Channel:
         _KNOWN[self.name] = self
 
     def __reduce__(self) -> tuple[Callable[[str], Channel], tuple[str]]:
-        # a channel is one and the same in every process
+        # unpickling returns the one object of this channel in the process
         return channel_named, (self.name,)
 
     def __str__(self) -> str:
@@ -181,40 +193,41 @@ class Channel:
 
     @property
     def is_flywheel(self) -> bool:
-        """True if it is monotone in every number of the flywheel."""
+        """True for a channel of the flywheel, which is monotone in each of its numbers."""
         return self.flywheel_value is not None
 
     @property
     def is_monotone_in_inertia(self) -> bool:
-        """True if it is monotone in the inertia of all that turns."""
+        """True if it is monotone in the inertia of all parts that turn with the crank."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
     def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
-        """Raise `ModelError` if a size that it needs is missing."""
+        """Raise `ModelError` if the engine lacks a size that the channel needs."""
         if self.size_value is not None:
             self.size_value(engine)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadChannel(Channel):
-    """Signal over the cycle, linear in the loads; measures are norms of it.
+    """Load as a signal over the cycle, linear in the loads; measures are norms of the signal.
 
     Attributes
     ----------
     signal
-        Function that returns its spectrum, shape (n, places, d), from the loads at an operating point.
+        Function of the loads at an operating point that returns the spectrum, shape (n, places, d).
     part
-        Components of the wrench for a load of the block; None for loads at mounts.
+        Components of the wrench, for loads on the block; None for others.
     depends_on_gas
-        True if it contains the roll moment: gas gives no force (eq. 1).
+        True if gas contributes to it. On the block gas makes a roll moment but no force (eq. 1).
     is_block_load
-        True if it follows from the wrench on the block alone; else it is a load inside the crankcase.
+        True if it follows from the wrench on the block alone; False for a load inside the crankcase.
     depends_on_unbalances
-        True if rotors load it and the loads of the throws add up; else it depends on cylinders and their twist.
+        True if rotors contribute and the loads of all throws are summed; False if it depends on single cylinders.
     sums_places
-        True if its places add up, so that only the mean over the cycle has a meaning.
+        True if the value is the sum over its places; then its norm is always the mean over the cycle.
     size_factors
-        Factors of sizes of each place or component, by which a load inside the crankcase is multiplied (Z1).
+        Function of engine and operating point that returns the factor of each place or component, such as 1 / area,
+        for loads inside the crankcase (Z1); None without factors.
     """
 
     keys: tuple[str, ...] = ON_BLOCK
@@ -228,14 +241,14 @@ class LoadChannel(Channel):
     is_load: ClassVar[bool] = True
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
-        """Return its factors of sizes, shape (places, d or 1); None without such factors."""
+        """Return the size factors at an operating point, shape (places, d or 1); None without such factors."""
         if self.size_factors is None:
             return None
         factors = self.size_factors(engine, point)
         return factors if factors.ndim > 1 else factors[:, None]
 
     def check_sizes(self, engine: Engine, point: OperatingPoint) -> None:
-        """Raise `ModelError` if a size of its places is missing."""
+        """Raise `ModelError` if the engine lacks a size of one of its places."""
         self.factors_of(engine, point)
 
     @property
@@ -255,12 +268,12 @@ class MassChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class NumberChannel(Channel):
-    """Numbers of a design without a signal.
+    """Number, or several numbers, of a design that are no norm of a signal.
 
     Attributes
     ----------
     values
-        Function that returns its numbers: the first is shown, limits apply to all.
+        Function of measure and design that returns the numbers. Reports show the first one, limits apply to all.
     """
 
     values: Callable[[MeasureQuery, EvaluatedDesign], Sequence[float]] = field(kw_only=True)
@@ -269,7 +282,7 @@ class NumberChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class SizeChannel(NumberChannel):
-    """Number that depends on sizes alone."""
+    """Number that depends on sizes alone, not on loads."""
 
     depends_on_loads: bool = False
 
@@ -301,7 +314,7 @@ def _names_of_bearings(engine: Engine) -> Sequence[str]:
 
 
 def names_of_cylinders(engine: Engine) -> Sequence[str]:
-    """Return the names of the places of loads of cylinders."""
+    """Return the names of the cylinders, which are the places of their loads."""
     return [part.name for part in engine.slider_cranks]
 
 
@@ -315,7 +328,19 @@ Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
 
 
 def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor: Factor | None = None) -> LoadChannel:
-    """Return the channel of a load inside the crankcase, multiplied by factors of sizes if there are any (Z1)."""
+    """Return the channel of a load inside the crankcase (Z1).
+
+    Parameters
+    ----------
+    name, unit
+        Name in files and reports; SI unit.
+    where
+        Keys, needed part and place names of the channel.
+    load
+        Function of engine, operating point and fidelity that returns the spectrum, shape (n, places, d).
+    factor
+        Size factors by which the load is multiplied; None for none.
+    """
 
     def signal(moving: Engine, loads: PointLoads) -> Spectrum:
         spectrum = load(moving, loads.point, loads.fidelity)
@@ -342,7 +367,7 @@ def _of_wheel(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
     needs: Need = Needs.FLYWHEEL, depends_on_torque: bool = False,
 ) -> FlywheelChannel:  # fmt: skip
-    """Return the channel of the largest value of a number over the operating points that count."""
+    """Return the channel of a number of the flywheel: its largest value over the operating points that count."""
 
     def flywheel_value(measure: MeasureQuery, evaluation: EvaluatedDesign) -> FlywheelFunction:
         counted = [loads.point for loads in evaluation.loads if measure.includes_point(loads.point)]
@@ -351,7 +376,7 @@ def _of_wheel(
 
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
-        # an uneven speed needs an inertia only
+        # without a flywheel the turning inertia alone gives the speed variation
         return () if inertia is None else (flywheel_value(measure, evaluation)(wheel or Flywheel(inertia)),)
 
     return FlywheelChannel(
@@ -381,7 +406,7 @@ OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_ST
 def mounting_in(engine: Engine) -> ElasticMounting:
     """Return the elastic mounting of an engine with a block."""
     if engine.block is None:
-        raise ValueError("this engine has no block, so its mounts are rigid")
+        raise ValueError("the engine has rigid mounts; elastic ones need a block")
     return elastic_mounting(engine.block, engine.mounts)
 
 
@@ -406,14 +431,14 @@ def _transmissibility(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Seq
 
 
 def motion_indices(measure: MeasureQuery) -> tuple[int, ...]:
-    """Return the indices of the motions that should each have a mode of their own."""
+    """Return the indices of the motions that the modes should decouple; all by default."""
     return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 
 
 def _of_axis(
     name: str, unit: str, residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual]
 ) -> MountChannel:
-    # zero if turning about the torque-roll axis is a mode
+    # the residual is zero if rotation about the torque-roll axis is a natural mode
     def value(mounting: ElasticMounting, measure: MeasureQuery) -> float:
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
@@ -423,19 +448,19 @@ def _of_axis(
 
 
 def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
-    """Return the load cases that count."""
+    """Return the load cases of an engine that a measure counts."""
     return [case for case in engine.load_cases if measure.cases is None or case.name in measure.cases]
 
 
 def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
-    """Return the channel of the largest length over the mounts and load cases that count."""
+    """Return the channel of the largest vector length over the mounts and load cases that count."""
 
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         mounting = mounting_in(evaluation.engine)
-        chosen = measure.places([mount.name for mount in mounting.mounts])
+        counted = measure.places([mount.name for mount in mounting.mounts])
         weights = np.array(measure.direction_weights or (1.0, 1.0, 1.0))
         cases = counted_cases(measure, evaluation.engine)
-        vectors = [part(settled(mounting, case))[chosen] * weights for case in cases]
+        vectors = [part(settled(mounting, case))[counted] * weights for case in cases]
         return (max((float(np.linalg.norm(rows, axis=1).max()) for rows in vectors), default=0.0),)
 
     keys = ("load_cases", "mounts", "direction_weights")
@@ -489,13 +514,15 @@ def _on_block(name: str, unit: str, part: slice, depends_on_gas: bool = False) -
 
 
 def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
-    def known(loads: PointLoads) -> Spectrum:
+    def signal_of_mounts(loads: PointLoads) -> Spectrum:
         spectrum = signal(loads)
         if spectrum is None:
-            raise ValueError(f"this mounting has no {name}")
+            raise ValueError(f"these mounts have no {name}")
         return spectrum
 
-    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, is_block_load=True)
+    return LoadChannel(
+        name, unit, AT_MOUNTS, needs, signal=signal_of_mounts, places=_names_of_mounts, is_block_load=True
+    )
 
 
 def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
@@ -528,7 +555,7 @@ RESULTANT_MOUNT_FORCE = LoadChannel(
 )
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
-"""Loads for which bounds of mounts have formulas."""
+"""Loads at mounts for which bounds over boxes of mount numbers exist."""
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3))
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6))
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), depends_on_gas=True)
@@ -564,7 +591,7 @@ OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
 
 
 def is_at_mounts(channel: Channel) -> bool:
-    """Return True for the force and the travel of each mount."""
+    """Return True for the channels of mount force and mount travel."""
     return channel in AT_EACH_MOUNT
 
 

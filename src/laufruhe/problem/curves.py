@@ -1,6 +1,6 @@
-"""Labelled arrays of a design: loads over the crank angle and by order, and the modes of its mounting.
+"""Labelled arrays of designs: loads over the crank angle and by order, and natural modes.
 
-Scripts get them as xarray datasets, files as columns; both from the same fields.
+Scripts get them as xarray datasets, files as columns of a table.
 """
 
 from __future__ import annotations
@@ -49,7 +49,21 @@ class CurveAxis:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Quantity along the axes that all fields share, and along its own."""
+    """Quantity as an array along the common axes of all fields and along axes of its own.
+
+    Attributes
+    ----------
+    name
+        Name in datasets.
+    words
+        Name in headings.
+    unit
+        SI unit; empty for a ratio.
+    own
+        Axes of this quantity alone, after the common ones.
+    values
+        Values, shape (common axes ..., own axes ...).
+    """
 
     name: str
     words: str
@@ -58,7 +72,7 @@ class Field:
     values: Array
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
-        """Yield heading and index of every column along its own axes."""
+        """Yield heading and index of each column, one for each index of its own axes."""
         for index in itertools.product(*(range(len(axis.labels)) for axis in self.own)):
             labels = [(axis.name, axis.labels[k]) for axis, k in zip(self.own, index, strict=True)]
             texts = [f"{name} {label}" if isinstance(label, int | float) else str(label) for name, label in labels]
@@ -67,7 +81,19 @@ class Field:
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Fields on common axes: the designs, and the axes of the rows."""
+    """Fields on common axes.
+
+    Attributes
+    ----------
+    title
+        Title of the dataset.
+    designs
+        First common axis: the designs.
+    rows
+        Further common axes: those of the rows of a table.
+    fields
+        Quantities.
+    """
 
     title: str
     designs: CurveAxis
@@ -87,13 +113,13 @@ class Fields:
             )
             for field in self.fields
         }
-        axes = {axis.name: axis for axis in (*shared, *(own for field in self.fields for own in field.own))}
+        axes = {axis.name: axis for axis in (*shared, *(axis for field in self.fields for axis in field.own))}
         units = {name: {"units": axis.unit} if axis.unit else {} for name, axis in axes.items()}
         coords = {name: ([name], list(axis.labels), units[name]) for name, axis in axes.items()}
         return xr.Dataset(variables, coords, {"title": self.title})
 
     def table(self) -> tuple[list[str], Iterator[list[Any]]]:
-        """Return heads and rows: the designs side by side, a row for each index of the other axes."""
+        """Return headings and rows: one row for each index of the row axes, with the designs in columns."""
         named = len(self.designs.labels) > 1
         columns = [
             (f"{design}: {head}" if named else head, field.values[k][..., *index])
@@ -109,7 +135,15 @@ class Fields:
 
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
-    """Return the loads on the block, the mounts and the bearings, and the mount travel, over the cycle (C7)."""
+    """Return the loads on block, mounts and bearings, and the mount travel, over the cycle (C7).
+
+    Parameters
+    ----------
+    designs
+        Evaluated designs by name.
+    steps
+        Number of samples over the cycle.
+    """
     check_integer("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
     turn = first.engine.cycle.angle
@@ -150,8 +184,8 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         "rocking_couple": ("rocking couple", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 4:])),
     }
     for name, words, place, channel in _places(first):
-        own = (CurveAxis(place, tuple(channel.places(first.engine))),)
-        signals[name] = (words, channel.unit, own, channel.signal)
+        axes = (CurveAxis(place, tuple(channel.places(first.engine))),)
+        signals[name] = (words, channel.unit, axes, channel.signal)
     spectra = {
         name: [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
         for name, (_, _, _, signal) in signals.items()
@@ -166,8 +200,8 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         return np.where(np.isfinite(values), values, math.inf)
 
     fields = [
-        Field(name, words, unit, own, np.array([[amplitudes(one) for one in row] for row in spectra[name]]))
-        for name, (words, unit, own, _) in signals.items()
+        Field(name, words, unit, axes, np.array([[amplitudes(one) for one in row] for row in spectra[name]]))
+        for name, (words, unit, axes, _) in signals.items()
     ]
     orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))
     points = CurveAxis("point", tuple(loads.point.name for loads in first.loads))
@@ -175,7 +209,7 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
-    """Return natural frequencies, loss factors and shares of kinetic energy of a block on elastic mounts.
+    """Return natural frequencies [Hz], loss factors and shares of kinetic energy of a block on elastic mounts.
 
     Raises
     ------
@@ -197,7 +231,7 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
 
 
 def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
-    # name, words, name of the axis, channel of loads with several places
+    # name, words, name of the place axis, and channel of each load with several places
     if design.engine.mounts:
         yield "mount_force", "force on", "mount", MOUNT_FORCE
     if design.engine.mounts and design.engine.block is not None:

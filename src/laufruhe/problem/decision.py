@@ -1,7 +1,6 @@
-"""Decisions: open numbers, the sets they lie in, and the numbers of the engine they drive.
+"""Decisions: open numbers, their sets of allowed values, and the numbers of the engine that they change (drives).
 
-Kinds of drives select the method that solves a problem. A bound needs the minimum of a linear function over the set, a
-method the nearest point (P4).
+The kinds of decisions select the method that solves a problem.
 """
 
 from __future__ import annotations
@@ -27,18 +26,18 @@ LAG, NUMBERS_OF_MOUNT = 13, 14
 
 @dataclass(frozen=True, order=True)
 class Kind:
-    """A kind of open numbers, by the dependence of loads on it.
+    """Kind of open numbers, distinguished by how loads depend on them.
 
     Attributes
     ----------
     rank
-        The highest rank counts where a decision drives several kinds.
+        Order of the kinds; a decision that drives several kinds has the kind of highest rank.
     name
         Name in messages; the table of a problem file for a kind of an extension.
     words
         Name of such numbers, in the plural.
     is_alone
-        True if channels of the core depend on it only where a line of dependences says so.
+        True if channels of the core depend on it only where the table of dependences has an entry for it.
     """
 
     rank: float
@@ -51,7 +50,7 @@ class Kind:
     PLACE: ClassVar[Kind]
     """Every load is affine in it while the unbalances are fixed (P8)."""
     STIFFNESS: ClassVar[Kind]
-    """K is linear in it."""
+    """The stiffness matrix of the mounting is linear in it."""
     MOUNT: ClassVar[Kind]
     STAR: ClassVar[Kind]
     """The phasing, which is no number."""
@@ -69,11 +68,11 @@ class Kind:
     """Any other number of the problem file, on which everything may depend."""
 
     def __hash__(self) -> int:
-        # the same in every process, and so is the order of sets
+        # the same in every process, so that sets of kinds have the same order
         return hash(self.rank)
 
     def __reduce__(self) -> tuple[Callable[[str], Kind], tuple[str]]:
-        # a kind is one and the same in every process
+        # unpickling returns the one object of this kind in the process
         return _kind_named, (self.name,)
 
 
@@ -102,18 +101,19 @@ def _kind_named(name: str) -> Kind:
 
 @dataclass
 class Numbers:
-    """Numbers of an engine that decisions may move; symbols of a smooth program are allowed too.
+    """Numbers of an engine that decisions may change; also as symbols of a smooth program.
 
     Attributes
     ----------
     unbalances
-        By the names of the rotors [kg m] (C4).
+        Complex unbalance of each rotor by its name [kg m] (C4).
     places
-        By the names of the rotors: x, and y and z of their shafts [m] (C2).
+        Position x of each rotor, and y and z of its shaft, by the name of the rotor [m] (C2).
     mounts
-        Fourteen numbers a spring: stiffness, loss factor, damping, position, turned angles, lag (E13).
+        Fourteen numbers for each spring: stiffness, loss factor, damping, position, turned angles, lag (E13). Empty if
+        no decision changes mounts.
     changes
-        Changes of all other numbers, by their kind and key (`NumberDrive`).
+        Changes of all other numbers by kind and key (`NumberDrive`).
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
@@ -123,7 +123,7 @@ class Numbers:
 
     @classmethod
     def from_engine(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
-        """Return the numbers of an engine, and those of its mounts where these may move."""
+        """Return the numbers of an engine; `mounts` has those of its springs if decisions may change them."""
         unbalances = {rotor.name: rotor.unbalance for rotor in engine.rotors}
         places: dict[str, list[Any]] = {rotor.name: list(rotor.place) for rotor in engine.rotors}
         return cls(unbalances, places, [list(row) for row in mounts])
@@ -133,17 +133,17 @@ class Numbers:
         rotors = []
         for rotor in base.rotors:
             unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
-            moved = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
-            rotors.append(moved if place == rotor.place else moved.placed(*place))
+            updated = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
+            rotors.append(updated if place == rotor.place else updated.placed(*place))
         mounts = base.mounts
         if self.mounts:
             rows = iter(self.mounts)
             mounts = tuple(mount.mapped(lambda spring: mount_from_numbers(spring, next(rows))) for mount in base.mounts)
         shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in base.geared})
-        # a sum of changes may leave a bound by a rounding
+        # a sum of changes may exceed a bound by a rounding error
         geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in base.geared)
         parts = list(base.slider_cranks)
-        # the inertia that a rod lacks may be negative
+        # the inertia deficit of a rod may be negative
         lower = {"rod_inertia_deficit": -math.inf}
         for k, part in enumerate(parts):
             pistons = {key: change for (kind, key), change in self.changes.items() if kind is Kind.PISTON}
@@ -165,13 +165,13 @@ class Numbers:
         return base.moved(self._of_kind(Kind.FLYWHEEL, dict(enumerate(base.numbers))).values())
 
     def _of_kind(self, kind: Kind, numbers: Mapping[Any, Any]) -> dict[Any, Any]:
-        # a number that no change moves may be None
-        changes = {key: change for (other, key), change in self.changes.items() if other is kind}
+        # numbers without a change may be None
+        changes = {key: change for (change_kind, key), change in self.changes.items() if change_kind is kind}
         return {key: value + changes[key] if key in changes else value for key, value in numbers.items()}
 
 
 class Drive(Protocol):
-    """Effect of a decision on one number of the engine."""
+    """Effect of a decision on one number of the engine (structural type of the classes below)."""
 
     @property
     def kind(self) -> Kind:
@@ -179,15 +179,15 @@ class Drive(Protocol):
 
     @property
     def acts(self) -> bool:
-        """True if a part of the engine follows."""
+        """True if the decision has an effect on the engine."""
 
     def move(self, numbers: Numbers, change: Any, /) -> None:
-        """Move the number by a change of the decision."""
+        """Change the number in place for a change of the decision from its start."""
 
 
 @dataclass(frozen=True)
 class RotorDrive:
-    """U += gain u of one rotor, or gain conj(u) when mirrored."""
+    """Change of the unbalance of one rotor: gain x change, or gain x conj(change) if mirrored."""
 
     rotor: str
     gain: complex
@@ -200,17 +200,17 @@ class RotorDrive:
         return self.gain != 0.0
 
     def of(self, change: Value) -> Value:
-        """Return the change of the unbalance [kg m] that follows from a change of the decision."""
+        """Return the change of the unbalance for a change of the decision [kg m]."""
         return self.gain * (change.conjugate() if self.mirrored else change)
 
     def move(self, numbers: Numbers, change: Any) -> None:
-        """Move the unbalance."""
+        """Change the unbalance in place."""
         numbers.unbalances[self.rotor] += self.of(change)
 
 
 @dataclass(frozen=True)
 class PlaceDrive:
-    """Place of one rotor += change, along x, or by the y or z of its shaft (C2)."""
+    """Change of the position of one rotor by the change of the decision: x, or y or z of its shaft [m] (C2)."""
 
     rotor: str
     axis: int
@@ -218,13 +218,13 @@ class PlaceDrive:
     acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
-        """Move the rotor."""
+        """Change the position in place."""
         numbers.places[self.rotor][self.axis] += change
 
 
 @dataclass(frozen=True)
 class MountDrive:
-    """Number += gain x change, for one number of one mount (E13)."""
+    """Change of one number of one mount: gain x change of the decision (E13)."""
 
     mount: int
     number: int
@@ -233,23 +233,23 @@ class MountDrive:
 
     @property
     def kind(self) -> Kind:
-        """Kind of the number: K is linear in stiffness alone."""
+        """STIFFNESS, in which the stiffness matrix is linear, or MOUNT for other numbers."""
         return Kind.STIFFNESS if self.number < STIFFNESS.stop else Kind.MOUNT
 
     def move(self, numbers: Numbers, change: Any) -> None:
-        """Move the number of the mount."""
+        """Change the number of the mount in place."""
         numbers.mounts[self.mount][self.number] += self.gain * change
 
 
 @dataclass(frozen=True)
 class NumberDrive:
-    """Number of the engine += change.
+    """Change of any other number of the engine by the change of the decision.
 
     Attributes
     ----------
     key
-        Distinguishes numbers of one kind: index in the flywheel's numbers, names of a slider-crank and its mass, size
-        of the running gear, shaft of a phase lead, geared inertia of a share.
+        Identifier among numbers of one kind: index in the flywheel's numbers, (slider-crank, mass), size of the running
+        gear, shaft of a phase lead, or geared inertia of a share.
     """
 
     kind: Kind
@@ -257,19 +257,19 @@ class NumberDrive:
     acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
-        """Add up the change of the number."""
+        """Add the change to the changes of the number."""
         key = self.kind, self.key
         numbers.changes[key] = numbers.changes.get(key, 0.0) + float(change.real)
 
 
 @dataclass(frozen=True)
 class AddressDrive:
-    """A number of the problem file: the engine is built again with the value at its address.
+    """Number of the problem file: the engine is built again from the file with each new value.
 
     Attributes
     ----------
     path
-        Keys, and indices in lists from zero.
+        Address in the file: keys, and indices in lists from zero.
     unit
         SI unit in which the value is written; empty for a plain number.
     """
@@ -280,19 +280,19 @@ class AddressDrive:
     acts: ClassVar[bool] = True
 
     def written(self, value: Value) -> str | float:
-        """Return the value as a file has it."""
+        """Return the value as it is written in a file: with its unit, if there is one."""
         number = float(value.real)
         return f"{number!r} {self.unit}" if self.unit else number
 
     def move(self, _numbers: Numbers, _change: Any) -> None:
-        """Refuse: the engine is built again instead (`Problem.fixed_at`)."""
-        raise TypeError(f"{self.path} is a number of the file; the engine is put together anew with it")
+        """Raise TypeError: the engine is built again instead (`Problem.fixed_at`)."""
+        raise TypeError(f"{self.path} is a number of the file; build the engine again with Problem.fixed_at")
 
 
 def mount_from_numbers(mount: Mount, numbers: Sequence[float]) -> Mount:
     """Return a mount with these fourteen numbers (E13)."""
     rows = turned_axes(NUMBERS, numbers[TURNED]).tolist()
-    # a sum of changes may leave a bound of zero by a rounding
+    # a sum of changes may fall below zero by a rounding error
     (a, b, c), (p, q, r) = (tuple(max(float(v), 0.0) for v in numbers[s]) for s in (STIFFNESS, DAMPING))
     x, y, z = (float(v) for v in numbers[POSITION])
     return replace(
@@ -303,20 +303,20 @@ def mount_from_numbers(mount: Mount, numbers: Sequence[float]) -> Mount:
 
 @dataclass(frozen=True)
 class Decision:
-    """An open number.
+    """Open number with its set of allowed values and its effects.
 
     Attributes
     ----------
     name
         Name in the problem file.
     unit
-        SI unit; "" for a balance factor.
+        SI unit; "" for a plain number such as a balance factor.
     set
         Set of allowed values.
     start
-        Value in the design as given: a complex u = size e^{i angle} for an unbalance.
+        Value in the design as given; complex, size x e^{i angle}, for an unbalance.
     drives
-        Numbers of the engine that follow.
+        Effects on numbers of the engine.
     """
 
     name: str
@@ -337,7 +337,7 @@ class Decision:
 
     @property
     def real_start(self) -> float:
-        """Start of a real number."""
+        """Start value as a real number."""
         return self.start.real
 
     @property
@@ -357,39 +357,39 @@ class Decision:
 
     @property
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
-        """Unbalances that follow."""
+        """Effects on unbalances of rotors."""
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
 
     @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:
-        """Places of rotors that follow."""
+        """Effects on positions of rotors."""
         return tuple(drive for drive in self.drives if isinstance(drive, PlaceDrive))
 
     @property
     def mount_drives(self) -> tuple[MountDrive, ...]:
-        """Numbers of mounts that follow."""
+        """Effects on numbers of mounts."""
         return tuple(drive for drive in self.drives if isinstance(drive, MountDrive))
 
     @property
     def address_drives(self) -> tuple[AddressDrive, ...]:
-        """Numbers of the file that follow."""
+        """Effects on numbers of the problem file."""
         return tuple(drive for drive in self.drives if isinstance(drive, AddressDrive))
 
     def keys(self, kind: Kind) -> tuple[Any, ...]:
-        """Return the keys of the numbers of a kind that follow."""
+        """Return the keys of the numbers of one kind that the decision changes."""
         return tuple(drive.key for drive in self.drives if isinstance(drive, NumberDrive) and drive.kind is kind)
 
 
 def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tuple[Decision, ...]:
-    """Return decisions without their drives of some rotors, and without decisions that drive nothing else."""
-    others = (
+    """Return decisions without effects on the named rotors; decisions without any other effect are dropped."""
+    reduced = (
         replace(d, drives=tuple(v for v in d.drives if getattr(v, "rotor", None) not in names)) for d in decisions
     )
-    return tuple(decision for decision in others if decision.drives)
+    return tuple(decision for decision in reduced if decision.drives)
 
 
 def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
-    """Move the numbers in place to decisions at these values, and return them."""
+    """Change numbers in place to these values of the decisions, and return them."""
     for decision, value in zip(decisions, values, strict=True):
         for drive in decision.drives:
             drive.move(numbers, value - decision.start)
@@ -398,7 +398,15 @@ def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Seq
 
 @dataclass(frozen=True)
 class Domain:
-    """Columns of a decision vector that belong to one decision."""
+    """Columns of the decision vector that belong to one decision.
+
+    Attributes
+    ----------
+    decision
+        The decision.
+    start
+        Index of its first column.
+    """
 
     decision: Decision
     start: int
@@ -415,7 +423,7 @@ class Domain:
 
     @property
     def columns(self) -> slice:
-        """Place of its columns in the decision vector."""
+        """Slice of its columns in the decision vector."""
         return slice(self.start, self.start + self.width)
 
     @property
@@ -425,30 +433,30 @@ class Domain:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Lower and upper bound of each of its columns."""
+        """Lower and upper bound, equal for all its columns."""
         return (self.set.lower, self.set.upper) if self.width == 1 else (-self.scale, self.scale)
 
     def complex_value(self, x: Array) -> complex:
-        """Return the decision u from the decision vector."""
+        """Return the complex value of the decision from the decision vector x."""
         return complex(sum(part * d for part, d in zip(x[self.columns], self.set.directions, strict=True)))
 
     def columns_of(self, u: Value) -> Array:
-        """Return the columns of a complex decision, shape (width,)."""
+        """Return the columns of a value of the decision, shape (width,)."""
         if self.width == 1:
             return np.array([(u * self.set.directions[0].conjugate()).real])
         return np.array([u.real, u.imag])
 
     def minimum(self, gradient: Array) -> float:
-        """Return min g . x over the set (P4)."""
+        """Return min g . x over the set of allowed values, g the columns of `gradient` (P4)."""
         return self.set.minimum(gradient[self.columns])
 
     def project(self, x: Array) -> Array:
-        """Return the point of the set nearest to the columns of x."""
+        """Return the allowed columns nearest to those of the decision vector x, shape (width,)."""
         return self.set.project(x[self.columns])
 
 
 def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
-    """Return domains in the order of the decisions, their columns side by side."""
+    """Return the domains of decisions, with consecutive columns in the same order."""
     domains: list[Domain] = []
     for decision in decisions:
         domains.append(Domain(decision, domains[-1].columns.stop if domains else 0))
@@ -456,31 +464,31 @@ def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
 
 
 def column_bounds(domains: Sequence[Domain]) -> tuple[Array, Array]:
-    """Return lower and upper bounds of every column of a decision vector."""
+    """Return lower and upper bounds of all columns of the decision vector, shape (columns,) each."""
     low, high = (np.array([d.ends[k] for d in domains for _ in range(d.width)], dtype=float) for k in (0, 1))
     return low, high
 
 
 def real_bounds(decisions: Sequence[Decision]) -> tuple[Array, Array]:
-    """Return lower and upper bounds of real decisions."""
+    """Return lower and upper bounds of real decisions, shape (decisions,) each."""
     lower, upper = (np.array([getattr(d, side) for d in decisions], dtype=float) for side in ("lower", "upper"))
     return lower, upper
 
 
 def column_scales(domains: Sequence[Domain]) -> Array:
-    """Return the largest size of every column of a decision vector."""
+    """Return the largest size of each column of the decision vector, shape (columns,)."""
     return np.array([d.scale for d in domains for _ in range(d.width)], dtype=float)
 
 
 def decision_vector(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:
-    """Return the decision vector of complex values; by default those of the design as given."""
-    own = [domain.decision.start for domain in domains] if values is None else values
-    return np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, own, strict=True))])
+    """Return the decision vector of values, shape (columns,); by default of the design as given."""
+    starts = [domain.decision.start for domain in domains] if values is None else values
+    return np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, starts, strict=True))])
 
 
 def projected_vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    """Return the decision vector of complex values, each projected onto its set."""
-    out = decision_vector(domains, values)
+    """Return the decision vector of values, each moved to the nearest allowed value, shape (columns,)."""
+    vector = decision_vector(domains, values)
     for domain in domains:
-        out[domain.columns] = domain.project(out)
-    return out
+        vector[domain.columns] = domain.project(vector)
+    return vector

@@ -1,8 +1,8 @@
-"""Dependence of every channel on every kind of decision.
+"""Dependence of each channel on each kind of decision.
 
-The table lists known dependences. A channel that is not in it is UNKNOWN for every kind: no bound counts it as affine
-or as constant, and a problem with it is decided locally. Sampling (`tests/problem/test_dependence.py`) can refute
-an entry and never prove it.
+The table lists known dependences. A channel that is not in it is UNKNOWN for every kind: no bound treats it as affine
+or constant, and a problem with it is solved locally. Tests by sampling (`tests/problem/test_dependence.py`) can refute
+an entry but not prove it.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ class Dependence(StrEnum):
     NONE = "none"
     """Constant."""
     AFFINE = "affine"
-    """For masses: sums of lengths of vectors that are affine."""
+    """Affine; a mass is a sum of lengths of affine vectors."""
     BIAFFINE = "affine while unbalances are fixed"
     BENT = "affine between bearings while unbalances are fixed"
-    """Has a kink where a place passes a bearing of its shaft (B4)."""
+    """As BIAFFINE, with a kink where a rotor passes a bearing of its shaft (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
-    """Masses follow from sizes; the factor of each place is monotone in each size (Z2)."""
+    """Affine in masses that follow from sizes, times a factor of each place that is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
-    """Parts are throws of a star, or the loads of each geared shaft (P13)."""
+    """Sum of parts, each delayed by its own angle: the throws of a star, or the loads of geared shafts (P13)."""
     SWING = "a number of a signal that is SHIFT"
     CONVEX = "convex"
     MONOTONE_UP = "never falls"
     MONOTONE_DOWN = "never rises"
     SMOOTH = "smooth"
-    """Continuous, and nothing more is claimed."""
+    """Continuous, without further known properties."""
     UNKNOWN = "unknown"
 
 
@@ -107,29 +107,29 @@ def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
     name, words = line.split("  ", 1)
     letters = [word for word in words.split() if "=" not in word]
     row = dict(zip(_COLUMNS, map(_LETTERS.__getitem__, letters), strict=True)) if letters else {}
-    further = (word.split("=") for word in words.split() if "=" in word)
-    # a kind that is not installed moves nothing
-    return name, row | {KINDS[kind]: _LETTERS[letter] for kind, letter in further if kind in KINDS}
+    additions = (word.split("=") for word in words.split() if "=" in word)
+    # kinds of extensions that are not installed have no effect
+    return name, row | {KINDS[kind]: _LETTERS[letter] for kind, letter in additions if kind in KINDS}
 
 
-def _with_added(own: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
-    """Return the table with the lines of extensions about their own channels or kinds."""
-    without = set(CHANNELS).difference(own)
+def _with_added(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
+    """Return the table of the core with the lines of extensions about their own channels or kinds."""
+    missing = set(CHANNELS).difference(core_rows)
     table: dict[str, Mapping[Kind, Dependence]] = {
         name: row | {kind: Dependence.NONE for kind in KINDS.values() if kind.is_alone and kind not in row}
-        for name, row in own.items()
+        for name, row in core_rows.items()
     }
     for extension in extensions():
         for line in extension.dependences:
             try:
                 name, row = _row(line)
             except (KeyError, ValueError):
-                rule = f"{line!r} is no line of dependences; give a channel, two blanks and {len(_COLUMNS)} letters"
+                rule = f"{line!r} is no line of dependences; write a channel, two blanks and {len(_COLUMNS)} letters"
                 raise ModelError(f"extension '{extension.name}': {rule}") from None
-            if name in without:
-                without.remove(name)
-            elif name not in own or not row.keys() <= {kind for _, kind in objects(extension, "kinds")}:
-                rule = f"'{name}' is no channel without dependences; leave its line out"
+            if name in missing:
+                missing.remove(name)
+            elif name not in core_rows or not row.keys() <= {kind for _, kind in objects(extension, "kinds")}:
+                rule = f"'{name}' has dependences already, or is no channel; remove the line"
                 raise ModelError(f"extension '{extension.name}': {rule}")
             table[name] = {**table.get(name, {}), **row}
     return table
@@ -137,7 +137,7 @@ def _with_added(own: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[
 
 TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_added(dict(map(_row, _TABLE.strip().splitlines()[1:])))
 """Dependences by the name of the channel and the kind of decision."""
-# loads of bearings depend on the places of rotors on the shafts that they carry
+# loads of bearings depend on the positions of rotors on the shafts that they carry
 _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.BENT)
@@ -156,13 +156,13 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
         return Dependence.NONE
     if entry is Dependence.BENT and problem.fidelity.crankshaft != "cut":
-        # a beam hands loads on to farther bearings
+        # a continuous beam passes loads on to all bearings
         return Dependence.SMOOTH
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
-        # rigid mounts share a force by their places alone
+        # rigid mounts share a force by their positions alone
         return Dependence.NONE
     if kind is Kind.LEAD and entry in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
-        # a lead moves one piston against another that has the same gas
+        # a lead changes the volume between two pistons with common gas
         return Dependence.SMOOTH
     if problem.fidelity.is_uneven and entry in _OF_EVEN_SPEED and kind is not Kind.STAR:
         return Dependence.SMOOTH
@@ -175,35 +175,35 @@ def falls_with_flywheel(channel: Channel) -> bool:
 
 
 def open_kinds(problem: Problem) -> frozenset[Kind]:
-    """Return the kinds of open numbers and choices."""
+    """Return the kinds of all open numbers and choices of a problem."""
     stars = [Kind.STAR] if problem.phasing is not None else []
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
 
 
 def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
-    """Return True if a channel may change with decisions of these kinds; UNKNOWN counts."""
+    """Return True if a channel may change with decisions of these kinds; UNKNOWN counts as a change."""
     return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)
 
 
 def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
     """Return True if a channel is affine in decisions of these kinds together, or constant."""
     if {Kind.SHARE, Kind.PISTON} <= set(kinds):
-        # the inertia on a geared shaft is a fraction of that of the pistons
+        # the inertia on a geared shaft is a fraction of one that depends on the pistons
         return not depends(channel, kinds, problem)
     allowed = (Dependence.NONE, Dependence.AFFINE)
     return all(dependence(channel, kind, problem) in allowed for kind in kinds)
 
 
 def shares_gas(problem: Problem) -> bool:
-    """Return True if gas between two pistons affects a measure, and one of the pistons has an open lead."""
+    """Return True if a piston with an open lead shares its gas with another one, and the gas affects a measure."""
     names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
-    led = (part for part in parts if part.shaft.name in names)
-    return problem.depends_on_gas and any(part.faces(other) for part in led for other in parts if other is not part)
+    moving = (part for part in parts if part.shaft.name in names)
+    return problem.depends_on_gas and any(part.faces(other) for part in moving for other in parts if other is not part)
 
 
 def _moves_carried(problem: Problem) -> bool:
-    # a bearing carries a shaft whose rotors have open places
+    # True if a bearing carries a shaft with rotors of open position
     carried = {bearing.shaft.name for bearing in problem.engine.bearings}
-    moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
-    return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)
+    moving = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
+    return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moving)

@@ -25,9 +25,9 @@ from laufruhe.problem.measure import Limit, Measure, Rows, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 BETWEEN = NORMS["maximum"].refinement
-"""Refinement of samples among which maxima are sought (M6)."""
+"""Factor on the number of samples for maxima (M6)."""
 FINE_SAMPLES = 5760
-"""Number of samples at which a mean is exact enough for limits that no decision affects (P7)."""
+"""Number of samples over the cycle at which a mean counts as exact (P7)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,17 @@ class Evaluation(EvaluatedDesign):
         return [mount.name for mount in self.engine.mounts]
 
     def rows(self, measure: Measure, samples: int | None = None, bends: Sequence[Array] | None = None) -> Rows:
-        """Return the rows of a measure over the whole cycle, of a peak at its kinks too."""
+        """Return the rows of a measure of loads or masses over the whole cycle.
+
+        Parameters
+        ----------
+        measure
+            Measure that is no number.
+        samples
+            Number of samples over the cycle; by default that of the evaluation.
+        kink_angles
+            Angles of kinks at each operating point [rad]; by default those of the signals.
+        """
         if not measure.is_load:
             return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
         signals = with_common_base(self.engine.cycle.base_order, self.signals(measure.load))
@@ -69,11 +79,11 @@ class Evaluation(EvaluatedDesign):
         return load_rows(measure, points, signals, self.engine, samples or self.samples, bends)
 
     def signals(self, channel: LoadChannel) -> list[Spectrum]:
-        """Return the signal of a channel at every operating point, shape (n, places, d) each."""
+        """Return the spectrum of a channel at each operating point, shape (n, places, d)."""
         return [channel.signal(loads) for loads in self.loads]
 
     def values(self, measure: Measure) -> Sequence[float]:
-        """Return all numbers of a measure [SI], its value first; each measure is computed once."""
+        """Return all numbers of a measure [SI], its value first; results are cached."""
         if measure not in self._values:
             self._values[measure] = self._computed(measure)
         return self._values[measure]
@@ -86,35 +96,44 @@ class Evaluation(EvaluatedDesign):
         signals = self.signals(measure.load)
         if measure.norm.refinement == 1:
             signals = [signal.series for signal in signals]
-        # rows that repeat over the cycle have the norm of one period
+        # signals that repeat within the cycle need one period only
         base = self.engine.cycle.base_order
-        once, samples = _one_period(base, signals, measure.norm.refinement * self.samples)
+        periodic, samples = _one_period(base, signals, measure.norm.refinement * self.samples)
         with np.errstate(invalid="ignore" if self.resonance else None):
-            value = load_rows(measure, [loads.point for loads in self.loads], once, self.engine, samples).value
+            value = load_rows(measure, [loads.point for loads in self.loads], periodic, self.engine, samples).value
         return (value if math.isfinite(value) or not self.resonance else math.inf,)
 
     def value(self, measure: Measure) -> float:
-        """Return a measure of this design [SI], a maximum sought between samples too; infinite on a resonance."""
+        """Return the value of a measure [SI]; infinite on an undamped resonance."""
         return self.values(measure)[0]
 
     def check_limit(self, limit: Limit) -> LimitCheck:
-        """Return how this design stands to a limit (E15)."""
-        # a shaft that is left out has no place to limit
-        nothing = math.inf if limit.maximum == math.inf else max(limit.minimum, 0.0)
-        pairs = ((value, *limit.slack(value)) for value in self.values(limit.measure) or (nothing,))
-        value, room, edge, side = min(pairs, key=lambda pair: pair[1])
-        return LimitCheck(value, edge, side, -room)
+        """Return value and violation of a limit for this design (E15)."""
+        # a shaft that is not built has no place to limit
+        missing = math.inf if limit.maximum == math.inf else max(limit.minimum, 0.0)
+        pairs = ((value, *limit.slack(value)) for value in self.values(limit.measure) or (missing,))
+        value, slack, edge, side = min(pairs, key=lambda pair: pair[1])
+        return LimitCheck(value, edge, side, -slack)
 
     def violation(self, limits: Sequence[Limit]) -> float:
-        """Return the largest relative violation of limits, negative if all have slack; zero without limits."""
+        """Return the largest relative violation of the limits, negative if all have slack; zero without limits."""
         return max((self.check_limit(limit).violation for limit in limits), default=0.0)
 
 
 @dataclass(frozen=True)
 class LimitCheck:
-    """A value, the nearest side of its limit, and its relative violation.
+    """Value of a measure compared with its limit.
 
-    A limit on several values, such as natural frequencies, shows the value with the least slack.
+    Attributes
+    ----------
+    value
+        Value of the measure [SI]; of several, such as natural frequencies, the one with the smallest slack.
+    edge
+        Bound of the side of the limit with the smallest slack [SI].
+    side
+        Sense of that side: "at most" or "at least".
+    violation
+        Violation relative to the bound; negative if the limit is satisfied with slack.
     """
 
     value: float
@@ -129,34 +148,34 @@ def fine_samples(samples: int) -> int:
 
 
 def with_fine_sampling(evaluation: Evaluation) -> Evaluation:
-    """Return the evaluation at enough samples for exact means; few samples may overestimate a mean (P7)."""
+    """Return the evaluation with enough samples for exact means; few samples may overestimate a mean (P7)."""
     return replace(evaluation, samples=fine_samples(evaluation.samples))
 
 
 def with_more_samples(problem: Problem, factor: int) -> Problem:
-    """Return the problem with `factor` as many samples; the gas keeps its own."""
-    own = problem.fidelity
-    return problem.at(replace(own, samples=factor * own.samples, gas_samples=own.gas_steps))
+    """Return the problem with `factor` times as many samples; the samples of the gas stay."""
+    fidelity = problem.fidelity
+    return problem.at(replace(fidelity, samples=factor * fidelity.samples, gas_samples=fidelity.gas_steps))
 
 
 def with_default_sampling(problem: Problem) -> Problem:
-    """Return the problem with the default number of samples at least: bounds at few samples hold at these only."""
+    """Return the problem with at least the default number of samples, at which bounds are meaningful."""
     factor = math.ceil(EXACT.samples / problem.fidelity.samples)
     return problem if factor == 1 else with_more_samples(problem, factor)
 
 
 def is_coarsely_sampled(measure: Measure, samples: int) -> bool:
-    """Return True if the norm of a load sees fewer samples than `FINE_SAMPLES`; peaks are refined anyway (M6)."""
+    """Return True if the norm of a load is computed from fewer than `FINE_SAMPLES` samples, after refinement (M6)."""
     return measure.norm.refinement * samples < FINE_SAMPLES
 
 
 def limit_samples(measure: Measure, samples: int) -> int:
-    """Return the number of samples at which a limit on a load is checked: `samples`, or enough (P7)."""
+    """Return the number of samples for checking a limit on a load: `samples`, or more for an exact mean (P7)."""
     return fine_samples(samples) if is_coarsely_sampled(measure, samples) else samples
 
 
 def with_common_base(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:
-    """Return signals with one common base order, at most `base`."""
+    """Return signals with one common base order, of which `base` is a multiple."""
     finest = common_base([base, *(signal.base for signal in signals)])
     return [signal.with_finer_base(finest) for signal in signals]
 
@@ -192,7 +211,7 @@ def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None
 
 
 def with_mounts(evaluation: Evaluation, engine: Engine) -> Evaluation:
-    """Return the evaluation on other mounts; `engine` differs in its mounts alone."""
+    """Return the evaluation with other mounts; `engine` may differ from that of the evaluation in its mounts only."""
     loads = _on_mounts(engine, evaluation.fidelity, [(loads.point, loads.wrench) for loads in evaluation.loads])
     return replace(evaluation, engine=engine, loads=loads)
 
@@ -216,38 +235,41 @@ def objective_value(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def value_of_loads(problem: Problem, evaluation: Evaluation) -> float:
-    """Return the part of the objective that fidelity affects: norms of loads and masses."""
+    """Return the part of the objective that consists of norms of loads and masses, which the fidelity affects [SI]."""
     return sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms)
 
 
 def channel_samples(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> Array:
-    """Return a channel at operating point k over the whole cycle, shape (samples, places, d)."""
+    """Return samples of a channel at operating point k over the cycle, shape (samples, places, d) [SI]."""
     signal = channel.signal(evaluation.loads[k])
     return with_common_base(evaluation.engine.cycle.base_order, [signal])[0].sample(evaluation.samples)
 
 
 def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
-    """Return mean, maximum and rms at every place of a channel at operating point k, maxima sought between samples."""
-    known = evaluation._place_measures
-    if (k, channel) in known:
-        return known[k, channel]
+    """Return mean, maximum and rms at each place of a channel at operating point k [SI].
+
+    Maxima are computed with refined samples and at kinks; all are infinite on an undamped resonance.
+    """
+    cached = evaluation._place_measures
+    if (k, channel) in cached:
+        return cached[k, channel]
     signal = channel.signal(evaluation.loads[k])
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
-    (once,), samples = _one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
-    fine, coarse = (lengths(each.sample(samples)) for each in (once, once.series))
+    (periodic,), samples = _one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
+    fine, coarse = (lengths(part.sample(samples)) for part in (periodic, periodic.series))
     top = np.maximum(fine.max(axis=0), lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0))
-    known[k, channel] = [
+    cached[k, channel] = [
         replace(cycle_measures(values[:, None]), max=float(largest))
         for values, largest in zip(coarse[::BETWEEN].T, top, strict=True)
     ]
-    return known[k, channel]
+    return cached[k, channel]
 
 
 def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
-    # signals over the period in which all repeat, and the samples of the cycle in it
-    once = common_base([signal.repeat_order() for signal in signals])
-    periods = multiple_of_base(once, base)
+    # signals over their common period, and the number of samples in it
+    period_base = common_base([signal.repeat_order() for signal in signals])
+    periods = multiple_of_base(period_base, base)
     if not periods or samples % periods:
         return with_common_base(base, signals), samples
-    return [signal.with_base(once) for signal in signals], samples // periods
+    return [signal.with_base(period_base) for signal in signals], samples // periods

@@ -49,7 +49,7 @@ class EvaluatedDesign:
 
 @dataclass(frozen=True, kw_only=True)
 class MeasureQuery:
-    """Keys that narrow a channel.
+    """Keys of a file that narrow a channel to parts of it.
 
     Attributes
     ----------
@@ -59,13 +59,13 @@ class MeasureQuery:
     orders
         Orders of crank speed that count; all when None.
     direction_weights
-        Factors on the components of a force before its length is taken.
+        Factors on the components of a force before its length is computed; None for 1, 1, 1.
     motions
-        Motions that should each have a mode of their own; all when None.
+        Motions that natural modes should decouple; all when None.
     frequency
-        Lower and upper bound of the wanted natural frequency about the torque-roll axis [Hz].
+        Lower and upper bound of the desired natural frequency about the torque-roll axis [Hz].
     wanted
-        Energy share of a motion in its own mode that suffices.
+        Energy share of a motion in one mode at which it counts as decoupled, 0 to 1.
     alternating
         True if the mean of a load over the cycle is left out (M7).
     """
@@ -86,5 +86,5 @@ class MeasureQuery:
         return self.points is None or point.name in self.points
 
     def places(self, names: Sequence[str]) -> list[int]:
-        """Return the indices of the names that count as places."""
+        """Return the indices of the place names that count; all if no places are selected."""
         return [k for k, name in enumerate(names) if self.at is None or name in self.at]

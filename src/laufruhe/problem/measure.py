@@ -1,7 +1,7 @@
 """Measures: norms of channels that a problem minimises and limits (P1).
 
-A measure of loads or masses is a norm of rows that are affine in the unbalances, so the same few lines evaluate it,
-optimise it and prove it.
+A measure of loads or masses is a norm of rows, vectors that are affine in the unbalances. Evaluation, optimisation and
+proofs all use these rows.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Measure(MeasureQuery):
 
     @property
     def depends_on_gas(self) -> bool:
-        """True if gas contributes to it."""
+        """True if the measure depends on the gas."""
         if self.is_load:
             return self.load.depends_on_gas
         channel = self.channel
@@ -95,31 +95,31 @@ class Measure(MeasureQuery):
 
     @property
     def is_cylinder_resolved(self) -> bool:
-        """True for a number of the crankshaft's twist, which no sum over the cylinders gives."""
+        """True for a number of the crankshaft's torsion, which is no sum over the cylinders."""
         return self.channel.depends_on_loads and self.channel.is_number and not self.is_mounting
 
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
-        """Return the weight of every operating point, shape (points,); they add up to one, zero does not count."""
+        """Return the weight of each operating point, shape (points,): sum one, zero for points that do not count."""
         weights = [p.weight if self.includes_point(p) else 0.0 for p in points]
         return np.array(weights) / (sum(weights) or math.nan)
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
-        """Return the mask of orders of crank speed that count, shape of `orders`."""
+        """Return the mask of the orders that count, shape of `orders`."""
         counts = np.ones(np.shape(orders), dtype=bool) if self.orders is None else orders_equal(orders, self.orders)
         return counts & ~orders_equal(orders, 0.0) if self.alternating else counts
 
     @property
     def includes_mean(self) -> bool:
-        """True if the mean of a load over the cycle is a part of it."""
+        """True if the measure contains the mean of the load over the cycle."""
         return self.is_load and bool(self.counted([0.0])[0])
 
     @property
     def with_all_orders(self) -> Measure:
-        """Measure of the whole load, its mean included."""
+        """The same measure with all orders, including the mean."""
         return replace(self, orders=None, alternating=False)
 
     def signal(self, loads: PointLoads, engine: Engine) -> Spectrum:
-        """Return the part of a load that counts at an operating point, shape (n, places, d)."""
+        """Return the spectrum of the places and orders that count at an operating point, shape (n, places, d)."""
         return narrow_signal(self, self.load.signal(loads), engine)
 
 
@@ -133,12 +133,14 @@ class Term:
 
 @dataclass(frozen=True)
 class PriorityLevel:
-    """An objective in order of priority, minimised among the optima of those before it.
+    """Objective of one priority, minimised over the optima of all objectives of higher priority.
 
     Attributes
     ----------
+    terms
+        Terms of its weighted sum.
     within
-        Relative excess over its minimum that later objectives may cause.
+        Fraction of its minimum by which objectives of lower priority may increase it.
     """
 
     terms: tuple[Term, ...]
@@ -147,7 +149,17 @@ class PriorityLevel:
 
 @dataclass(frozen=True)
 class Limit:
-    """Bounds of a measure [SI]; `outside` keeps every value out of a band."""
+    """Limits of a measure.
+
+    Attributes
+    ----------
+    name
+        Name in reports.
+    maximum, minimum
+        Largest and smallest allowed value [SI].
+    outside
+        Lower and upper edge of a band that no value may lie in [SI].
+    """
 
     name: str
     measure: Measure
@@ -156,7 +168,11 @@ class Limit:
     outside: tuple[float, float] | None = None
 
     def slack(self, value: float) -> tuple[float, float, str]:
-        """Return the relative slack to the nearest side, negative outside; that side [SI], and its sense (E15)."""
+        """Return slack, bound and sense of the side of the limit with the smallest slack (E15).
+
+        The slack is relative to the bound, and negative if the value violates it. The bound is in SI units, the sense
+        "at most" or "at least".
+        """
         sides = []
         if self.minimum > -math.inf:
             sides.append((value - self.minimum, self.minimum, "at least"))
@@ -165,7 +181,9 @@ class Limit:
         if self.outside is not None:
             low, high = self.outside
             sides.append(max((low - value, low, "at most"), (value - high, high, "at least")))
-        return min(((room / (abs(edge) or 1.0), edge, side) for room, edge, side in sides), default=(math.inf, 0.0, ""))
+        return min(
+            ((slack / (abs(bound) or 1.0), bound, side) for slack, bound, side in sides), default=(math.inf, 0.0, "")
+        )
 
 
 Side: TypeAlias = tuple[Limit, str]
@@ -182,7 +200,17 @@ MEASURES: Mapping[str, tuple[Channel, Norm]] = {
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Vectors whose norm is a measure (P1), shape (k, d), and the grid they lie on."""
+    """Vectors whose norm is a measure (P1).
+
+    Attributes
+    ----------
+    norm
+        Norm of the measure.
+    vectors
+        Rows, shape (k, d) [SI].
+    grid
+        Weights and grouping of the rows.
+    """
 
     norm: Norm
     vectors: Array
@@ -196,36 +224,40 @@ class Rows:
 
 def load_rows(
     measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int,
-    bends: Sequence[Array] | None = None,
+    kink_angles: Sequence[Array] | None = None,
 ) -> Rows:  # fmt: skip
-    """Return the rows of a load at equal steps of its period, and of a peak at its kinks.
+    """Return the rows of a load: samples at equal steps of its period, and for peaks also values at kinks.
 
     Parameters
     ----------
+    measure
+        Measure of a load.
+    points
+        Operating points.
     signals
-        Signal of the channel at every point, shape (n, places, d), all with one base order.
+        Signal of the channel at each operating point, shape (n, places, d), all with one base order.
     engine
-        Engine whose mounts, bearings or cylinders lie along the second axis.
+        Engine whose mounts, bearings or cylinders are the places.
     samples
         Number of samples over the period of the signals.
-    bends
-        Angles of kinks at every point [rad], as many at each; by default those of `kinks_of`.
+    kink_angles
+        Angles of kinks at each operating point, the same number for each [rad]; by default those of `kinks_of`.
 
     Returns
     -------
-    Rows of (points, places, samples and kinks) in that order; weights add up to one.
+    Rows, ordered by operating point, place, and angle (samples, then kinks). Their weights sum to one.
     """
     blocks, weights = [], []
-    bends = kinks_of(measure, signals, engine) if bends is None else bends
-    for signal, share, own in zip(signals, measure.shares(points), bends, strict=True):
+    kink_angles = kinks_of(measure, signals, engine) if kink_angles is None else kink_angles
+    for signal, share, angles in zip(signals, measure.shares(points), kink_angles, strict=True):
         if share == 0.0:
             continue
         counted = narrow_signal(measure, signal, engine)
         if measure.norm.refinement == 1:
             values = counted.series.sample(samples)
         else:
-            values = np.concatenate([counted.sample(samples, JUMP_OFFSET), counted.values(own)])
-        # an engine without the named places has no load there
+            values = np.concatenate([counted.sample(samples, JUMP_OFFSET), counted.values(angles)])
+        # the engine may lack the selected places
         if not values.shape[1]:
             continue
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
@@ -233,25 +265,25 @@ def load_rows(
         weights.append(np.full(len(rows), share / len(rows)))
     if not blocks:
         return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
-    count = len(bends[0])
+    count = len(kink_angles[0])
     # one block needs no copy
     rows, shares = (blocks[0], weights[0]) if len(blocks) == 1 else (np.concatenate(blocks), np.concatenate(weights))
     return Rows(measure.norm, rows, Grid(shares, samples + count, count, len(blocks)))
 
 
 def kinks_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
-    """Return the angles of kinks [rad] where a peak may stand, as many for every operating point (L5a)."""
+    """Return the angles of kinks where a peak may lie, the same number for each operating point [rad] (L5a)."""
     if measure.norm.refinement == 1:
         return [np.zeros(0)] * len(signals)
     kinks = [narrow_signal(measure, signal, engine).kink_angles for signal in signals]
     count = max(map(len, kinks))
-    return [np.resize(own, count) if len(own) else np.zeros(count) for own in kinks]
+    return [np.resize(angles, count) if len(angles) else np.zeros(count) for angles in kinks]
 
 
 def narrow_signal(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
-    """Return the places and orders of a signal (n, places, d) that count, its directions weighted.
+    """Return the counted places and orders of a signal, shape (n, places, d), with weighted directions.
 
-    Signals of places that add up are multiplied by their number: the mean over them is then their sum.
+    A channel that sums its places is multiplied by their number, so that the mean over places is the sum.
     """
     if measure.at is not None:
         signal = signal.mapped(lambda values: values[:, measure.places(measure.load.places(engine)), :])
@@ -271,19 +303,22 @@ def _roles(measure: Measure) -> tuple[Role, ...]:
 
 
 def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    """Return the rotors whose masses a measure adds up."""
+    """Return the rotors whose masses a measure sums."""
     roles = _roles(measure)
     return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
 def counterweight_masses(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
-    """Return the counterweights of mechanisms that a measure adds up [kg]; none if it names rotors."""
+    """Return the masses of the counterweights of mechanisms that a measure sums [kg]; none if it names rotors."""
     counts = Role.COUNTERWEIGHT in _roles(measure) and measure.rotors is None
     return [mass for part in parts if counts and (mass := part.counterweight_mass) is not None]
 
 
 def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderCrank] = ()) -> Rows:
-    """Return rows U / radius of the counted rotors and counterweights, shape (rows, 2) [kg]; a zero row for none."""
+    """Return the rows of a sum of masses, shape (k, 2) [kg]: unbalance / radius of each counted rotor, and masses.
+
+    Without any counted part there is one zero row.
+    """
     counted = counted_rotors(measure, rotors)
     vectors = [[r.unbalance.real / radius_of(r), r.unbalance.imag / radius_of(r)] for r in counted]
     vectors += [[mass, 0.0] for mass in counterweight_masses(measure, parts)]
@@ -291,7 +326,7 @@ def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderC
 
 
 def radius_of(rotor: Rotor) -> float:
-    """Return the radius of a rotor whose mass is limited [m]."""
+    """Return the radius of a rotor [m]; `ModelError` if it is missing."""
     if rotor.radius is None:
-        raise ModelError(f"the mass of '{rotor.name}' counts, so it needs a radius")
+        raise ModelError(f"'{rotor.name}' needs a radius, because its mass counts; add radius")
     return rotor.radius

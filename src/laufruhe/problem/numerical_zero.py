@@ -18,9 +18,9 @@ from laufruhe.problem.problem import Problem
 ROUNDING = 1e-9
 """Fraction of cancelling loads below which their sum counts as zero."""
 OF_ORDERS = 1e-12
-"""Fraction of all orders of a part below which one order counts as zero: they come from one signal."""
+"""Fraction of all orders of a part below which a single order counts as zero; all come from one signal."""
 SAMPLES = 96
-"""Number of samples over the cycle for these sizes."""
+"""Number of samples over the cycle for these estimates."""
 
 
 _SIZES: Mapping[Channel, Callable[[Engine], float]] = {
@@ -28,14 +28,14 @@ _SIZES: Mapping[Channel, Callable[[Engine], float]] = {
     TORQUE_ROLL: lambda _: 1.0,
     RAW_TORQUE_ROLL: lambda engine: torque_roll_answer(mounting_in(engine)),
 }
-"""Sizes of the parts that cancel in residuals [SI]; all other numbers have none."""
+"""Size of the terms that cancel in residuals [SI], by channel; other numbers have no numerical zero."""
 
 
 def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
-    """Return the objective that counts as zero [SI]: the rounding error of the sum over an engine's parts.
+    """Return the value of the objective that counts as zero [SI]: the rounding error of the sum over all parts.
 
-    The objective of a balanced engine gives no scale, so that of each part alone is taken. A part without a load of
-    some order still has its other orders, which cancel in that order over the cycle.
+    The objective of a balanced engine gives no scale, so the objectives of single parts are summed. If only some orders
+    count, a small fraction of all orders is added, because each order is a sum over the cycle of the complete signal.
 
     Parameters
     ----------
@@ -50,13 +50,13 @@ def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
 
 @lru_cache(maxsize=32)
 def _cached_zero(problem: Problem) -> float:
-    # mounts that damp all modes: a resonance would make a size of its own
+    # with damped mounts, because a resonance would magnify the scale
     springs = [
         mount.mapped(lambda spring: replace(spring, loss_factor=max(spring.loss_factor, 1.0)))
         for mount in problem.engine.mounts
     ]
     engine = replace(problem.engine, mounts=tuple(springs))
-    # at an even speed: the effect of one part on the speed does not count
+    # at even speed, because the effect of one part on the speed does not count
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
     total = _sum_of_parts(even)
     all_orders = replace(
@@ -83,9 +83,9 @@ def _sum_of_parts(problem: Problem) -> float:
     parts = [replace(engine, slider_cranks=(part,), rotors=()) for part in engine.slider_cranks]
     parts += [replace(engine, slider_cranks=(), rotors=(r,)) for r in engine.rotors if r.unbalance != 0.0]
     for part in parts:
-        # a part alone may drive a direction that no mount carries
+        # a single part may excite a direction that no mount carries
         with suppress(ModelError):
-            alone = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
+            single = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
             terms = (term for term in problem.load_terms if not term.measure.is_mass)
-            total += sum(term.weight * alone.value(term.measure) for term in terms)
+            total += sum(term.weight * single.value(term.measure) for term in terms)
     return total

@@ -62,12 +62,12 @@ class Intervals:
 
 @dataclass(frozen=True)
 class Candidate:
-    """Throws, firing order, banks and shafts of one design; all other open numbers stay open.
+    """Choice of throws, firing order, bank angle and shafts; other open numbers stay open.
 
     Attributes
     ----------
     throws
-        Angles [rad] (C3).
+        Angles of the throws [rad] (C3).
     firing_order
         Cylinder numbers; None lets each cylinder fire at its first dead centre.
     bank_angle, split_pin
@@ -75,7 +75,7 @@ class Candidate:
     left_out
         Names of the optional shafts that are not built.
     without_gas
-        True if gas is left out, for parts of an engine that could not run.
+        True to leave out gas, for partial engines that could not run.
     """
 
     throws: tuple[float, ...]
@@ -93,7 +93,7 @@ class ShaftChoice:
     Attributes
     ----------
     optional
-        Sets of shafts with coupled unbalances, built together or not at all.
+        Sets of shaft names with coupled unbalances; each set is built completely or not at all.
     masses
         Mass of each set without its unbalances [kg].
     maximum
@@ -101,7 +101,7 @@ class ShaftChoice:
     most_mass
         Largest mass of the shafts [kg].
     clashes
-        Groups of sets that collide if built together.
+        Groups of indices of sets that collide if all are built.
     """
 
     optional: tuple[tuple[str, ...], ...] = ()
@@ -112,18 +112,18 @@ class ShaftChoice:
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
-        """Choices of sets that satisfy the limits."""
+        """Choices of sets, as tuples of their indices, that satisfy the limits."""
         count = len(self.optional)
-        every = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
-        return tuple(built for built in every if self.allows(built))
+        choices = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
+        return tuple(built for built in choices if self.allows(built))
 
     @property
     def largest(self) -> tuple[tuple[int, ...], ...]:
-        """Maximal allowed choices; a shaft that is built may carry no unbalance."""
+        """Maximal allowed choices; smaller ones cannot be better, because a built shaft may have zero unbalance."""
         return tuple(b for b in self.allowed if not any(set(b) < set(other) for other in self.allowed))
 
     def allows(self, built: Sequence[int]) -> bool:
-        """Return True if these sets satisfy the limits of number and mass, and do not collide."""
+        """Return True if the sets with these indices satisfy the limits of number and mass and do not collide."""
         number = sum(len(self.optional[k]) for k in built)
         if any(set(clash) <= set(built) for clash in self.clashes):
             return False
@@ -132,7 +132,7 @@ class ShaftChoice:
 
 @dataclass(frozen=True, eq=False)
 class PhasingOf(Generic[P]):
-    """The open part of an engine's phasing.
+    """Open throws, firing order, bank angles and shafts of an engine, with bounds and search settings.
 
     Attributes
     ----------
@@ -193,11 +193,11 @@ class PhasingOf(Generic[P]):
         return self.layout(candidate.bank_angle, candidate.split_pin)
 
     def without(self, built: Sequence[int]) -> tuple[str, ...]:
-        """Return the optional shafts of the sets that are not built."""
+        """Return the names of optional shafts that are not built, from the indices of the built sets."""
         return tuple(name for k, names in enumerate(self.shafts.optional) if k not in built for name in names)
 
     def built(self, candidate: Candidate) -> tuple[str, ...]:
-        """Return the optional shafts of a design."""
+        """Return the names of the optional shafts that a candidate has."""
         return tuple(name for names in self.shafts.optional for name in names if name not in candidate.left_out)
 
     @property
@@ -242,16 +242,18 @@ class PhasingOf(Generic[P]):
         self, steps: Sequence[int], phases: int, geometry: tuple[float | None, float | None],
         left_out: tuple[str, ...] = (),
     ) -> Candidate:  # fmt: skip
-        """Return the design of an even star, with the first of its firing orders.
+        """Return the candidate of a star with even firing, with the first of its firing orders.
 
         Parameters
         ----------
         steps
-            Steps of the throws, `phases` to a turn.
+            Angle of each throw in steps.
+        phases
+            Number of steps in one turn.
         geometry
-            Bank angle and split pin [rad].
+            Bank angle and split pin angle [rad].
         left_out
-            Optional shafts that are not built.
+            Names of optional shafts that are not built.
         """
         layout = self.layout(*geometry)
         order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)
@@ -260,14 +262,17 @@ class PhasingOf(Generic[P]):
     def fired(
         self, slots: Sequence[int], geometry: tuple[float | None, float | None], left_out: tuple[str, ...] = ()
     ) -> Candidate:
-        """Return the design whose cylinders, each on its own throw, fire in these slots of the cycle (S6, V9)."""
+        """Return the candidate whose cylinders, each on its own throw, fire in these slots of the cycle (S6, V9)."""
         steps = slot_steps(self.cycle, slots)
         throws = star_throws(self.layout(*geometry), steps, firing_lattice(self.cycle, self.cylinders).steps)
         return Candidate(throws, slot_order(slots), *geometry, left_out)
 
     @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:
-        """Bank angles and split pins between their bounds with even firing (S6): finitely many if one is open."""
+        """Pairs of bank angle and split pin angle within their bounds that allow even firing (S6) [rad].
+
+        If both are open, three bank angles are tried: the bounds and the middle.
+        """
         if self.bank is None:
             return ((None, None),)
         split = self.split or (0.0, 0.0)
@@ -283,35 +288,35 @@ class PhasingOf(Generic[P]):
         return tuple((self.bank[0], s) for s in _multiples(step, split, self.bank[0]))
 
 
-def _multiples(step: float, bounds: tuple[float, float], other: float) -> list[float]:
+def _multiples(step: float, bounds: tuple[float, float], offset: float) -> list[float]:
     # values between bounds whose sums with `other` are multiples of a step
-    low = math.ceil((bounds[0] + other) / step - 1e-9)
-    high = math.floor((bounds[1] + other) / step + 1e-9)
-    return [m * step - other for m in range(low, high + 1)]
+    low = math.ceil((bounds[0] + offset) / step - 1e-9)
+    high = math.floor((bounds[1] + offset) / step + 1e-9)
+    return [m * step - offset for m in range(low, high + 1)]
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
-    """Return throws within their bounds [rad]: the middle, then the even stars closest to the bounds.
+    """Return start stars within the bounds of the throws [rad]: the middle, then the nearest evenly firing stars.
 
-    Many cylinders without a firing order have too many even stars, so the middle is returned alone.
+    For more than seven cylinders without a firing order, only the middle is returned.
     """
     bounds = phasing.throw_bounds or ()
     if phasing.firing_order is not None:
         orders = [phasing.firing_order]
     elif phasing.cylinders <= _MOST_PERMUTED:
-        orders = [(1, *rest) for rest in itertools.permutations(range(2, phasing.cylinders + 1))]
+        orders = [(1, *others) for others in itertools.permutations(range(2, phasing.cylinders + 1))]
     else:
         orders = []
     moves: dict[tuple[float, ...], float] = {}
     for order in orders:
         try:
-            even = even_throws(phasing.cycle, layout, order)
+            throws = even_throws(phasing.cycle, layout, order)
         except ModelError:
             continue
-        inside = tuple(
+        bounded = tuple(
             min(max(angle + math.tau * round((0.5 * (low + high) - angle) / math.tau), low), high)
-            for angle, (low, high) in zip(even, bounds, strict=True)
+            for angle, (low, high) in zip(throws, bounds, strict=True)
         )
-        moves[inside] = sum(1.0 - math.cos(a - b) for a, b in zip(inside, even, strict=True))
+        moves[bounded] = sum(1.0 - math.cos(a - b) for a, b in zip(bounded, throws, strict=True))
     middle = tuple(0.5 * (low + high) for low, high in bounds)
     return [middle, *sorted(moves, key=lambda star: round(moves[star], 12))[:_EVEN_STARS]]

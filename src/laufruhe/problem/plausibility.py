@@ -1,4 +1,4 @@
-"""Plausibility warnings about numbers that no usual engine has: a decimal point or a unit may be wrong."""
+"""Plausibility warnings about unusual numbers, which may have a wrong unit or decimal point."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from laufruhe.units import quantity_text
 FASTEST = 30.0
 """Mean piston speed [m/s]; racing engines reach 26."""
 LIGHTEST, HEAVIEST = 150.0, 20_000.0
-"""Reciprocating mass over the volume that a piston sweeps [kg/m^3], about 700 to 4000 in engines that were built."""
+"""Usual range of reciprocating mass over swept volume [kg/m^3]; engines that were built have about 700 to 4000."""
 SHORTEST_ROD = 0.45
-"""Crank radius over rod length."""
+"""Largest usual ratio of crank radius to rod length."""
 FLATTEST, LONGEST = 0.25, 5.0
-"""Stroke over bore."""
+"""Usual range of stroke over bore."""
 MOST_UNBALANCE = 20.0
-"""Of one weight, over that of all pistons and pins at their crank radius."""
+"""Largest usual unbalance of one rotor over that of all pistons and pins at their crank radius."""
 _PAIR = 2
 """Cylinders that may fire within one turn of two: twins with throws at 180 degrees do."""
 MOST_SAG, LEAST_SAG = 0.1, 1e-6
-"""Of a block on its mounts [m]: soft mounts give about 10 mm."""
+"""Usual range of the static sag of a block on its mounts [m]; soft mounts sag about 10 mm."""
 
 
 def plausibility_warnings(
@@ -59,7 +59,7 @@ def _of_speed(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Comp
     for point in points:
         speed = 2.0 * longest * point.speed / math.pi
         if speed > FASTEST:
-            rule = f"makes a mean piston speed of {speed:.4g} m/s, and racing engines reach 26 m/s"
+            rule = f"gives a mean piston speed of {speed:.4g} m/s; racing engines reach 26 m/s"
             yield Complaint(f"operating point {point.name}", "", rule, "check speed and stroke")
 
 
@@ -83,10 +83,10 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_rotors(engine: Engine) -> Iterator[Complaint]:
-    whole = sum((p.reciprocating_mass + p.rotating_mass) * p.crank_radius for p in engine.slider_cranks)
+    total = sum((p.reciprocating_mass + p.rotating_mass) * p.crank_radius for p in engine.slider_cranks)
     for rotor in engine.rotors:
-        if abs(rotor.unbalance) > MOST_UNBALANCE * whole > 0.0:
-            rule = f"is {abs(rotor.unbalance) / whole:.3g} times that of all pistons and pins at their crank radius"
+        if abs(rotor.unbalance) > MOST_UNBALANCE * total > 0.0:
+            rule = f"is {abs(rotor.unbalance) / total:.3g} times that of all pistons and pins at their crank radius"
             yield Complaint(
                 f"unbalance of {rotor.name}", quantity_text(abs(rotor.unbalance), "kg m"), rule, "check its unit"
             )

@@ -28,7 +28,19 @@ Path: TypeAlias = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Drawing:
-    """Parts of a problem that follow from numbers of its file."""
+    """Parts of a problem that depend on the numbers of its file.
+
+    Attributes
+    ----------
+    engine
+        Design with open numbers at their start.
+    points
+        Operating points.
+    decisions
+        Open numbers.
+    mount_numbers
+        Fourteen numbers of each elastic spring (E13).
+    """
 
     engine: Engine
     points: tuple[OperatingPoint, ...]
@@ -37,12 +49,12 @@ class Drawing:
 
 
 Rebuild: TypeAlias = Callable[[Mapping[Path, str | float]], Drawing]
-"""Return the drawing of a problem file with other numbers at some addresses."""
+"""Function that returns the drawing of a problem file with other numbers at some addresses."""
 
 
 def no_file(changes: Mapping[Path, str | float]) -> Drawing:
-    """Refuse to draw a problem that was not read from a file."""
-    raise ModelError(f"{', '.join(map(str, changes))} is a number of a problem file, and there is none")
+    """Raise `ModelError`: the problem was not read from a file."""
+    raise ModelError(f"{', '.join(map(str, changes))} needs a problem file, and this problem was made in code")
 
 
 def _with_changes(
@@ -52,7 +64,7 @@ def _with_changes(
 
 
 class Extra:
-    """Request of an extension beyond the drawing: the core evaluates the drawing, a reduction decides the rest.
+    """Additional part of a problem that an extension reads and decides; the core evaluates the other parts.
 
     Attributes
     ----------
@@ -64,11 +76,11 @@ class Extra:
 
     @property
     def open_names(self) -> tuple[str, ...]:
-        """Names of the numbers that it decides."""
+        """Names of the open numbers that the extension decides."""
         return ()
 
     def objective_name(self, name: str) -> str:
-        """Return the name of the objective, given that of the drawing."""
+        """Return the name of the objective with this extension, from its name without."""
         return name
 
 
@@ -77,14 +89,14 @@ E = TypeVar("E", bound=Extra)
 
 @dataclass(frozen=True)
 class Search:
-    """Settings of searches where a problem is not convex.
+    """Settings of searches for problems that are not convex.
 
     Attributes
     ----------
     starts, seed
         Largest number of start points, and seed of random ones.
     boxes
-        Largest number of boxes of a proof; None lets the method choose.
+        Largest number of boxes in branch and bound; None lets the method choose.
     proves
         True if the result is to be proven.
     """
@@ -108,8 +120,8 @@ class Origin:
     tables, path
         Tables as they were read, and path of the file.
     edited
-        Function of this, an edit ("with_values", "open_number" or "fix_number") and its arguments, which returns the
-        new problem.
+        Function of this origin, the name of an edit ("with_values", "open_number" or "fix_number") and its arguments;
+        it returns the new problem.
     """
 
     tables: Mapping[str, Any]
@@ -119,12 +131,14 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class KnownRows:
-    """Rows of a measure that is the largest length of constant + slope x, with x the columns that loads are affine in.
+    """Rows of a measure in time: its value is the largest length of constant + slope x.
 
     Attributes
     ----------
-    constant, slope
-        Shapes (k, d) and (k, d, n).
+    constant
+        Rows at x = 0, shape (k, d).
+    slope
+        Derivatives by the columns x of the decisions that loads are affine in, shape (k, d, n).
     """
 
     constant: NDArray[np.float64]
@@ -166,7 +180,7 @@ class Problem:
     origin
         File of the problem; None if it was made or changed in code.
     sharply
-        True if a gap within the tolerance is closed further at little cost (P10).
+        True to close a gap within the tolerance further at little cost (P10).
     ranks
         Objectives in order of priority, the first equal to `objective`; empty for a single objective.
     fires_together
@@ -214,7 +228,7 @@ class Problem:
         engine = self.engine
         numbers = {"mount": engine.mounts, "operating point": self.points, "limit": self.limits}
         parts = [self.name, counted(len(engine.cylinders), "cylinder"), str(engine.cycle)]
-        parts += [counted(len(each), name) for name, each in numbers.items()]
+        parts += [counted(len(parts_of_kind), name) for name, parts_of_kind in numbers.items()]
         return ", ".join(parts) + "; open: " + (", ".join(self.open_names) or "nothing")
 
     @property
@@ -226,7 +240,7 @@ class Problem:
 
     def extra(self, kind: type[E]) -> E | None:
         """Return the request of a class, or None."""
-        return next((one for one in self.extras if isinstance(one, kind)), None)
+        return next((extra for extra in self.extras if isinstance(extra, kind)), None)
 
     @property
     def drawing(self) -> Problem:
@@ -240,7 +254,7 @@ class Problem:
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:
-        """Decisions that loads are affine in."""
+        """Decisions in which all loads are affine."""
         return tuple(decision for decision in self.decisions if decision.is_affine)
 
     @property
@@ -300,12 +314,12 @@ class Problem:
 
     @property
     def depends_on_gas(self) -> bool:
-        """True if gas affects a measure; gas gives a roll moment only, but everything at an uneven speed."""
+        """True if gas affects a measure: by the roll moment, or at an uneven speed by all loads."""
         return self.has_gas and (any(measure.depends_on_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
     def depends_on_firing_order(self) -> bool:
-        """True if a measure depends on the firing order of one star: twist, and loads inside the crankcase with gas."""
+        """True if a measure depends on the firing order of a star: torsion, and loads inside the crankcase with gas."""
         if any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]
@@ -363,11 +377,11 @@ class Problem:
 
     def _edited(self, edit: str, *arguments: Any) -> Problem:
         if self.origin is None:
-            raise ModelError(f"{self.name} was made or changed in code; change numbers of what was loaded, before that")
+            raise ModelError(f"{self.name} was made or changed in code; edit numbers right after loading its file")
         return self.origin.edited(self.origin, edit, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
-        """Return the problem with other attributes, for every design of an open star too."""
+        """Return the problem with other attributes, also in the problems of its candidates if stars are open."""
         changes = {"origin": None, **changes}
         if self.phasing is not None:
             realise = self.phasing.realise
@@ -382,25 +396,25 @@ class Problem:
     def fixed_at(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
         """Return the problem with decisions fixed at these values; by default all decisions.
 
-        For a number of the file, the engine, its operating points and the drives of other decisions are built again.
+        If one is a number of the file, engine, operating points and drives of other decisions are built again.
 
         Raises
         ------
         ModelError
-            If there is no such engine.
+            If the engine cannot be built with these values.
         """
-        held = self.decisions if decisions is None else tuple(decisions)
-        value_of = {decision.name: value for decision, value in zip(held, values, strict=True)}
-        drawn = self._drawn({v.path: v.written(value_of[d.name]) for d in held for v in d.address_drives})
-        if drawn is not self:
-            known = {decision.name: decision for decision in drawn.decisions}
-            held = tuple(known[decision.name] for decision in held)
-        moved = [decision for decision in held if not decision.address_drives]
-        numbers = drawn.numbers([value_of[decision.name] for decision in moved], moved)
+        fixed = self.decisions if decisions is None else tuple(decisions)
+        value_of = {decision.name: value for decision, value in zip(fixed, values, strict=True)}
+        redrawn = self._drawn({v.path: v.written(value_of[d.name]) for d in fixed for v in d.address_drives})
+        if redrawn is not self:
+            by_name = {decision.name: decision for decision in redrawn.decisions}
+            fixed = tuple(by_name[decision.name] for decision in fixed)
+        direct = [decision for decision in fixed if not decision.address_drives]
+        numbers = redrawn.numbers([value_of[decision.name] for decision in direct], direct)
         rows = tuple(tuple(map(float, row)) for row in numbers.mounts)
         return replace(
-            drawn, engine=numbers.engine(drawn.engine), mount_numbers=rows or drawn.mount_numbers,
-            decisions=tuple(decision for decision in drawn.decisions if decision.name not in value_of),
+            redrawn, engine=numbers.engine(redrawn.engine), mount_numbers=rows or redrawn.mount_numbers,
+            decisions=tuple(decision for decision in redrawn.decisions if decision.name not in value_of),
         )  # fmt: skip
 
     def _drawn(self, changes: Mapping[Path, str | float]) -> Problem:
@@ -408,15 +422,17 @@ class Problem:
         if not changes:
             return self
         drawing = self.rebuild(changes)
-        known = {decision.name: decision for decision in drawing.decisions}
+        by_name = {decision.name: decision for decision in drawing.decisions}
         for decision in self.decisions:
-            if not decision.address_drives and decision.name not in known:
-                raise ModelError(f"{decision.name} is open, and nothing of this engine follows it")
+            if not decision.address_drives and decision.name not in by_name:
+                raise ModelError(f"{decision.name} is open but has no effect in this engine; fix it")
         if len(drawing.points) != len(self.points):
-            raise ModelError("another number of operating points follows from an open number; fix it")
-        # measures know operating points by name, and a name may be the speed that is open
-        points = tuple(replace(new, name=own.name) for new, own in zip(drawing.points, self.points, strict=True))
-        decisions = tuple(d if d.address_drives else replace(known[d.name], set=d.set) for d in self.decisions)
+            raise ModelError("an open number changes the number of operating points; fix it")
+        # measures refer to operating points by name, and a name may contain an open speed
+        points = tuple(
+            replace(point, name=previous.name) for point, previous in zip(drawing.points, self.points, strict=True)
+        )
+        decisions = tuple(d if d.address_drives else replace(by_name[d.name], set=d.set) for d in self.decisions)
         return replace(
             self, engine=drawing.engine, points=points, mount_numbers=drawing.mount_numbers, decisions=decisions,
             rebuild=partial(_with_changes, self.rebuild, changes),
@@ -424,17 +440,17 @@ class Problem:
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
         """Return the engine with decisions at these values; by default all decisions."""
-        moved = self.decisions if decisions is None else decisions
-        if any(decision.address_drives for decision in moved):
-            return self.fixed_at(values, moved).engine
-        return self.numbers(values, moved).engine(self.engine)
+        chosen = self.decisions if decisions is None else decisions
+        if any(decision.address_drives for decision in chosen):
+            return self.fixed_at(values, chosen).engine
+        return self.numbers(values, chosen).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
-        """Return the numbers of the engine with decisions at these values, which may be symbols."""
-        moved = self.decisions if decisions is None else decisions
-        on_mounts = any(decision.mount_drives for decision in moved)
-        start = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
-        return apply_decisions(start, moved, values)
+        """Return the numbers of the engine with decisions at these values; symbols of a smooth program are allowed."""
+        chosen = self.decisions if decisions is None else decisions
+        on_mounts = any(decision.mount_drives for decision in chosen)
+        numbers = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
+        return apply_decisions(numbers, chosen, values)
 
 
 def _check_name(name: object) -> None:

@@ -34,7 +34,7 @@ class Interval:
         return max(abs(self.lower), abs(self.upper)) or 1.0
 
     def scaled(self, factor: float) -> Interval:
-        """Return the set in a unit of another size."""
+        """Return the set with all sizes multiplied by a factor."""
         return replace(self, lower=self.lower * factor, upper=self.upper * factor)
 
     def within(self, size: float) -> Interval:
@@ -43,7 +43,7 @@ class Interval:
 
     @property
     def angles(self) -> tuple[float, float]:
-        """Bounds of the angle [rad], which are equal."""
+        """Lower and upper bound of the angle [rad], equal for an interval."""
         return self.angle, self.angle
 
     @property
@@ -56,19 +56,19 @@ class Interval:
         return (u * self.directions[0].conjugate()).real, self.angle
 
     def minimum(self, g: Array) -> float:
-        """Return min g . x over the set."""
+        """Return min g . x over the points x of the set, for g of shape (1,)."""
         return float(min(g[0] * self.lower, g[0] * self.upper))
 
     def project(self, v: Array) -> Array:
-        """Return the nearest point of the set."""
+        """Return the point of the set nearest to v, shape (1,)."""
         return np.clip(v, self.lower, self.upper)
 
     def margins(self, _: Array) -> tuple[float, ...]:
-        """Return relative distances from edges that are no bounds of a column: none."""
+        """Return relative distances to edges that are not bounds of one column: none for an interval."""
         return ()
 
     def inside(self, v: Array) -> Array:
-        """Return the directions in which a point of the set is not on a bound, shape (1, m)."""
+        """Return the directions in which a point of the set can move both ways, shape (1, m), m = 0 on a bound."""
         x = float(v[0])
         on_bound = any(abs(x - bound) <= EDGE * max(abs(x), abs(bound)) for bound in (self.lower, self.upper))
         return np.eye(1, int(not on_bound))
@@ -90,7 +90,7 @@ class Sector:
         return self.upper or 1.0
 
     def scaled(self, factor: float) -> Sector:
-        """Return the set in a unit of another size."""
+        """Return the set with all sizes multiplied by a factor."""
         return replace(self, upper=self.upper * factor)
 
     def within(self, size: float) -> Sector:
@@ -111,38 +111,41 @@ class Sector:
         return np.array([[np.cos(low), np.sin(low)], [np.cos(high), np.sin(high)]])
 
     def split(self, u: Value) -> tuple[float, float]:
-        """Return the size and angle [rad] of a value, the angle at most a turn over the lower bound."""
+        """Return the size and angle [rad] of a value, the angle within one turn above its lower bound."""
         low = self.angles[0]
         return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
 
     def minimum(self, g: Array) -> float:
-        """Return min g . x over the set: the negative support function of -g (P4)."""
+        """Return min g . x over the points x of the set, for g of shape (2,): minus the support function of -g (P4)."""
         if self._inside_cone(-g):
             return -self.upper * float(np.hypot(*g))
         return min(0.0, self.upper * float((self.edges @ g).min()))
 
     def project(self, v: Array) -> Array:
-        """Return the nearest point of the set."""
+        """Return the point of the set nearest to v, shape (2,)."""
         if not self._inside_cone(v):
-            along = np.maximum(self.edges @ v, 0.0)
-            best = int(np.argmax(along))
-            v = along[best] * self.edges[best]
+            components = np.maximum(self.edges @ v, 0.0)
+            best = int(np.argmax(components))
+            v = components[best] * self.edges[best]
         size = float(np.hypot(*v))
         return v * (self.upper / size) if size > self.upper else v
 
     def margins(self, v: Array) -> tuple[float, ...]:
-        """Return relative distances of a point from the arc, and from the sides if they enclose under half a turn."""
+        """Return relative distances of a point from the arc and from the two sides, negative outside.
+
+        A disc has no sides.
+        """
         arc = 0.5 * (1.0 - float(v @ v) / self.scale**2)
         sides = zip(self.edges, (1.0, -1.0), strict=False)
         return arc, *(sense * float(a * v[1] - b * v[0]) / self.scale for (a, b), sense in sides)
 
     def inside(self, v: Array) -> Array:
-        """Return the directions in which a point of the set is not on a bound, shape (2, m)."""
+        """Return the directions in which a point of the set can move both ways, shape (2, m), m = 0 ... 2."""
         size = float(np.hypot(*v))
         if size >= self.upper * (1.0 - EDGE):
             return np.zeros((2, 0))
-        along = [edge[:, None] for edge in self.edges if abs(edge[0] * v[1] - edge[1] * v[0]) <= EDGE * size]
-        return along[0] if along else np.eye(2)
+        edge_directions = [edge[:, None] for edge in self.edges if abs(edge[0] * v[1] - edge[1] * v[0]) <= EDGE * size]
+        return edge_directions[0] if edge_directions else np.eye(2)
 
     def _inside_cone(self, v: Array) -> bool:
         if self.free_angle:

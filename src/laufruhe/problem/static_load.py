@@ -1,4 +1,4 @@
-"""Static part of an objective: the steady reaction to mean loads, which no unbalance can balance (M7)."""
+"""Static part of an objective: the reaction to mean loads, which no unbalance can balance (M7)."""
 
 from __future__ import annotations
 
@@ -13,16 +13,17 @@ NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True)
 class StaticPart:
-    """Objectives of whole loads, of their means alone, and of the loads without their means.
+    """Objective for complete loads, for their means alone, and for the loads without their means.
 
     Attributes
     ----------
     whole
-        Objective of the whole loads [SI].
+        Objective for the complete loads [SI].
     static
-        Objective of the means over the cycle [SI]; no part of a sum, since lengths do not add up.
+        Objective for the means over the cycle [SI]. With `alternating` it does not sum to `whole`, because norms do
+        not add.
     alternating
-        Objective of the loads without their means [SI].
+        Objective for the loads without their means [SI].
     """
 
     whole: float
@@ -31,17 +32,17 @@ class StaticPart:
 
     @property
     def is_floor(self) -> bool:
-        """True if the objective equals its lower bound, the static part: a norm is at least that of the mean."""
+        """True if the objective equals the static part, which is a lower bound of it."""
         return self.whole <= self.static * (1.0 + NEGLIGIBLE)
 
 
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
-    """Return the static part of loads on the block and its mounts in the objective, or None where it is negligible."""
-    whole = with_mean_loads(problem)
-    counted = [term for term in whole.objective if term.measure.includes_mean and not term.measure.is_inside]
+    """Return the static part of the objective for loads on block and mounts, or None if it is negligible."""
+    with_means = with_mean_loads(problem)
+    counted = [term for term in with_means.objective if term.measure.includes_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
         return None
-    value = objective_value(whole, evaluation)
+    value = objective_value(with_means, evaluation)
     static = sum(term.weight * evaluation.value(replace(term.measure, orders=(0.0,))) for term in counted)
     if not static > NEGLIGIBLE * value:
         return None
@@ -49,19 +50,19 @@ def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
 
 
 def with_alternating_loads(problem: Problem) -> Problem:
-    """Return the problem with an objective that leaves out the mean of every load."""
+    """Return the problem with an objective without the means of loads."""
     return _with_loads(problem, True)
 
 
 def with_mean_loads(problem: Problem) -> Problem:
-    """Return the problem with an objective that keeps the mean of every load."""
+    """Return the problem with an objective that includes the means of loads."""
     return _with_loads(problem, False)
 
 
 def _with_loads(problem: Problem, alternating: bool) -> Problem:
     terms = []
     for term in problem.objective:
-        whole = replace(term.measure, alternating=False)
-        may = whole.includes_mean and "alternating" in whole.channel.keys
-        terms.append(replace(term, measure=replace(whole, alternating=alternating and may)))
+        measure = replace(term.measure, alternating=False)
+        is_alternating = measure.includes_mean and "alternating" in measure.channel.keys
+        terms.append(replace(term, measure=replace(measure, alternating=alternating and is_alternating)))
     return replace(problem, objective=tuple(terms))

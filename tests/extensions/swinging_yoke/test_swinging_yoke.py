@@ -179,9 +179,9 @@ speed = "90 rpm"
         ('drive = "swinging-yoke"', "rod_ratio = 0.2", "means nothing with drive 'slider-crank'"),
         ('stroke = "400 mm"', 'stroke = "400 mm"\nrod_ratio = 0.2', "means nothing with drive 'swinging-yoke'"),
         ('stroke = "400 mm"', 'stroke = "400 mm"\nlever_weight = "5 kg"', "engine.lever_weight_radius"),
-        ('layout = "inline"', 'layout = "radial"\nknuckle_radius = "0 mm"', "no rod that could carry the others"),
+        ('layout = "inline"', 'layout = "radial"\nknuckle_radius = "0 mm"', "this layout needs a master rod"),
         ('drive = "swinging-yoke"', 'drive = "scotch yoke"', "engine.drive"),
-        ("[[operating", '[[counterweights]]\nname = "web"\nbalance_factor = 0.5\n[[operating', "does not move as one"),
+        ("[[operating", '[[counterweights]]\nname = "web"\nbalance_factor = 0.5\n[[operating', "needs pistons on crank pins"),
     ],
 )  # fmt: skip
 def test_files_that_contradict_themselves(old: str, new: str, said: str) -> None:

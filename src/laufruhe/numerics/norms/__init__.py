@@ -1,4 +1,4 @@
-"""Norms of signals, one a file; a problem file names them as this table does."""
+"""Norms of signals, one class in each file, and their table by the names in problem files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""max_k |v_k|: the peak over the cycle, over mounts and operating points."""
+"""Maximum norm, max_k |v_k|: the peak over the cycle, over places and operating points."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Maximum(Norm):
         return float(lengths(rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return v_k / |v_k| of the longest row alone."""
+        """Return v_k / |v_k| for the longest row and zero for all others."""
         size, z = lengths(rows), np.zeros_like(rows)
         k = int(np.argmax(size)) if len(size) else 0
         if len(size) and size[k] > 0.0:
@@ -46,7 +46,7 @@ class Maximum(Norm):
         return z
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return rows as long as the longest, and those that the given dual rows use."""
+        """Return Z as base, and the rows that are as long as the longest or in use in Z."""
         size, shares = lengths(rows), lengths(z)
         counts = (size >= (1.0 - LONGEST_TOL) * size.max(initial=0.0)) | (shares > DUAL_TOL * shares.sum())
         return Subdifferential(z, np.flatnonzero(counts & (size > 0.0)))
@@ -56,11 +56,11 @@ class Maximum(Norm):
         return float(lengths(z).sum())
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return the solver's rows: one row is too little where several are as long."""
+        """Return Z: the longest row alone gives a poor bound where several rows are as long."""
         return z
 
     def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Return the rows in place, with zeros at the angles between."""
+        """Return the dual rows at their angles, with zeros at the angles between."""
         return in_place(z, steps, times)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
@@ -73,7 +73,7 @@ class Maximum(Norm):
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return a variable that no softened row exceeds (E22)."""
+        """Return an epigraph variable, with the constraint that no softened row exceeds it (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)
@@ -83,33 +83,35 @@ class Maximum(Norm):
     def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Limit the squares, which are smooth at zero."""
+        """Return squared lengths, shape (k, 1), which are smooth at zero, and the limit maximum^2."""
         import casadi as ca
 
         return ca.sum2(rows * rows), maximum * maximum, 2.0 * maximum
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Bound by the sum of the orders' amplitudes."""
-        used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
-        return max((float(amplitudes(signal).max(initial=0.0)) for signal in used), default=0.0)
+        """Return the largest sum of the amplitudes of all orders at one place."""
+        counted = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
+        return max((float(amplitudes(signal).max(initial=0.0)) for signal in counted), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compare all shifts of the samples, and add what curvature hides between them."""
+        """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
         coarse = steps * self.refinement
-        times, errors, bends = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
+        times, errors, curvatures = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
         for signal, share in zip(signals, shares, strict=True):
             if share > 0.0:
                 size, step = fine_lengths(signal, coarse, times)
-                bends.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
-                bent = lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0)
+                curvatures.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
+                kink_lengths = lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0)
                 maximum, minimum = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
-                errors.append(float((np.maximum(maximum, bent) - np.maximum(minimum, bent)).max(initial=0.0)))
-        return max(errors) + max(bends)
+                errors.append(
+                    float((np.maximum(maximum, kink_lengths) - np.maximum(minimum, kink_lengths)).max(initial=0.0))
+                )
+        return max(errors) + max(curvatures)
 
 
 def in_place(z: Array, steps: int, times: int) -> Array:
     """Return dual rows on a finer grid, with zeros at the angles between."""
     blocks = z.reshape(-1, steps, z.shape[-1])
-    out = np.zeros((len(blocks), steps * times, z.shape[-1]))
-    out[:, ::times] = blocks
-    return out.reshape(-1, z.shape[-1])
+    placed = np.zeros((len(blocks), steps * times, z.shape[-1]))
+    placed[:, ::times] = blocks
+    return placed.reshape(-1, z.shape[-1])

@@ -1,4 +1,4 @@
-"""sum_k w_k |v_k|: a mean where the weights add up to one, a sum of masses where they are one."""
+"""Weighted sum of row lengths, sum_k w_k |v_k|: a mean over the cycle, or a sum of masses with weights of one."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ from laufruhe.numerics.norms.norm import (
 from laufruhe.numerics.spectrum import Spectrum
 
 SHORT = 1e-6
-"""Share of the longest row that a second derivative takes the shortest for."""
-LEAST = 1e-9
-"""Share of the longest row that a majorant takes the shortest for."""
+"""Smallest row length in a second derivative, as a fraction of the longest row."""
+MAJORANT_FLOOR = 1e-9
+"""Smallest row length in a majorant, as a fraction of the longest row."""
 
 
 class Mean(Norm):
@@ -48,70 +48,70 @@ class Mean(Norm):
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
 
     def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
-        """Return w_k / |v_k|, with a short row in place of a zero one."""
+        """Return w_k / |v_k|, with the length of a zero row replaced by a small one."""
         size = lengths(rows)
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return rows along the design's own, free where they vanish."""
+        """Return w_k v_k / |v_k| as base, and the rows that vanish."""
         size = lengths(rows)
         vanishing = size <= ZERO_TOL * float(size.max(initial=0.0))
         base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
         return Subdifferential(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return max_k |z_k| / w_k; infinite where a weightless row is used."""
+        """Return max_k |z_k| / w_k; infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
         return float((size / np.where(weights > 0.0, weights, 1.0)).max(initial=0.0))
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """Shorten rows that are too long."""
+        """Return Z with every row shortened to at most its weight."""
         size, weights = lengths(z), grid.weights
         shrink = np.divide(weights, size, out=np.ones(len(size)), where=size > weights)
         return np.asarray(z * shrink[:, None])
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return the design's directions, the solver's only where a row vanishes."""
+        """Return the subgradient at the design, and the solver's Z where a row vanishes."""
         size = lengths(rows)
         small = size <= 1e-6 * float(size.max(initial=0.0))
         return np.where(small[:, None], z, self.subgradient(grid, rows))
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Return lengths times weights."""
+        """Return the weighted sum of lengths."""
         return np.asarray(np.dot(lengths, weights))
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
-        """Return |v| <= (|v|^2 / c + c) / 2 for every row."""
-        size = np.maximum(lengths, LEAST * float(lengths.max(initial=0.0)) or 1.0)
+        """Return the sum of |v| <= (|v|^2 / c + c) / 2 over all rows, c the given length of each."""
+        size = np.maximum(lengths, MAJORANT_FLOOR * float(lengths.max(initial=0.0)) or 1.0)
         return grid.weights / size, 0.5 * float(grid.weights @ size)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return a head for each row."""
+        """Return one cone with a head of its own for each row."""
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return the softened lengths."""
+        """Return the weighted sum of softened lengths."""
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Bound by the root mean square of the same place."""
+        """Return the root mean square of each place, averaged over places and points."""
         squares = np.array([mean_square(signal) for signal in signals])
         return float(shares @ np.sqrt(squares).mean(axis=1))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compare all shifts of the samples, and add what curvature hides between them."""
+        """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
         times, total = max(2, math.ceil(finest / steps)), 0.0
         for signal, share in zip(signals, shares, strict=True):
             if share == 0.0:
                 continue
             size, step = fine_lengths(signal, steps, times)
             shifted = fine_lengths(signal.series, steps, times)[0].mean(axis=(0, 2))
-            # what a step across a jump sees of it is one side
-            bend = float((step**2 / 8.0 * curvature(signal)[1] + step * jumped(signal)).mean())
-            total += share * (float(np.abs(shifted - size.mean()).max()) + bend)
+            # a step across a jump sees one side of it only
+            hidden = float((step**2 / 8.0 * curvature(signal)[1] + step * jumped(signal)).mean())
+            total += share * (float(np.abs(shifted - size.mean()).max()) + hidden)
         return float(total)

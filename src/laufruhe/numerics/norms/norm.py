@@ -1,10 +1,8 @@
 """Base class of norms of signals (P1-P3).
 
-Mean, peak and root mean square of a force over angle, mounts and operating points are
-norms of the same kind: a norm over rows of the length of each row. So is a sum of masses
-of unbalances. A class in a file of its own says how such a norm is computed, bounded,
-stated as cones, made smooth, and how far samples can be off. Nothing else in the project
-asks which norm it has before it.
+A norm maps rows v_k, the vectors of a signal at sampled angles and places, to one number. Each norm has a class in a
+file of its own: its value, dual norm, cones, smooth form and sampling error. Callers use these methods and never test
+which norm they have.
 """
 
 from __future__ import annotations
@@ -32,14 +30,13 @@ class Grid:
     Attributes
     ----------
     weights
-        w_k, shape (k,).
+        Weight w_k of each row, shape (k,).
     steps
-        Rows of one signal; rows come in groups of as many.
+        Number of rows of each signal; the rows of one signal are consecutive.
     kinks
-        The last rows of every signal, at angles where it bends; those before follow each other at equal steps of its
-        period.
+        Number of rows at kinks, the last ones of each signal. The rows before them are samples at equal steps.
     points
-        Operating points, each with as many rows, one behind the other.
+        Number of operating points. All have the same number of rows, and the rows of one point are consecutive.
     """
 
     weights: Array
@@ -49,26 +46,26 @@ class Grid:
 
 
 LONGEST_TOL, ZERO_TOL, DUAL_TOL = 1e-5, 1e-6, 1e-4
-"""Shares of the longest row that a row may lack and be as long, and up to which it is none; share of all dual rows
-from which one counts."""
+"""Relative tolerances: rows as long as the longest; rows that count as zero; dual rows that are in use."""
 MOST_KINKS = 64
-"""Dual rows of which a mixture is told."""
+"""Largest number of dual rows of which mixtures are formed."""
 
 
 @dataclass(frozen=True, eq=False)
 class Subdifferential:
-    """Dual rows that touch a norm at a design (P19).
+    """Subdifferential of a norm at the rows of a design: the set of its dual rows Z (P19).
 
     Attributes
     ----------
     base
-        One of them, shape (k, d).
+        One subgradient Z, shape (k, d).
     longest
-        Rows of which each alone, along itself, would do in its place; none where the base is needed.
+        Indices of the longest rows. A unit vector along each one alone is a subgradient too; empty if the base is the
+        only choice.
     vanishing
-        Rows that are zero: anything no longer than their weight may be added.
+        Indices of zero rows. Any vector not longer than the weight of the row may be added to the base there.
     others
-        Further dual rows of the shape of the base; any mixture of these and the base would do.
+        Further subgradients, shape (k, d) each; every convex combination of these and the base is one.
     """
 
     base: Array
@@ -79,24 +76,27 @@ class Subdifferential:
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """Norm as the least linear function of heads t_c >= |rows of cone c| (P1).
+    """Norm as a second-order cone program: the minimum of value . t over epigraph variables t ("heads") (P1).
+
+    Cone c requires t[head[c]] >= |factors * rows of cone c|.
 
     Attributes
     ----------
     value
-        The norm is value . heads, shape (heads,).
+        Coefficients of the heads in the norm, shape (heads,).
     head
-        Of each cone the head that is over it, shape (cones,).
+        Index of the head of each cone, shape (cones,).
     factors
-        What each row is multiplied by inside its cone, shape (k,).
+        Factor of each row inside its cone, shape (k,).
     is_single
-        Whether one cone holds all rows; else each row has its own.
+        True if one cone contains all rows; otherwise each row has its own cone.
     centred
-        Whether the rows of every signal are counted from a vector that is free.
+        True if a free vector is subtracted from all rows of a signal.
     linear_rows
-        Linear functions of the heads that are at most zero: their numbers, heads and factors, shapes (n,).
+        Linear constraints on heads as sparse triplets: constraint number, head, factor, shapes (n,). Each sum is at
+        most zero.
     squares
-        Heads a, b, c with t_a^2 <= t_b t_c, shapes (n,): rotated cones of heads alone.
+        Indices of heads a, b, c with t_a^2 <= t_b t_c, shapes (n,): rotated cones.
     """
 
     value: Array
@@ -109,13 +109,13 @@ class Cones:
 
 
 class EpigraphProgram(Protocol):
-    """Program that a smooth form adds variables and constraints to (N3, E22)."""
+    """Nonlinear program to which the smooth form of a norm adds variables and constraints (N3, E22)."""
 
     def head(self, value: Any) -> Any:
-        """Return a nonnegative variable that starts at `value`."""
+        """Return a new nonnegative epigraph variable that starts at `value`."""
 
     def free(self, value: Any) -> Any:
-        """Return a row of variables without bounds."""
+        """Return new variables without bounds that start at `value`, in its shape."""
 
     def hold(self, expression: Any) -> None:
         """Constrain every entry to be at most zero."""
@@ -132,34 +132,34 @@ def norm_instance(kind: type[Norm]) -> Norm:
 class Norm(ABC):
     """Norm of rows v_k, shape (k, d), on a grid.
 
-    A class claims what it is; a fact that it does not claim is used by no method and by no bound. One that claims
-    nothing needs `value`, `above` and `sampling_bound` alone.
+    The flags state properties that methods and bounds may use; all are False by default. A class without flags needs
+    `value`, `upper_bound` and `sampling_bound` only.
 
     Attributes
     ----------
     name
-        As a problem file and a report say it.
+        Name in problem files and reports.
     refinement
-        Times as many samples, among which the value of a result is sought (M6).
+        Factor on the number of samples when the value of a result is computed (M6).
     averages
-        Whether rows may be averages about their angles, which bound the whole cycle (P7).
+        True if the norm of rows averaged about their angles is a lower bound of the norm over the cycle (P7).
     is_euclidean
-        Whether nothing but the sum of weighted squares of all rows matters (S12).
+        True if it depends only on the weighted sum of squares of all rows (S12).
     sums_lengths
-        Whether the norm is linear in the lengths of the rows.
+        True if it is linear in the lengths of the rows.
     is_largest
-        Whether it is the length of the longest row, so that under a limit each row keeps it by itself.
+        True if it is the length of the longest row; a limit then holds for each row separately.
     is_largest_mean
-        Whether it is the largest, over operating points, of the mean length of their rows.
+        True if it is the maximum over operating points of the mean length of their rows.
     is_diameter
-        Whether it is the largest diameter of the balls that hold the signals: at most twice the longest row.
+        True if it is the largest diameter of the enclosing balls of the signals, at most twice the longest row.
     is_convex
-        Whether its cones and its dual norm hold: it is at least <Z, V> for every Z of dual norm one.
+        True if it is convex, with cones and a dual norm: norm(V) >= <Z, V> for every Z with dual norm one.
     is_monotone_in_lengths
-        Whether nothing but the lengths of the rows matters, wherever they stand, and it never falls with one of them.
+        True if it depends only on the lengths of the rows and their weights, and never falls when a row gets longer.
     is_pointwise
-        Whether it is a weighted sum, a root of weighted squares, or the largest of what rows or signals alone have:
-        operating points do not count as groups.
+        True if it combines rows or signals separately, by a weighted sum, a root of weighted squares or a maximum, so
+        that the grouping by operating points does not matter.
     """
 
     name: ClassVar[str]
@@ -183,101 +183,148 @@ class Norm(ABC):
 
     @abstractmethod
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return the norm."""
+        """Return the norm of rows, shape (k, d)."""
 
-    def values(self, grid: Grid, many: Array) -> Array:
-        """Return the norm of many signals, shape (n, k, d)."""
-        return np.array([self.value(grid, rows) for rows in many])
+    def values(self, grid: Grid, row_sets: Array) -> Array:
+        """Return the norm of each of n sets of rows, shape (n, k, d) to (n,)."""
+        return np.array([self.value(grid, rows) for rows in row_sets])
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return a Z with dual norm at most one and <Z, V> = norm(V); zero rows give zero (P2).
+        """Return a subgradient Z at rows V, shape (k, d): dual norm at most one, <Z, V> = norm(V) (P2).
 
-        The inner product is sum_k z_k . v_k; weights are part of Z.
+        The inner product is sum_k z_k . v_k; weights are part of Z. Zero rows of V give zero rows of Z.
         """
         raise self._unclaimed("subgradient")
 
     def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
-        """Return the second derivative across every row, shape (k,); None if the norm is no sum over rows (P10)."""
+        """Return the second derivative of the norm across the direction of each row, shape (k,) (P10).
+
+        None if the norm is not a sum over rows.
+        """
         return None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return the smallest t with <Z, V> <= t norm(V) for every V (P3); infinite where there is none."""
+        """Return the dual norm of Z, shape (k, d): the smallest t with <Z, V> <= t norm(V) for every V (P3).
+
+        Infinite if no such t exists.
+        """
         raise self._unclaimed("dual norm")
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """Return a simple projection of Z into the unit ball of the dual norm (P3)."""
+        """Return Z, shape (k, d), moved into the unit ball of the dual norm by a simple projection (P3)."""
         violation = self.dual_norm(grid, z)
         return z if violation <= 1.0 else z / violation
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
-        """Return all dual rows that touch the norm here, with those given; None where they are not known (P19)."""
+        """Return all subgradients at rows V, shape (k, d), starting from dual rows Z of a solver (P19).
+
+        None if they are unknown or too many.
+        """
         return None
 
     def balanced_dual(self, grid: Grid, z: Array) -> Array:
-        """Return nearby dual rows with a finite dual norm (P3)."""
+        """Return dual rows near Z, shape (k, d), whose dual norm is finite (P3)."""
         return z
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
+        """Return dual rows, shape (k, d), for a lower bound at a design with rows V (P6).
+
+        They point along V where this gives a bound at least as good as the solver's Z; elsewhere they are those of Z.
+        """
         raise self._unclaimed("dual norm")
 
     def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Interpolate dual rows at `steps` angles of each signal to a grid `times` as fine (P6)."""
+        """Return dual rows on a grid `times` as fine, from Z at `steps` samples of each signal (P6)."""
         return between(z, steps, times)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Return the norm of many designs from row lengths (..., k), shape (...); overwrites the lengths."""
+        """Return the norm of each design from its row lengths, shape (..., k) to (...); overwrites the lengths.
+
+        `weights` has shape (k,).
+        """
         raise TypeError(f"{self.name} is not known from lengths alone")
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float] | None:
-        """Return squares above the norm that touch it at these row lengths (R6).
+        """Return a quadratic upper bound of the norm that is exact at these row lengths, shape (k,) (R6).
 
         Returns
         -------
-        a, shape (k,), and c of norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V; None where the norm has no such.
+        Coefficients a, shape (k,), and constant c with norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V. None if the
+        norm has no such bound.
         """
         return None
 
     def cones(self, grid: Grid) -> Cones:
-        """Return the norm as second-order cones."""
+        """Return the norm of rows on a grid as second-order cones (P1)."""
         raise self._unclaimed("cones")
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return a smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
+        """Return a smooth CasADi expression of the norm to minimise (N3, E22).
+
+        Parameters
+        ----------
+        program
+            Program that receives epigraph variables and their constraints.
+        rows
+            CasADi matrix, shape (k, d).
+        unit, share
+            The expression differs from the norm by at most share x unit.
+        """
         raise self._unclaimed("smooth form")
 
     def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Return a smooth expression for norm <= `maximum`, its largest value, and the slope of that by `maximum`.
+        """Return a smooth form of the limit norm(rows) <= maximum: expression <= value.
 
-        Smooth where the rows are zero too, and off by no more than the share of one; that to minimise where it is so.
+        Returns
+        -------
+        CasADi expression, its largest allowed value, and the derivative of that value by `maximum`. The expression is
+        smooth at zero rows too, and as exact as `smooth_expression` with unit one, which is the default.
         """
         return self.smooth_expression(program, grid, rows, 1.0, share), maximum, 1.0
 
     @abstractmethod
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Return an upper bound of the norm of signals (n, places, d), without samples (F6)."""
+        """Return an upper bound of the norm over the cycle, from coefficients alone (F6).
+
+        Parameters
+        ----------
+        signals
+            Signal at each operating point, shape (n, places, d).
+        shares
+            Weight of each operating point, shape (points,).
+        """
 
     @abstractmethod
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return an upper bound of the sampling error of the norm at `steps` samples a cycle (F7, F8)."""
+        """Return an upper bound of the sampling error of the norm at `steps` samples over a period (F7, F8).
+
+        Parameters
+        ----------
+        signals
+            Signal at each operating point, shape (n, places, d).
+        shares
+            Weight of each operating point, shape (points,).
+        finest
+            Smallest number of samples with which the coarse samples are compared.
+        """
 
     def _unclaimed(self, what: str) -> TypeError:
-        return TypeError(f"norm '{self.name}' claims no {what}, and a method asks for it")
+        return TypeError(f"norm '{self.name}' has no {what}, which a method needs; implement it in its class")
 
 
 def between(z: Array, steps: int, times: int) -> Array:
-    """Interpolate dual rows to a finer grid, linearly by angle."""
+    """Interpolate dual rows at `steps` samples of each signal linearly to a grid `times` as fine."""
     blocks = z.reshape(-1, steps, z.shape[-1])
     share = np.arange(times) / times
-    following = np.roll(blocks, -1, axis=1)
-    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
+    next_blocks = np.roll(blocks, -1, axis=1)
+    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + next_blocks[:, :, None] * share[:, None]
     return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
 
 def lengths(rows: Array) -> Array:
-    """Return |v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
+    """Return the Euclidean length of each row, shape (..., d) to (...), safe from overflow and underflow."""
     # BLAS warns of nothing
     if not np.vdot(rows, rows) < _MOST**2:
         return _scaled_lengths(rows)
@@ -312,39 +359,45 @@ def mean_square(signal: Spectrum) -> Array:
     c = signal.coefficients
     power = 0.5 * np.sum(np.abs(c) ** 2, axis=(0, 2))
     # the steady part does not alternate
-    own = power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1)
+    square = power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1)
     if signal.kinks is None:
-        return np.asarray(own)
-    return np.asarray(own + lengths(signal.kinks.beyond(len(c), float(signal.base))[1]) ** 2)
+        return np.asarray(square)
+    return np.asarray(square + lengths(signal.kinks.beyond(len(c), float(signal.base))[1]) ** 2)
 
 
 def amplitudes(signal: Spectrum) -> Array:
     """Return the sum of the orders' amplitudes at every place, an upper bound of the signal, shape (places,)."""
-    own = order_amplitude(signal.coefficients).sum(axis=0)
+    total = order_amplitude(signal.coefficients).sum(axis=0)
     if signal.kinks is None:
-        return np.asarray(own)
-    return np.asarray(own + lengths(signal.kinks.beyond(len(signal.coefficients), float(signal.base))[0]))
+        return np.asarray(total)
+    return np.asarray(total + lengths(signal.kinks.beyond(len(signal.coefficients), float(signal.base))[0]))
 
 
 def curvature(signal: Spectrum) -> tuple[Array, Array]:
-    """Bound the second derivative over crank angle between kinks, and its mean with them, shape (places,)."""
+    """Return upper bounds of the second derivative by crank angle at each place, shape (places,).
+
+    The first bounds its maximum between kinks, the second its mean with the jumps of slope at kinks.
+    """
     smooth = signal.smooth
     bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
     maximum, mean = amplitudes(bent), np.sqrt(mean_square(bent))
     if signal.kinks is None:
         return maximum, mean
     size = lengths(signal.kinks.curvature(signal.period))
-    bends = lengths(np.abs(signal.kinks.jumps[:, 1]).sum(axis=0)) / signal.period
-    return maximum + size.max(axis=0), mean + size.mean(axis=0) + bends
+    kinks = lengths(np.abs(signal.kinks.jumps[:, 1]).sum(axis=0)) / signal.period
+    return maximum + size.max(axis=0), mean + size.mean(axis=0) + kinks
 
 
 def jumped(signal: Spectrum) -> Array:
-    """Return the sum of the signal's own jumps over its period, shape (places,)."""
+    """Return the sum of the jumps of the signal's value over its period, per radian, shape (places,)."""
     if signal.kinks is None:
         return np.zeros(signal.coefficients.shape[1])
     return lengths(np.abs(signal.kinks.jumps[:, 0]).sum(axis=0)) / signal.period
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:
-    """Return lengths at `steps` samples from `times` first angles, (steps, times, places), and the step [rad]."""
+    """Return row lengths at `steps` samples for each of `times` shifted starts, and the fine step [rad].
+
+    The lengths have the shape (steps, times, places).
+    """
     return lengths(signal.sample(steps * times)).reshape(steps, times, -1), signal.period / (steps * times)

@@ -1,8 +1,7 @@
-"""2 min_c max_k |v_k - c|: the diameter of the smallest ball that holds a signal over its cycle.
+"""Peak-to-peak seminorm, 2 min_c max_k |v_k - c|: the diameter of the smallest enclosing ball of a signal.
 
-Of one component it is the largest less the smallest value. What does not alternate does
-not count, so it is a seminorm: its dual rows add up to nothing over every signal, and
-their lengths add up to two at the most. Of several signals it is the largest.
+For one component it is the largest value less the smallest. The mean of a signal does not count, so the dual rows of
+each signal sum to zero; their lengths sum to at most two. The norm of several signals is the largest of theirs.
 """
 
 from __future__ import annotations
@@ -34,11 +33,11 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
 from laufruhe.numerics.spectrum import Spectrum
 
 SAME_WAY = 1e-3
-"""Share of a radius that tells directions apart."""
+"""Relative tolerance within which directions to support points count as equal."""
 
 
 class PeakToPeak(Norm):
-    """Largest diameter of the signals."""
+    """Largest diameter of the enclosing balls of the signals."""
 
     name = "peak to peak"
     refinement = 8
@@ -48,74 +47,79 @@ class PeakToPeak(Norm):
         """Return the largest diameter."""
         return _diameter(_signals(rows, grid.steps))
 
-    def values(self, grid: Grid, many: Array) -> Array:
-        """Return the largest diameter of each of many signals."""
-        balls = enclosing_balls(_signals(many, grid.steps))
-        return np.asarray(2.0 * balls.radii.reshape(len(many), -1).max(axis=1, initial=0.0))
+    def values(self, grid: Grid, row_sets: Array) -> Array:
+        """Return the largest diameter of each set of rows, shape (n, k, d) to (n,)."""
+        balls = enclosing_balls(_signals(row_sets, grid.steps))
+        return np.asarray(2.0 * balls.radii.reshape(len(row_sets), -1).max(axis=1, initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return radii to the points that hold the largest ball, by their shares of its centre."""
+        """Return unit vectors from the centre of the largest ball to its support points, weighted by their shares."""
         z = np.zeros_like(rows)
         balls = enclosing_balls(_signals(rows, grid.steps))
         if balls.radii.max(initial=0.0) > 0.0:
             largest = int(np.argmax(balls.radii))
-            at, shares = largest * grid.steps + balls.inside[largest], balls.shares[largest]
-            along = (rows[at] - balls.centres[largest]) / balls.radii[largest]
-            np.add.at(z, at, 2.0 * shares[:, None] * along)
+            support, shares = largest * grid.steps + balls.support[largest], balls.shares[largest]
+            directions = (rows[support] - balls.centres[largest]) / balls.radii[largest]
+            np.add.at(z, support, 2.0 * shares[:, None] * directions)
         return z
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
-        """Return the shares of points that hold every largest ball; None where they are many (P19).
+        """Return the subgradients of all sets of support points of the largest balls; None if there are many (P19).
 
-        No more points than directions and one have shares of their own; all others are mixtures of these.
+        A ball in d dimensions has at most d + 1 affinely independent support points; other subgradients are convex
+        combinations of theirs.
         """
-        balls, found = enclosing_balls(_signals(rows, grid.steps)), list[Array]()
+        balls, subgradients = enclosing_balls(_signals(rows, grid.steps)), list[Array]()
         largest = float(balls.radii.max(initial=0.0))
         for k in np.flatnonzero(balls.radii >= (1.0 - LONGEST_TOL) * largest) if largest else ():
             first = int(k) * grid.steps
-            along = (rows[first : first + grid.steps] - balls.centres[k]) / balls.radii[k]
-            at = _peaks(lengths(along))
-            count = int(np.linalg.matrix_rank(_balance(along[at]), tol=SAME_WAY)) if len(at) else 0
-            if math.comb(len(at), count) > MOST_KINKS:
+            directions = (rows[first : first + grid.steps] - balls.centres[k]) / balls.radii[k]
+            peaks = _peaks(lengths(directions))
+            count = int(np.linalg.matrix_rank(_balance(directions[peaks]), tol=SAME_WAY)) if len(peaks) else 0
+            if math.comb(len(peaks), count) > MOST_KINKS:
                 return None
-            for few in combinations(at.tolist(), count):
-                shares = _shares_of(along[[*few]])
+            for subset in combinations(peaks.tolist(), count):
+                shares = _shares_of(directions[[*subset]])
                 if shares is not None:
-                    own = np.zeros_like(rows)
-                    own[first + np.array(few)] = 2.0 * shares[:, None] * along[[*few]]
-                    found.append(own)
-        return Subdifferential(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
+                    subgradient = np.zeros_like(rows)
+                    subgradient[first + np.array(subset)] = 2.0 * shares[:, None] * directions[[*subset]]
+                    subgradients.append(subgradient)
+        return (
+            Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
+            if 0 < len(subgradients) <= MOST_KINKS
+            else None
+        )
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return half the sum of lengths; infinite if the rows of a signal do not add up to zero."""
+        """Return half the sum of lengths; infinite if the rows of a signal do not sum to zero."""
         sums = np.array([signal.sum(axis=0) for signal in _signals(z, grid.steps)])
-        whole = float(lengths(z).sum())
-        return 0.5 * whole if np.abs(sums).max(initial=0.0) <= 1e-12 * whole else math.inf
+        total = float(lengths(z).sum())
+        return 0.5 * total if np.abs(sums).max(initial=0.0) <= 1e-12 * total else math.inf
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """Balance, then scale."""
+        """Return Z less its mean over each signal, scaled into the unit ball."""
         return super().dual_feasible(grid, self.balanced_dual(grid, z))
 
     def balanced_dual(self, grid: Grid, z: Array) -> Array:
-        """Subtract the mean of every signal."""
+        """Return Z less its mean over each signal."""
         blocks = z.reshape(-1, grid.steps, z.shape[-1])
         return np.asarray(blocks - blocks.mean(axis=1, keepdims=True)).reshape(z.shape)
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return the solver's rows: several signals may be as large."""
+        """Return Z: one ball alone gives a poor bound where several are as large."""
         return z
 
     def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Return the rows in place, with zeros at the angles between."""
+        """Return the dual rows at their angles, with zeros at the angles between."""
         return in_place(z, steps, times)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return a single head over all rows, each signal counted from a free centre."""
+        """Return one head for all rows, with a free centre for each signal."""
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return a variable over all radii (E22)."""
+        """Return twice an epigraph variable of the radii of all enclosing balls (E22)."""
         return 2.0 * unit * self._radius(program, grid, rows / unit, share)
 
     def _radius(self, program: EpigraphProgram, grid: Grid, rows: Any, share: Any) -> Any:
@@ -133,24 +137,24 @@ class PeakToPeak(Norm):
         return top
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Bound by twice the sum of the amplitudes of alternating orders."""
-        used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
-        return max((_swing(signal) for signal in used), default=0.0)
+        """Return twice the sum of the amplitudes of all orders but zero."""
+        counted = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
+        return max((_swing(signal) for signal in counted), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compare all shifts of the samples, and add what curvature hides between them."""
+        """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
         coarse = steps * self.refinement
-        times, errors, bends = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
+        times, errors, curvatures = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
         for signal, share in zip(signals, shares, strict=True):
             if share == 0.0:
                 continue
             samples = signal.sample(coarse * times).swapaxes(0, 1)
             step = 2.0 * math.pi / float(signal.base) / (coarse * times)
-            bends.append(step**2 / 8.0 * 2.0 * float(curvature(signal)[0].max(initial=0.0)))
-            for place, bent in zip(samples, signal.values(signal.kink_angles).swapaxes(0, 1), strict=True):
-                whole, starts = _reach(place, bent), (place[first::times] for first in range(times))
-                errors.append(max(whole - _reach(start, bent) for start in starts))
-        return max(errors) + max(bends)
+            curvatures.append(step**2 / 8.0 * 2.0 * float(curvature(signal)[0].max(initial=0.0)))
+            for place, kink_values in zip(samples, signal.values(signal.kink_angles).swapaxes(0, 1), strict=True):
+                diameter, starts = _reach(place, kink_values), (place[first::times] for first in range(times))
+                errors.append(max(diameter - _reach(start, kink_values) for start in starts))
+        return max(errors) + max(curvatures)
 
 
 def _signals(rows: Array, steps: int) -> Array:
@@ -165,17 +169,17 @@ def _peaks(sizes: Array) -> NDArray[np.intp]:
     return np.array([group[np.argmax(sizes[group])] for group in groups if len(group)], dtype=np.intp)
 
 
-def _balance(along: Array) -> Array:
-    return np.vstack([along.T, np.ones(len(along))])
+def _balance(directions: Array) -> Array:
+    return np.vstack([directions.T, np.ones(len(directions))])
 
 
-def _shares_of(along: Array) -> Array | None:
-    system = _balance(along)
+def _shares_of(directions: Array) -> Array | None:
+    system = _balance(directions)
     right = np.zeros(len(system))
     right[-1] = 1.0
     shares, _, rank, _ = np.linalg.lstsq(system, right, rcond=SAME_WAY)
     near = np.abs(system @ shares - right).max() <= SAME_WAY and shares.min() >= -SAME_WAY
-    return np.maximum(shares, 0.0) if near and rank == len(along) else None
+    return np.maximum(shares, 0.0) if near and rank == len(directions) else None
 
 
 def _swing(signal: Spectrum) -> float:
@@ -183,8 +187,8 @@ def _swing(signal: Spectrum) -> float:
     return 2.0 * float(amplitudes(alternating).max(initial=0.0))
 
 
-def _reach(steps: Array, bent: Array) -> float:
-    return _diameter(np.concatenate([steps, bent])[None])
+def _reach(steps: Array, kink_values: Array) -> float:
+    return _diameter(np.concatenate([steps, kink_values])[None])
 
 
 def _diameter(signals: Array) -> float:

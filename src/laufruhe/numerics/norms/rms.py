@@ -1,4 +1,4 @@
-"""sqrt(sum_k w_k |v_k|^2): the root mean square."""
+"""Root mean square, sqrt(sum_k w_k |v_k|^2)."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ class RootMeanSquare(Norm):
         return largest * float(np.sqrt(grid.weights @ np.square(size / largest)))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return w_k v_k over the norm."""
+        """Return w_k v_k / norm(V)."""
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return rows along the design's own: the norm is smooth except at zero."""
+        """Return the gradient as base, or Z at zero rows: the norm is smooth except at zero."""
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""
+        """Return sqrt(sum_k |z_k|^2 / w_k); infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -47,24 +47,24 @@ class RootMeanSquare(Norm):
         return largest * float(np.sqrt((np.square(size / largest) / np.where(weights > 0.0, weights, 1.0)).sum()))
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return the design's own direction."""
+        """Return the subgradient at the design."""
         return self.subgradient(grid, rows)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Return the root of weighted squares."""
+        """Return the root of the weighted sum of squares."""
         return np.asarray(np.sqrt(np.dot(np.multiply(lengths, lengths, out=lengths), weights)))
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
-        """Return N <= (N^2 / c + c) / 2 for the whole."""
-        whole = self.value(grid, lengths[:, None]) or 1.0
-        return grid.weights / whole, 0.5 * whole
+        """Return N <= (N^2 / c + c) / 2 for the norm N of all rows, c its value at the given lengths."""
+        norm = self.value(grid, lengths[:, None]) or 1.0
+        return grid.weights / norm, 0.5 * norm
 
     def cones(self, grid: Grid) -> Cones:
-        """Return a single cone over all rows, each times the root of its weight."""
+        """Return one cone with all rows, each multiplied by the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), is_single=True)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return the norm softened as a single length."""
+        """Return sqrt(N^2 + e^2) - e with N the norm and e = share x unit."""
         import casadi as ca
 
         softness = share * unit
@@ -73,20 +73,20 @@ class RootMeanSquare(Norm):
     def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Limit the mean square, which is smooth at zero."""
+        """Return the mean square, which is smooth at zero, and the limit maximum^2."""
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), maximum * maximum, 2.0 * maximum
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Return Parseval's sum, exact except for orders of kinks."""
+        """Return the root of Parseval's sum; exact without kinks, whose orders beyond the list are bounded."""
         squares = np.array([mean_square(signal) for signal in signals])
         return math.sqrt(float(shares @ squares.mean(axis=1)))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compare with Parseval's sum."""
+        """Return the difference between the sampled norm and Parseval's sum."""
         squares = [float(np.square(lengths(s.series.sample(steps))).mean()) for s in signals]
         sampled = math.sqrt(float(shares @ np.array(squares)))
-        # the orders of corners beyond those that are counted add something between nothing and a bound
+        # orders of kinks beyond the listed ones add between zero and a bound
         counted = self.upper_bound([s.series for s in signals], shares)
         return max(abs(sampled - counted), abs(sampled - self.upper_bound(signals, shares)))

@@ -1,4 +1,4 @@
-"""(sum_k w_k |v_k|^4)^(1/4): the root mean quad, by which vibration with peaks is rated (ISO 2631-1, eq. 4)."""
+"""Root mean quad, (sum_k w_k |v_k|^4)^(1/4), which rates vibration with peaks (ISO 2631-1, eq. 4)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class RootMeanQuad(Norm):
-    """The fourth root of the mean of fourth powers."""
+    """Fourth root of the weighted mean of fourth powers."""
 
     name = "rmq"
     is_convex = is_monotone_in_lengths = True
@@ -35,7 +35,7 @@ class RootMeanQuad(Norm):
         return longest and longest * float(grid.weights @ (size / longest) ** 4) ** 0.25
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return w_k |v_k|^2 v_k over the cube of the norm."""
+        """Return w_k |v_k|^2 v_k / norm(V)^3."""
         value = self.value(grid, rows)
         if value == 0.0:
             return np.zeros_like(rows)
@@ -43,11 +43,11 @@ class RootMeanQuad(Norm):
         return np.asarray((grid.weights * share**2)[:, None] * (rows / value))
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return the gradient: the norm is smooth but at zero."""
+        """Return the gradient as base, or Z at zero rows: the norm is smooth except at zero."""
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4); infinite where a row without weight is used."""
+        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4); infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -60,11 +60,11 @@ class RootMeanQuad(Norm):
         return self.subgradient(grid, rows)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Return the norms of many designs."""
+        """Return the fourth root of the weighted sum of fourth powers."""
         return np.asarray(np.sqrt(np.sqrt(np.dot(np.square(np.square(lengths)), weights))))
 
     def cones(self, grid: Grid) -> Cones:
-        """Return the heads t_k, s_k, r_k, T: t_k^2 <= s_k T, s_k^2 <= r_k T, sum_k w_k r_k <= T."""
+        """Return cones of heads t_k >= |v_k|, s_k, r_k and T: t_k^2 <= s_k T, s_k^2 <= r_k T, sum_k w_k r_k <= T."""
         count = len(grid.weights)
         length, top = np.arange(count), np.full(count, 3 * count)
         value = np.zeros(3 * count + 1)
@@ -86,7 +86,7 @@ class RootMeanQuad(Norm):
         )
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return the norm of the rows and of one length of the share of `unit`, less that length."""
+        """Return (N^4 + e^4)^(1/4) - e with N the norm and e = share x unit."""
         import casadi as ca
 
         squares = ca.sum2(rows * rows) / unit**2
@@ -95,21 +95,21 @@ class RootMeanQuad(Norm):
     def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Return the mean of fourth powers, which is smooth at zero."""
+        """Return the mean of fourth powers, which is smooth at zero, and the limit maximum^4."""
         import casadi as ca
 
         squares = ca.sum2(rows * rows)
         return ca.dot(ca.DM(grid.weights), squares * squares), maximum**4, 4.0 * maximum**3
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Return a bound by Hölder's inequality: |v|^4 has at most the largest square times the mean square."""
+        """Return a bound by Hölder's inequality: mean |v|^4 <= max |v|^2 mean |v|^2."""
         fourth = [float((amplitudes(s) ** 2 * mean_square(s)).mean()) for s in signals]
         return math.sqrt(math.sqrt(float(shares @ np.array(fourth))))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return how far the means of samples and of orders differ, and what orders beyond these add at most.
+        """Return the difference of sampled and exact means, plus a bound for orders of kinks beyond the list.
 
-        |v|^4 has four times the orders of v, so that a mean of more samples than these is the integral.
+        |v|^4 has four times the orders of v, so a mean over more samples than these is the exact integral.
         """
         sampled, exact, beyond = 0.0, 0.0, 0.0
         for signal, share in zip(signals, shares, strict=True):

@@ -1,6 +1,6 @@
-"""max_p mean_p |v_k|: the mean over the cycle and the places, at the operating point where it is largest.
+"""Worst mean, max_p mean_p |v_k|: the mean over cycle and places, at the operating point where it is largest.
 
-A largest of norms is a norm, so what is proven of a mean is proven of it. Weights of operating points do not count.
+Weights of operating points do not count.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _MEAN = Mean()
 
 
 class WorstMean(Norm):
-    """Largest mean of any operating point."""
+    """Maximum over operating points of the mean length of their rows."""
 
     name = "worst mean"
     averages = True
@@ -43,49 +43,55 @@ class WorstMean(Norm):
         """Return the subgradient of the mean at the worst operating point."""
         means, z = self._means(grid, rows), np.zeros_like(rows)
         if len(means):
-            own = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
-            z[own] = _MEAN.subgradient(Grid(_shares(grid)[own], grid.steps), rows[own])
+            rows_of_point = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
+            z[rows_of_point] = _MEAN.subgradient(Grid(_shares(grid)[rows_of_point], grid.steps), rows[rows_of_point])
         return z
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
-        """Return the kinks of the largest means; None where a row of one vanishes."""
-        means, size, found = self._means(grid, rows), _size(grid), list[Array]()
+        """Return the subgradients of the largest means; None if one of their rows vanishes."""
+        means, size, subgradients = self._means(grid, rows), _size(grid), list[Array]()
         for point in np.flatnonzero(means >= (1.0 - LONGEST_TOL) * means.max(initial=0.0)):
-            own, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
-            mean = _MEAN.subdifferential(Grid(_shares(grid)[own], grid.steps), rows[own], rows[own])
+            rows_of_point, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
+            mean = _MEAN.subdifferential(
+                Grid(_shares(grid)[rows_of_point], grid.steps), rows[rows_of_point], rows[rows_of_point]
+            )
             if len(mean.vanishing):
                 return None
-            base[own] = mean.base
-            found.append(base)
-        return Subdifferential(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
+            base[rows_of_point] = mean.base
+            subgradients.append(base)
+        return (
+            Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
+            if 0 < len(subgradients) <= MOST_KINKS
+            else None
+        )
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """sum_p max_k |z_k| / w_k, weights of every operating point adding up to one."""
+        """Return sum_p max_k |z_k| / w_k, with the weights of each operating point summing to one."""
         return float(self._prices(grid, z).sum())
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """The design's own directions, by the solver's shares of the operating points."""
+        """Return the directions of the design's rows, weighted by the shares of operating points in Z."""
         size, shares = lengths(rows), _shares(grid)
         prices = np.repeat(self._prices(grid, z), _size(grid))
         small = size <= 1e-6 * float(size.max(initial=0.0))
-        along = rows * (prices * shares / np.where(size > 0.0, size, 1.0))[:, None]
-        return np.where(small[:, None], z, along)
+        directions = rows * (prices * shares / np.where(size > 0.0, size, 1.0))[:, None]
+        return np.where(small[:, None], z, directions)
 
     def cones(self, grid: Grid) -> Cones:
-        """A head for each row, and one over the mean of every operating point."""
+        """Return one head for each row, and one that exceeds the mean of every operating point."""
         count, size = len(grid.weights), _size(grid)
         point = np.arange(count) // size
         value = np.zeros(count + 1)
         value[-1] = 1.0
-        under = (
+        linear_rows = (
             np.concatenate([point, np.arange(grid.points)]),
             np.concatenate([np.arange(count), np.full(grid.points, count)]),
             np.concatenate([_shares(grid), np.full(grid.points, -1.0)]),
         )
-        return Cones(value, np.arange(count), np.ones(count), linear_rows=under)
+        return Cones(value, np.arange(count), np.ones(count), linear_rows=linear_rows)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """A variable that no mean of softened lengths exceeds (E22)."""
+        """Return an epigraph variable, with the constraint that no mean of softened lengths exceeds it (E22)."""
         import casadi as ca
 
         weights = ca.DM(_shares(grid).reshape(grid.points, _size(grid)))
@@ -96,12 +102,12 @@ class WorstMean(Norm):
         return top * unit
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """The largest of what the means do not exceed."""
-        return max((_MEAN.upper_bound([own], np.ones(1)) for own in _counted(signals, shares)), default=0.0)
+        """Return the largest upper bound of the mean at any operating point."""
+        return max((_MEAN.upper_bound([signal], np.ones(1)) for signal in _counted(signals, shares)), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the bound of the mean that is off most."""
-        errors = (_MEAN.sampling_bound([own], np.ones(1), steps, finest) for own in _counted(signals, shares))
+        """Return the largest sampling bound of the mean at any operating point."""
+        errors = (_MEAN.sampling_bound([signal], np.ones(1), steps, finest) for signal in _counted(signals, shares))
         return max(errors, default=0.0)
 
     def _means(self, grid: Grid, rows: Array) -> Array:
@@ -113,7 +119,7 @@ class WorstMean(Norm):
             z.reshape(grid.points, _size(grid), z.shape[-1]),
             strict=True,
         )
-        return np.array([_MEAN.dual_norm(Grid(shares, grid.steps), own) for shares, own in blocks])
+        return np.array([_MEAN.dual_norm(Grid(shares, grid.steps), block) for shares, block in blocks])
 
 
 def _size(grid: Grid) -> int:
@@ -122,8 +128,8 @@ def _size(grid: Grid) -> int:
 
 def _shares(grid: Grid) -> Array:
     blocks = grid.weights.reshape(grid.points, _size(grid))
-    whole = blocks.sum(axis=1, keepdims=True)
-    return np.asarray(blocks / np.where(whole > 0.0, whole, 1.0)).reshape(-1)
+    sums = blocks.sum(axis=1, keepdims=True)
+    return np.asarray(blocks / np.where(sums > 0.0, sums, 1.0)).reshape(-1)
 
 
 def _counted(signals: Sequence[Spectrum], shares: Array) -> list[Spectrum]:
