@@ -28,7 +28,7 @@ FAULTS = {
     "a comma too few between rows": ('a = [\n["1"]\n["2"],\n]', "3:1: a comma is missing"),
     "path of Windows": (r'file = "C:\users\p.csv"', "in a path write / in its place"),
     "path with another letter": (r'file = "C:\data\p.csv"', "in a path write / in its place"),
-    "path that is a bell": (r'file = "C:\bench.csv"', "U+0008, which is not a printable character; remove it; in a path"),
+    "path that is a bell": (r'file = "C:\bench.csv"', "U+0008, which is not a printable character; remove it; in"),
     "text without end": ('a = "80 mm\nb = 1', "1:11: the text is not closed"),
     "text without quotes": ("layout = inline", 'text stands without quotes; write "inline"'),
     "no equals sign": ('bore "80 mm"\n', "1:6: no = follows the key; write key = value"),
