@@ -181,7 +181,7 @@ speed = "90 rpm"
         ('stroke = "400 mm"', 'stroke = "400 mm"\nlever_weight = "5 kg"', "engine.lever_weight_radius"),
         ('layout = "inline"', 'layout = "radial"\nknuckle_radius = "0 mm"', "this layout needs a master rod"),
         ('drive = "swinging-yoke"', 'drive = "scotch yoke"', "engine.drive"),
-        ("[[operating", '[[counterweights]]\nname = "web"\nbalance_factor = 0.5\n[[operating', "needs pistons on crank"),
+        ("[[operating", '[[counterweights]]\nname = "web"\nbalance_factor = 0.5\n[[operating', "needs pistons"),
     ],
 )  # fmt: skip
 def test_files_that_contradict_themselves(old: str, new: str, said: str) -> None:
