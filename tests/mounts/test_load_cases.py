@@ -147,7 +147,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in shares]
         values = np.array([with_mounts(still, engine).value(measure) for engine in drawn])
         # the linear function itself is under every design, not its least alone
-        lines = found.value + (2.0 * shares - 1.0) @ found.slopes[0] - found.rest
+        lines = found.value + (2.0 * shares - 1.0) @ found.slopes[0] - found.remainder
         assert np.all(lines <= values * (1.0 + 1e-9))
         ratios.append(float(found.minimum[0]) / values.min())
     assert max(ratios) <= 1.0 + 1e-9

@@ -39,7 +39,7 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
         at = series(halves, halves, inverse[None], sides, sides.inside(told["sides"]), motion[None])
         turned = sides.along(told["ends"]) * halves[0, sides.number_of_column]
         answer = mapped(at, told["value"][None], turned)
-        ended += int(np.isfinite(answer.rest).sum())
+        ended += int(np.isfinite(answer.remainder).sum())
         corners = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(ranks))).reshape(len(ranks), -1).T
         for s in [*corners, *rng.uniform(-1.0, 1.0, (20, len(ranks)))]:
             moved = np.linalg.solve(
@@ -48,8 +48,8 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
             maps = told["value"] + np.einsum("n,nri->ri", s * halves[0], told["ends"])
             off = np.einsum("kri,ki->kr", maps, moved) - answer.value[0] - np.einsum("n,knr->kr", s, answer.slopes[0])
             size = np.linalg.norm(off, axis=-1)
-            assert np.all(size <= answer.rest[0] * (1.0 + 1e-9) + 1e-12)
-            tight = max(tight, float((size / answer.rest[0]).max()))
+            assert np.all(size <= answer.remainder[0] * (1.0 + 1e-9) + 1e-12)
+            tight = max(tight, float((size / answer.remainder[0]).max()))
     assert tight > 0.2
     assert ended > 30
 
@@ -60,9 +60,9 @@ def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
     inverse = np.linalg.inv(told["middle"])
     motion = np.einsum("kij,kj->ki", inverse, told["loads"])
     at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
-    assert np.all(np.isinf(at.rest))
-    assert np.all(mapped(at, 0.0 * told["value"][None]).rest == 0.0)
-    assert np.all(np.isinf(mapped(at, told["value"][None]).rest))
+    assert np.all(np.isinf(at.remainder))
+    assert np.all(mapped(at, 0.0 * told["value"][None]).remainder == 0.0)
+    assert np.all(np.isinf(mapped(at, told["value"][None]).remainder))
 
 
 def test_a_number_of_no_width_moves_nothing() -> None:
@@ -73,8 +73,8 @@ def test_a_number_of_no_width_moves_nothing() -> None:
     at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
     answer = mapped(at, told["value"][None], sides.along(told["ends"]) * wide[0, sides.number_of_column])
     assert np.all(answer.slopes[0, :, 1] == 0.0)
-    assert np.all(answer.bends[0, :, 1] == 0.0)
-    assert np.all(answer.bends[0, :, 0] > 0.0)
+    assert np.all(answer.scores[0, :, 1] == 0.0)
+    assert np.all(answer.scores[0, :, 0] > 0.0)
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (4, 4), (12, 3), (6, 6)])

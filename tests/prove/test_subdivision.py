@@ -122,8 +122,8 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
         low, high = centre * (1.0 - share), centre * (1.0 + share)
         at = search.model.expanded(search.model.lines(), low[None], high[None])
         found = lower_bound_of_norm(search.model, problem.objective[0].measure, search.model.lines(), at)
-        assert float(found.value[0]) == pytest.approx(value, abs=float(found.rest[0]))
-        lacking.append(float(found.rest[0]) / value)
+        assert float(found.value[0]) == pytest.approx(value, abs=float(found.remainder[0]))
+        lacking.append(float(found.remainder[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]
 
 

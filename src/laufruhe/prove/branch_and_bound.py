@@ -144,7 +144,7 @@ class BranchAndBound(Generic[P]):
         Returns
         -------
         float
-            Lower bound of the objective over all designs [SI]: the least bound of all parts that remain or were
+            Lower bound of the objective over all designs [SI]: the lowest bound of all parts that remain or were
             fathomed. Nothing lowers it to the value of the incumbent.
         """
         self.open_nodes, self.node_count, self._minimum = [], 1, math.inf

@@ -120,7 +120,7 @@ def of_seed(seed: int) -> Boxes:
 
 
 def minimum(under: LinearBound) -> Array:
-    found = under.value - under.rest - np.abs(under.slopes).sum(axis=1)
+    found = under.value - under.remainder - np.abs(under.slopes).sum(axis=1)
     return np.where(np.isfinite(found), found, -np.inf)
 
 
@@ -137,7 +137,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
             values = boxes.values(x)
             best = np.minimum(best, values)
             share = (x - boxes.lower[box]) / half - 1.0
-            lines = np.array([u.value[box] - u.rest[box] + u.slopes[box] @ share for u in found])
+            lines = np.array([u.value[box] - u.remainder[box] + u.slopes[box] @ share for u in found])
             assert np.all(lines[np.isfinite(lines)] <= values[np.isfinite(lines)] * (1.0 + 1e-9))
         bounds = np.array([minimum(under)[box] for under in found])
         assert np.all(bounds <= best * (1.0 + 1e-9))
@@ -158,7 +158,7 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
         assert np.all(np.diff(np.maximum(bounds, 0.0)) >= -1e-9 * bounds[-1])
         assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
         # squares are in the rest as well, as far as they are under
-        assert found.rest[5] < 1.2e-2 * found.rest[4] + 1e-12 * bounds[-1]
+        assert found.remainder[5] < 1.2e-2 * found.remainder[4] + 1e-12 * bounds[-1]
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -238,7 +238,7 @@ class LoadBoxes:
             response = box.response(FORCE if is_ratio(measure) else measure)
             share = np.sqrt(weight * line_weights(self.problem, measure, self._orders))
             share = share * measure.counted(self._orders.orders)
-            is_known = np.isfinite(response.rest)[..., None] * share[:, None]
+            is_known = np.isfinite(response.remainder)[..., None] * share[:, None]
             value = np.where(is_known > 0.0, response.value * is_known, 0.0).reshape(len(gram), -1)
             slopes = np.where(is_known[:, :, None] > 0.0, response.slopes * is_known[:, :, None], 0.0)
             slopes = np.moveaxis(slopes, 2, -1).reshape(len(gram), -1, box.count)
@@ -263,8 +263,8 @@ class LoadBoxes:
             response = LinearResponse(
                 response.value * row_factors,
                 response.slopes * slope_factors,
-                response.rest * factors,
-                response.bends * row_factors,
+                response.remainder * factors,
+                response.scores * row_factors,
             )
         value = response.value + np.einsum("bwkr,bk->bwr", response.slopes, points)
         bound = norm_under(self.problem, measure, replace(response, value=value), self._orders)
@@ -359,13 +359,13 @@ class _Boxes:
         )
         products = [response.slopes for response in column_responses]
         slopes = np.concatenate([fixed.slopes, np.moveaxis(by_column, 0, 2), *products], axis=2)
-        rests = np.array([response.rest for response in column_responses]).reshape(self.columns, boxes, orders)
+        rests = np.array([response.remainder for response in column_responses]).reshape(self.columns, boxes, orders)
         for k, response in enumerate(throw_remainders):
             rests[self._unbalances + k] += response.maximum
-        bends = fixed.bends + sum((response.bends for response in column_responses), np.zeros_like(fixed.bends))
+        bends = fixed.scores + sum((response.scores for response in column_responses), np.zeros_like(fixed.scores))
         # halving unbalances cannot make a diverging series converge
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)
-        return LinearResponse(value, slopes, fixed.rest + rests.sum(axis=0), bends)
+        return LinearResponse(value, slopes, fixed.remainder + rests.sum(axis=0), bends)
 
     def scores(self, bound: LinearBound) -> Array:
         """Return branching scores, shape (boxes, open numbers)."""
@@ -373,7 +373,7 @@ class _Boxes:
             len(self.lower), self.columns, self._numbers
         )
         shared = np.concatenate([products.sum(axis=1), products.sum(axis=2)], axis=1)
-        return np.asarray(np.nan_to_num(bound.bends, posinf=1e300) + 0.5 * shared)
+        return np.asarray(np.nan_to_num(bound.scores, posinf=1e300) + 0.5 * shared)
 
     def affine_under(self, measure: Measure, points: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
@@ -393,9 +393,9 @@ class _Boxes:
 
 def _shared(expansion: Expansion, response: LinearResponse) -> LinearResponse:
     # add the rest of the remainder to the branching scores, in proportion to the gain of each side
-    excess = np.where(np.isfinite(response.rest), response.rest - response.bends.sum(axis=-1), 0.0)
+    excess = np.where(np.isfinite(response.remainder), response.remainder - response.scores.sum(axis=-1), 0.0)
     pull = expansion.pull / np.maximum(expansion.pull.sum(axis=-1, keepdims=True), 1e-300)
-    return replace(response, bends=response.bends + np.maximum(excess, 0.0)[..., None] * pull)
+    return replace(response, scores=response.scores + np.maximum(excess, 0.0)[..., None] * pull)
 
 
 def _counted(response: LinearResponse, is_counted: Mask) -> LinearResponse:
@@ -407,7 +407,10 @@ def _counted(response: LinearResponse, is_counted: Mask) -> LinearResponse:
         for n, coefficients in ((1, response.value), (2, response.slopes))
     )
     return LinearResponse(
-        value, slopes, np.where(is_counted, response.rest, 0.0), np.where(is_counted[:, None], response.bends, 0.0)
+        value,
+        slopes,
+        np.where(is_counted, response.remainder, 0.0),
+        np.where(is_counted[:, None], response.scores, 0.0),
     )
 
 

@@ -83,7 +83,7 @@ class RunBoxes:
                 box_equations if len(indices) == len(lower) else self._equations(lower[indices], upper[indices])
             )
             bounds = self._under(measure, box_equations)
-            for name in ("value", "slopes", "rest", "bends"):
+            for name in ("value", "slopes", "remainder", "scores"):
                 getattr(result, name)[indices] = getattr(bounds, name)
         return result
 
@@ -96,7 +96,7 @@ class RunBoxes:
         run_bounds = [_RunBounds(box_equations, run, maps, d).under() for run in self._runs]
         bounds = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
         best, boxes = np.argmax(bounds, axis=0), np.arange(box_equations.count)
-        parts = ("value", "slopes", "rest", "bends")
+        parts = ("value", "slopes", "remainder", "scores")
         return LinearBound(
             *(np.array([getattr(run_bound, part) for run_bound in run_bounds])[best, boxes] for part in parts)
         )

@@ -160,7 +160,7 @@ class TwistBoxes:
         terms = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
         bound, pull = (
             _root_bound(terms),
-            np.nan_to_num(sum((w * under.bends[0] for w, under in terms), np.zeros(len(wide)))),
+            np.nan_to_num(sum((w * under.scores[0] for w, under in terms), np.zeros(len(wide)))),
         )
         pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
         turning = sum(weight * of.minimum(chains) for weight, of in self._turning)
@@ -236,7 +236,7 @@ class TwistBoxes:
                 weights.append(np.array([share]))
         parts = (
             np.concatenate([getattr(answer, part) for answer in answers], axis=1)
-            for part in ("value", "slopes", "rest", "bends")
+            for part in ("value", "slopes", "remainder", "scores")
         )
         return root_under(LinearResponse(*parts), np.concatenate(weights))
 
@@ -258,8 +258,10 @@ class TwistBoxes:
             return answer
         moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
         alone = mapped(twist, moved)
-        maximum = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
-        return replace(answer, rest=answer.rest + np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1))
+        maximum = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.remainder[..., None]
+        return replace(
+            answer, remainder=answer.remainder + np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1)
+        )
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
@@ -314,5 +316,7 @@ def _is_square(measure: Measure) -> bool:
 
 def _root_bound(terms: Sequence[tuple[float, LinearBound]]) -> float:
     slopes = sum((weight * under.slopes[0] for weight, under in terms), np.zeros(1))
-    bound = sum(weight * float(under.value[0] - under.rest[0]) for weight, under in terms) - float(np.abs(slopes).sum())
+    bound = sum(weight * float(under.value[0] - under.remainder[0]) for weight, under in terms) - float(
+        np.abs(slopes).sum()
+    )
     return max(bound, 0.0) if math.isfinite(bound) else 0.0

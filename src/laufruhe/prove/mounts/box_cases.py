@@ -101,11 +101,11 @@ def _with_stops(
     if side_maps is not None:
         reach = reach + sum(_along(corner, side) for side in model.sides.maps_by_number(side_maps[:, 0]))
     error = reach * np.sum(violation * _along(corner, stops.rows), axis=1, keepdims=True) + violation @ np.abs(ends).T
-    rest = answer.rest[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
+    remainder = answer.remainder[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
     # the series diverges close to a free mode
-    minimum = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)
+    minimum = np.where(np.isfinite(remainder), size - np.abs(slope).sum(axis=-1) - remainder, -np.inf)
     box, best = np.arange(len(size)), np.argmax(minimum, axis=1)
-    bound = LinearBound(size[box, best], slope[box, best], rest[box, best], answer.bends[:, 0])
+    bound = LinearBound(size[box, best], slope[box, best], remainder[box, best], answer.scores[:, 0])
     return bound.where(np.isfinite(minimum[box, best])), span
 
 
@@ -137,7 +137,7 @@ def _stop_errors(
     """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60)."""
     response = mapped(expansion, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
     travel = np.asarray(response.value[:, 0].real)
-    span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.rest[:, 0, None]
+    span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.remainder[:, 0, None]
     # distance of springs beyond their gaps, and of open stops within
     distance = np.where(signs != 0.0, signs * travel - stops.gaps, stops.gaps - np.abs(travel))
     along = _along(corner, stops.rows)

@@ -1,4 +1,4 @@
-"""Linear lower bounds of objective and limits over boxes, and the least feasible objective by them (P4, E39)."""
+"""Linear lower bounds of objective and limits over boxes, and the lower bound that they give (P4, E39)."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class LinearRelaxation:
         left_out
             Largest effect of omitted orders on the term [SI].
         """
-        value = minimum.value - minimum.rest - left_out
+        value = minimum.value - minimum.remainder - left_out
         is_positive = np.isfinite(value) & (value > 0.0)
         self.value = self.value + weight * np.where(is_positive, value, 0.0)
         self.slopes = self.slopes + weight * np.where(is_positive[:, None], minimum.slopes, 0.0)
@@ -74,11 +74,11 @@ class LinearRelaxation:
             Limit [SI].
         """
         unit = maximum or 1.0
-        violation = (minimum.value - minimum.rest - left_out - maximum) / unit
+        violation = (minimum.value - minimum.remainder - left_out - maximum) / unit
         is_finite = np.isfinite(violation) & np.all(np.isfinite(minimum.slopes), axis=1)
         slopes = np.where(is_finite[:, None], minimum.slopes / unit, 0.0)
         self.limits.append((np.where(is_finite, violation, -1.0), slopes))
-        self.pulls.append(np.where(is_finite[:, None], np.nan_to_num(minimum.bends) / unit, 0.0))
+        self.pulls.append(np.where(is_finite[:, None], np.nan_to_num(minimum.scores) / unit, 0.0))
 
     @property
     def violation(self) -> Array:

@@ -13,7 +13,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse
 
-PARTS = ("value", "slopes", "rest", "bends")
+PARTS = ("value", "slopes", "remainder", "scores")
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,23 +22,23 @@ class LinearBound:
 
     Attributes
     ----------
-    value, rest
+    value, remainder
         Shape (boxes,).
     slopes
         Shape (boxes, n).
-    bends
-        Share of each side in the rest, for branching, shape (boxes, n).
+    scores
+        Share of each side in the remainder, for branching, shape (boxes, n).
     """
 
     value: Array
     slopes: Array
-    rest: Array
-    bends: Array
+    remainder: Array
+    scores: Array
 
     @property
     def minimum(self) -> Array:
         """Least value over every box, shape (boxes,)."""
-        return np.asarray(self.value - self.rest - np.abs(self.slopes).sum(axis=-1))
+        return np.asarray(self.value - self.remainder - np.abs(self.slopes).sum(axis=-1))
 
     def where(self, mask: Mask) -> LinearBound:
         """Return the bound on boxes of a mask, and zero on the others."""
@@ -47,7 +47,7 @@ class LinearBound:
         return LinearBound(*parts)
 
     def or_else(self, other: LinearBound) -> LinearBound:
-        """Return for every box the bound with the larger least value."""
+        """Return for every box the bound with the larger minimum."""
         better = self.minimum >= other.minimum
         first, second = self.where(better), other.where(~better)
         return LinearBound(*(getattr(first, part) + getattr(second, part) for part in PARTS))
@@ -86,7 +86,8 @@ def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines
         best = np.argmax([bound.value for bound in by_point], axis=0)
         pick = np.arange(len(best))
         parts = (
-            np.array([getattr(bound, part) for bound in by_point]) for part in ("value", "slopes", "rest", "bends")
+            np.array([getattr(bound, part) for bound in by_point])
+            for part in ("value", "slopes", "remainder", "scores")
         )
         largest = LinearBound(*(part[best, pick] for part in parts))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
@@ -97,8 +98,8 @@ def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines
         sum(share[p] * getattr(bound, part) for p, bound in zip(points, by_point, strict=True))
         for part in ("value", "slopes")
     )
-    rest, bends = root_of(weights, answer.rest), root_of(weights, answer.bends)
-    return LinearBound(np.asarray(value), np.asarray(slopes), rest, bends)
+    remainder, scores = root_of(weights, answer.remainder), root_of(weights, answer.scores)
+    return LinearBound(np.asarray(value), np.asarray(slopes), remainder, scores)
 
 
 def counted_rows(problem: Problem, measure: Measure) -> tuple[NDArray[np.intp], Array]:
@@ -119,7 +120,7 @@ def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: i
     """Bound a mean, maximum or peak to peak over the samples of one operating point."""
     indices = np.flatnonzero(lines.points == p)
     value, slopes = answer.value[:, indices], answer.slopes[:, indices]
-    rest, bends = answer.rest[:, indices], answer.bends[:, indices]
+    remainder, scores = answer.remainder[:, indices], answer.scores[:, indices]
     factors = lines.phases(indices)
     boxes, samples, mounts = len(value), len(factors), value.shape[-1] // 3
     # rows by direction, then mount; real and imaginary parts count as separate orders
@@ -130,7 +131,7 @@ def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: i
         size = _lengths(rows)
         # a mean of lengths is at most their root mean square
         squares = np.where(lines.orders[indices] > 0.0, 0.5, 1.0) / mounts
-        rests = root_of(squares, rest), root_of(squares, bends)
+        rests = root_of(squares, remainder), root_of(squares, scores)
         by_mount, share = slopes.reshape(*slopes.shape[:3], mounts, 3), 1.0 / (samples * mounts)
 
         def pair_with(length: Array) -> LinearBound:
@@ -157,7 +158,7 @@ def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: i
     mount_slopes = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
     phases = factors[t] if times == 1.0 else factors[t] - factors[start[box, mount]]
     slope = np.einsum("bk,bkna,ba->bn", phases, mount_slopes, along).real
-    return LinearBound(length, slope, times * rest.sum(axis=1), times * bends.sum(axis=1))
+    return LinearBound(length, slope, times * remainder.sum(axis=1), times * scores.sum(axis=1))
 
 
 def _lengths(rows: Array) -> Array:
@@ -168,15 +169,17 @@ def _lengths(rows: Array) -> Array:
 
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
     """Bound the root of a weighted sum of squares; orders whose series may diverge count as zero."""
-    is_finite = np.isfinite(answer.rest)
+    is_finite = np.isfinite(answer.remainder)
     value, slopes = (
         np.where(is_finite[..., None], answer.value, 0.0),
         np.where(is_finite[..., None, None], answer.slopes, 0.0),
     )
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
-    rest = root_of(weights, np.where(is_finite, answer.rest, 0.0))
-    return LinearBound(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest, root_of(weights, answer.bends))
+    remainder = root_of(weights, np.where(is_finite, answer.remainder, 0.0))
+    return LinearBound(
+        size, slopes / np.where(size > 0.0, size, 1.0)[:, None], remainder, root_of(weights, answer.scores)
+    )
 
 
 def root_of(weights: Array, parts: Array) -> Array:

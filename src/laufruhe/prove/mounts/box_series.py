@@ -105,7 +105,7 @@ class Expansion:
         L, G and z0: (..., d, m), (..., m, m) and (..., m).
     balance
         Diagonal of T, (..., m).
-    rest
+    remainder
         Bound of g / (1 - g) |T G S z0|, (...); infinite if the series may diverge.
     """
 
@@ -117,7 +117,7 @@ class Expansion:
     gain: ComplexArray
     column_travels: ComplexArray
     balance: Array
-    rest: Array
+    remainder: Array
 
     @property
     def pull(self) -> Array:
@@ -135,22 +135,22 @@ class LinearResponse:
     ----------
     value, slopes
         Shapes (..., r) and (..., n, r).
-    rest
+    remainder
         Upper bound of the length of the remainder, (...).
-    bends
+    scores
         Share of each side in the remainder, (..., n).
     """
 
     value: ComplexArray
     slopes: ComplexArray
-    rest: Array
-    bends: Array
+    remainder: Array
+    scores: Array
 
     @property
     def maximum(self) -> Array:
         """Upper bound of the length anywhere in a box, shape (...)."""
         size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
-        return np.asarray(size + self.rest)
+        return np.asarray(size + self.remainder)
 
 
 def series(
@@ -228,11 +228,11 @@ def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearRespon
     sizes[..., k, k] *= 0.5
     # a zero map has no remainder, even of a series that diverges
     size = norm_over(pulls / expansion.balance[:, :, None])
-    beyond = np.where(size > 0.0, size * np.where(size > 0.0, expansion.rest, 0.0), 0.0)
+    beyond = np.where(size > 0.0, size * np.where(size > 0.0, expansion.remainder, 0.0), 0.0)
     bends = sizes.sum(axis=-1)
     size_at_centre = np.linalg.norm(value, axis=(-2, -1)) * np.linalg.norm(expansion.motion, axis=-1)
     scores = np.where(
-        np.isfinite(expansion.rest)[..., None], bends, DIVERGENT * size_at_centre[..., None] * expansion.pull
+        np.isfinite(expansion.remainder)[..., None], bends, DIVERGENT * size_at_centre[..., None] * expansion.pull
     )
     middle = np.matmul(value, expansion.motion[..., None])[..., 0] + 0.5 * squares.sum(axis=-1)
     return LinearResponse(middle, first, bends.sum(axis=-1) + beyond, scores)

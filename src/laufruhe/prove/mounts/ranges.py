@@ -44,7 +44,7 @@ Band: TypeAlias = tuple[float, float]
 
 
 def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[Band]]:
-    """Return matrices L <= A by least frequency and sag (E31), U >= A (E43), and excluded bands (E53).
+    """Return matrices L <= A by lowest frequency and sag (E31), U >= A (E43), and excluded bands (E53).
 
     A is the stiffness in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are squares
     of angular frequencies [rad^2/s^2], less the tolerance of limits.

@@ -46,16 +46,16 @@ def ratio_under(elastic: LinearResponse, rigid: LinearResponse, groups: Sequence
     groups
         Orders of each ratio, from `groups_of`.
     """
-    best, scores = np.zeros(len(elastic.value)), np.zeros(elastic.bends[:, 0].shape)
+    best, scores = np.zeros(len(elastic.value)), np.zeros(elastic.scores[:, 0].shape)
     for group in groups:
         weights = group.astype(float)
         top, bottom = root_under(elastic, weights), root_under(rigid, weights)
         square = np.einsum("k,bk->b", weights, np.linalg.norm(rigid.slopes, axis=-1).sum(axis=-1) ** 2)
-        is_bounded = np.all(np.isfinite(rigid.rest[:, group]), axis=1) & (bottom.value > 0.0)
+        is_bounded = np.all(np.isfinite(rigid.remainder[:, group]), axis=1) & (bottom.value > 0.0)
         curvature = square / (2.0 * np.where(is_bounded, bottom.value, 1.0))
-        minimum = _least_ratio(top, replace(bottom, rest=bottom.rest + curvature))
+        minimum = _least_ratio(top, replace(bottom, remainder=bottom.remainder + curvature))
         best = np.maximum(best, np.where(is_bounded, minimum, 0.0))
-        scores = np.maximum(scores, (top.bends + minimum[:, None] * bottom.bends) / bottom.value[:, None])
+        scores = np.maximum(scores, (top.scores + minimum[:, None] * bottom.scores) / bottom.value[:, None])
     return best, scores
 
 
@@ -65,7 +65,7 @@ def _least_ratio(top: LinearBound, bottom: LinearBound) -> Array:
     high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
     for _ in range(HALVINGS):
         t = 0.5 * (low + high)
-        left = top.value - top.rest - t * (bottom.value + bottom.rest)
+        left = top.value - top.remainder - t * (bottom.value + bottom.remainder)
         holds = left - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1) >= 0.0
         low, high = np.where(holds, t, low), np.where(holds, high, t)
     return low

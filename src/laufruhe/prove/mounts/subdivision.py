@@ -1,7 +1,7 @@
 """Lower bounds of mount forces, travel and transmissibility by branch and bound over stiffnesses (E38-E40).
 
 On a box every measure has a linear lower bound, with an error of second order in the size of the box. Boxes whose
-bound is not under the incumbent, or that violate a limit, are dropped, and the others are halved. The least bound of
+bound is not below the incumbent, or that violate a limit, are dropped, and the others are halved. The lowest bound of
 the remaining boxes is a lower bound of the objective of every feasible design.
 """
 
@@ -193,7 +193,7 @@ class StiffnessBoxes:
             expansion = self.model.expanded(lines, lower, upper)
             minimum = lower_bound_of_norm(self.model, measure, lines, expansion)
             boxes.add(weight, minimum, left_out)
-            scores, size = scores + weight * minimum.bends, size + weight * minimum.value
+            scores, size = scores + weight * minimum.scores, size + weight * minimum.value
         self._add_limits(boxes, lower, upper)
         numbers, score = self._numbers(lower, upper)
         violated = self._violated(lower, upper)
@@ -234,7 +234,7 @@ class StiffnessBoxes:
             for limit in problem.limits:
                 if limit.measure == measure:
                     boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
-            scores = np.maximum(scores, minimum.bends / np.where(minimum.value > 0.0, minimum.value, 1.0)[:, None])
+            scores = np.maximum(scores, minimum.scores / np.where(minimum.value > 0.0, minimum.value, 1.0)[:, None])
         return scores
 
     def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:

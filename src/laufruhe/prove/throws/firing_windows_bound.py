@@ -1,8 +1,8 @@
 """Lower bounds of slightly uneven stars (S22, S24).
 
 As in S4 a direction v bounds the couples by sum_k x_k a_k, but a throw on step p may now stand anywhere in a window
-around it: as far as the intervals before and after it let its firing move. The least of x_k a_p over the window is a
-number for each throw and step, so every star is bounded by a sum, and all stars by the least of their bounds.
+around it: as far as the intervals before and after it let its firing move. The minimum of x_k a_p over the window is
+a number for each throw and step. A sum of them bounds every star, and the smallest sum bounds all stars.
 
 Gas has a mean torque that no throw changes, and a norm is never less than that of the mean over the cycle (S24).
 """
@@ -104,7 +104,7 @@ def star_bounds(costs: Array, stars: Stars) -> Array:
 
 
 def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
-    """Return the least of x_k a_p over the window of step p, shape (directions, throws, steps)."""
+    """Return the minimum of x_k a_p over the window of step p, shape (directions, throws, steps)."""
     lower, upper = windows(phasing, intervals)
     v = dual_directions(objective)
     orders = np.array(objective.orders, dtype=float)
@@ -124,8 +124,8 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
 def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
     """Return how far a throw of every step may stand from it, low and high [rad], cylinder 1 at its dead centre.
 
-    The s-th firing comes between s least and s most intervals after the first, and as
-    many before the next cycle. A throw fires later the less far ahead it stands.
+    The s-th firing follows the first by s minimum to s maximum intervals, and precedes the next cycle by the others.
+    A throw fires later the less far ahead it stands.
     """
     count, cycle, even = phasing.cylinders, phasing.cycle.angle, phasing.even_interval
     lattice = firing_lattice(phasing.cycle, count)
