@@ -112,7 +112,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
 INSTALL = "install laufruhe with all its folders"
 
 
-def lack(extension: str) -> tuple[str, str]:
+def missing_extension(extension: str) -> tuple[str, str]:
     """Return rule and remedy for a file that needs an extension of this package that is not installed."""
     return f"needs the extension '{extension}', which is not installed", INSTALL
 

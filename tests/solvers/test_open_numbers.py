@@ -15,7 +15,7 @@ from scipy.optimize import brentq, minimize
 import laufruhe
 from files.test_reader import complaint_about
 from laufruhe.errors import InputError, ModelError
-from laufruhe.files.nested import inside, number_at, put
+from laufruhe.files.nested import number_at, walk, with_value_at
 from laufruhe.files.problem_file import file_model
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -201,14 +201,14 @@ def test_a_bound_of_what_is_given_twice_is_one_line(tmp_path: Path) -> None:
 def _every_number(name: str) -> Iterator[tuple[dict[str, Any], tuple[str | int, ...]]]:
     """Yield the tables of a ready problem with one number open about where it stands, and its address, for each."""
     tables = tables_of(PROBLEMS / f"{name}.toml")
-    for place, node in inside(tables):
+    for place, node in walk(tables):
         number = None if isinstance(node, dict | list | bool) else number_at(file_model(), place)
         match = None if number is None else re.fullmatch(r"\s*([-+.\deE]+)(\D*.*)", str(node))
         if match is not None:
             value, unit = float(match[1]), match[2] if isinstance(node, str) else ""
             ends = [0.97 * value, 1.03 * value] if value else [0.0, 0.01]
             low, high = ((f"{end!r}{unit}" if unit else end) for end in sorted(ends))
-            yield put(tables, place, {"between": [low, high], "start": node}), place
+            yield with_value_at(tables, place, {"between": [low, high], "start": node}), place
 
 
 @pytest.mark.slow
@@ -229,7 +229,7 @@ def test_every_number_of_a_file_is_open_or_refused_in_a_line(name: str) -> None:
         for decision in numbers:
             middle = 0.5 * (decision.lower + decision.upper)
             (drive,) = decision.address_drives
-            drawn = load_tables(put(tables, place, drive.written(middle)), Path(f"{name}.toml"))
+            drawn = load_tables(with_value_at(tables, place, drive.written(middle)), Path(f"{name}.toml"))
             held = problem.fixed_at([middle], [decision])
             assert (held.engine, held.points) == (drawn.engine, drawn.points)
     assert opened > 5

@@ -14,7 +14,7 @@ from laufruhe.cli.screen import typed
 from laufruhe.errors import printed, refused
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import engine_named, engines
-from laufruhe.files.complaints import in_file, nearest
+from laufruhe.files.complaints import errors_in_file, nearest
 from laufruhe.files.toml_text import toml_value
 from laufruhe.report import files
 
@@ -102,7 +102,7 @@ def engine_list() -> str:
 
 def engine_details(names: Sequence[str]) -> str:
     """Return the catalogue entries of some engines as text."""
-    with in_file("laufruhe"):
+    with errors_in_file("laufruhe"):
         entries = [engine_named(name, "engine") for name in names]
     lines = []
     for k, one in enumerate(entries):

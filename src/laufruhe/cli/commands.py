@@ -38,7 +38,7 @@ from laufruhe.cli.screen import (
 )
 from laufruhe.cli.supervised import is_interrupted, listen, supervised
 from laufruhe.errors import refused
-from laufruhe.extension import HOMES, extended, lack
+from laufruhe.extension import HOMES, extended, missing_extension
 from laufruhe.numerics.cores import ONE_THREAD
 
 
@@ -65,7 +65,7 @@ class _Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command that is typed, or name the extension that it needs."""
         if args[0] in HOMES["commands"] and self.get_command(ctx, args[0]) is None:
-            raise refused(args[0], "", *lack(HOMES["commands"][args[0]]))
+            raise refused(args[0], "", *missing_extension(HOMES["commands"][args[0]]))
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, signals
-from laufruhe.fidelity.knob import LeftOut
+from laufruhe.fidelity.knob import OmittedPart
 from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
@@ -40,7 +40,7 @@ class Choice:
     fidelity: Fidelity
     error_estimate: float
     description: tuple[str, ...]
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[OmittedPart, ...]
     numbers: tuple[int, int]
 
 
@@ -61,16 +61,16 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     Choice with an error bound below the tolerance, if the reference is that exact. If the objective is zero, all parts
     that are not zero are computed.
     """
-    return chosen_by(Scale.of(problem, engine), tolerance)
+    return choose_from_scale(Scale.of(problem, engine), tolerance)
 
 
-def chosen_by(scale: Scale, tolerance: float) -> Choice:
+def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
     """Return the choice of `choose` from a known reference."""
-    allowed_error = max(tolerance - scale.doubt, 0.0)
+    allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:
         fidelity = knob.chosen(scale, fidelity, allowed_error)
-    estimate = scale.loses(fidelity) + scale.misses(fidelity) + scale.doubt
+    estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
     left = [part for knob in KNOBS for part in knob.left_out(scale, fidelity)]
     return Choice(
         fidelity,
@@ -88,7 +88,7 @@ def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) ->
     if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
         # simulations have no error bound for omitted orders
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    return problem.at(chosen_by(scale or Scale.of(problem), tolerance).fidelity)
+    return problem.at(choose_from_scale(scale or Scale.of(problem), tolerance).fidelity)
 
 
 def ladder(scale: Scale) -> list[tuple[str, Problem]]:

@@ -63,7 +63,7 @@ def relative(bound: float, value: float) -> float:
     return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
-def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
+def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
     """Return an upper bound of the sampling error of a measure, in its unit; zero without samples (F7, F8).
 
     Parameters
@@ -125,7 +125,7 @@ class Scale:
         """Return the evaluation of the same design at another fidelity."""
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
-    def lost(self, ours: Evaluation, theirs: Evaluation) -> float:
+    def largest_change(self, ours: Evaluation, theirs: Evaluation) -> float:
         """Return an upper bound of the change of the objective between the signals of two evaluations (F6)."""
         total = 0.0
         for term in self.terms:
@@ -136,12 +136,12 @@ class Scale:
             total += term.weight * term.measure.norm.upper_bound(left_out, shares)
         return total
 
-    def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
+    def sampling_error(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
         """Return an upper bound of the sampling error of the objective of an evaluation (F7, F8)."""
-        return sum(term.weight * missed(term.measure, evaluation, finest) for term in self.terms)
+        return sum(term.weight * measure_sampling_error(term.measure, evaluation, finest) for term in self.terms)
 
     @cached_property
-    def doubted(self) -> float:
+    def gas_step_error(self) -> float:
         """Upper bound of the error of the reference from the steps of the gas torque, in units of the objective (F9).
 
         With kinks in closed form the error falls at least in proportion to the step, so the change to half as many
@@ -150,25 +150,25 @@ class Scale:
         fidelity = self.best.fidelity
         if all(fidelity.gas_of(loads.point) is None for loads in self.best.loads):
             return 0.0
-        return self.lost(self.evaluation(replace(fidelity, gas_samples=fidelity.gas_steps // 2)), self.best)
+        return self.largest_change(self.evaluation(replace(fidelity, gas_samples=fidelity.gas_steps // 2)), self.best)
 
     @property
-    def doubt(self) -> float:
+    def relative_doubt(self) -> float:
         """Upper bound of the relative error of the reference itself (F9)."""
-        return relative(self.doubted, self.value) + ROUNDING
+        return relative(self.gas_step_error, self.value) + ROUNDING
 
-    def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
+    def relative_loss(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
         """Return an upper bound of the relative change of the objective by a fidelity (F6).
 
         The change is against the reference, or against the evaluation `than`.
         """
         if than is not None:
-            return relative(self.lost(self.evaluation(fidelity), than), self.value)
-        return self._once("loses", fidelity, lambda own: self.lost(own, self.best))
+            return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
+        return self._once("loses", fidelity, lambda own: self.largest_change(own, self.best))
 
-    def misses(self, fidelity: Fidelity) -> float:
+    def relative_sampling_error(self, fidelity: Fidelity) -> float:
         """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
-        return self._once("misses", fidelity, self.missed)
+        return self._once("misses", fidelity, self.sampling_error)
 
     def _once(self, name: str, fidelity: Fidelity, error: Callable[[Evaluation], float]) -> float:
         key = name, replace(fidelity, tolerance=None)
@@ -179,7 +179,11 @@ class Scale:
     def error_of(self, evaluation: Evaluation) -> float:
         """Return an upper bound of the relative error of an evaluation of the same design, as `error_bound` does."""
         value = value_of_loads(self.problem, evaluation)
-        bound = self.lost(evaluation, self.best) + self.missed(evaluation, self.best.samples) + self.doubted
+        bound = (
+            self.largest_change(evaluation, self.best)
+            + self.sampling_error(evaluation, self.best.samples)
+            + self.gas_step_error
+        )
         return relative(bound + ROUNDING * value, value)
 
     @cached_property
@@ -190,14 +194,14 @@ class Scale:
             for rotor in self.problem.engine.rotors
             if rotor.unbalance != 0 or rotor.name in self.open_rotors
         )
-        bases = [signal.repeat_order(ratios) for signal in self.driving]
+        bases = [signal.repeat_order(ratios) for signal in self.exciting_signals]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
 
     @property
-    def driving(self) -> list[Spectrum]:
+    def exciting_signals(self) -> list[Spectrum]:
         """Spectra of the loads on the block, of unit open unbalances, and of measured loads inside the crankcase."""
         inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
-        return [*(loads.wrench for loads in self.best.loads), *self.decided, *inside]
+        return [*(loads.wrench for loads in self.best.loads), *self.open_wrenches, *inside]
 
     @property
     def open_rotors(self) -> set[str]:
@@ -211,7 +215,7 @@ class Scale:
         return None if self.best.engine.block is None else mounting_in(self.best.engine)
 
     @cached_property
-    def decided(self) -> list[Spectrum]:
+    def open_wrenches(self) -> list[Spectrum]:
         """Wrenches of unit unbalances of the open rotors, at all positions along their open axes."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
         by_name = {rotor.name: rotor for rotor in rotors}
@@ -221,9 +225,13 @@ class Scale:
         return [rotor_loads([rotor], 1.0, self.problem.engine.cycle) for rotor in rotors]
 
     @cached_property
-    def decided_modes(self) -> set[int]:
+    def open_rotor_modes(self) -> set[int]:
         """Numbers of the natural modes that open rotors can excite, 1 the lowest."""
-        return {mode + 1 for load in self.decided for mode in self.mounting.excited(load)} if self.mounting else set()
+        return (
+            {mode + 1 for load in self.open_wrenches for mode in self.mounting.excited(load)}
+            if self.mounting
+            else set()
+        )
 
     @cached_property
     def excited_modes(self) -> tuple[int, ...]:
@@ -231,13 +239,15 @@ class Scale:
         if self.mounting is None:
             return ()
         modes = {mode + 1 for loads in self.best.loads for mode in self.mounting.excited(loads.wrench)}
-        return tuple(sorted(modes | self.decided_modes))
+        return tuple(sorted(modes | self.open_rotor_modes))
 
     @cached_property
-    def strengths(self) -> dict[int, float]:
+    def mode_contributions(self) -> dict[int, float]:
         """Upper bound of the relative contribution of each excited mode to the objective (F6)."""
         other_modes = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
-        return {mode: self.loses(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()}
+        return {
+            mode: self.relative_loss(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()
+        }
 
 
 def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> float:
@@ -265,11 +275,11 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     The physics is that of the fidelity of `evaluation`. Infinite if only the objective is zero.
     """
     scale = Scale(problem, evaluation)
-    bound = scale.missed(evaluation) + ROUNDING * scale.value
-    return relative(bound + sum(missed_of_gas(problem, evaluation)), scale.value)
+    bound = scale.sampling_error(evaluation) + ROUNDING * scale.value
+    return relative(bound + sum(gas_sampling_errors(problem, evaluation)), scale.value)
 
 
-def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
+def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
     """Return upper bounds of the errors of the objective from gas samples and from points of a trace (F9, F9a).
 
     Both are in the unit of the objective, and the same for all designs, because unbalances do not change the gas.
@@ -283,7 +293,7 @@ def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, floa
     initial = evaluation if still is fidelity else scale.evaluation(still)
     finer = replace(still, samples=2 * fidelity.samples, gas_samples=2 * fidelity.gas_steps)
     # the error at twice the steps is at most the change to twice the steps
-    steps = 2.0 * scale.lost(initial, scale.evaluation(finer))
+    steps = 2.0 * scale.largest_change(initial, scale.evaluation(finer))
     if not any(isinstance(fidelity.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
         return steps, 0.0
     changes, cycle = [], evaluation.engine.cycle

@@ -15,7 +15,7 @@ PART_SHARE = 0.1
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class OmittedPart:
     """Part of the physics that is not computed.
 
     Attributes
@@ -56,7 +56,7 @@ class Knob:
     schema: ClassVar[Mapping[str, Any]] = {}
     is_decided: ClassVar[bool] = True
 
-    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+    def refusal(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         """Return (rule, remedy) if a problem cannot have this value; None if it can."""
         return None
 
@@ -78,7 +78,7 @@ class Knob:
         """Return descriptions of the physics that the fidelity computes in this field."""
         return []
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
         """Return the parts that the fidelity omits in this field, with upper bounds of their effect."""
         return []
 
@@ -86,7 +86,7 @@ class Knob:
         """Return the fidelities that a trade tries for this field: (name, fidelity)."""
         return []
 
-    def away(self, problem: Problem) -> Rungs:
+    def without_part(self, problem: Problem) -> Rungs:
         """Return fidelities of a problem without one part of its loads: (name of the part, fidelity)."""
         return []
 
@@ -104,7 +104,7 @@ def first_sufficient(
     return candidate
 
 
-def part_left_out(scale: Scale, chosen: Fidelity, restored: Fidelity, what: str, why: str) -> LeftOut:
+def omitted_part(scale: Scale, chosen: Fidelity, restored: Fidelity, what: str, why: str) -> OmittedPart:
     """Return an omitted part with the bound of its effect, from the chosen fidelity and the one with the part."""
-    share = scale.loses(chosen, scale.evaluation(restored))
-    return LeftOut(what, why if share > 0.0 else "the objective does not count them", share, restored)
+    share = scale.relative_loss(chosen, scale.evaluation(restored))
+    return OmittedPart(what, why if share > 0.0 else "the objective does not count them", share, restored)

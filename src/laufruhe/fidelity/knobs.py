@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
-from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, first_sufficient, part_left_out
+from laufruhe.fidelity.knob import PART_SHARE, Knob, OmittedPart, Rungs, first_sufficient, omitted_part
 from laufruhe.fidelity.mount_knobs import MOUNT_KNOBS
 from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, RodModel
 from laufruhe.physics.mechanism import rod_effects
@@ -71,20 +71,24 @@ class _SwitchedPart(Knob):
         if fidelity.is_uneven or not self.is_there(scale.problem):
             return fidelity
         less = replace(fidelity, **self.less)
-        return less if scale.loses(less) - scale.loses(fidelity) <= PART_SHARE * allowed_error else fidelity
+        return (
+            less
+            if scale.relative_loss(less) - scale.relative_loss(fidelity) <= PART_SHARE * allowed_error
+            else fidelity
+        )
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
         if not self.is_there(scale.problem):
-            return [LeftOut(self.what, "the problem describes none")]
+            return [OmittedPart(self.what, "the problem describes none")]
         if self.is_active(scale.problem, fidelity):
             return []
         reason = "the objective hardly sees its roll moment"
-        return [part_left_out(scale, fidelity, replace(fidelity, **self.whole), self.what, reason)]
+        return [omitted_part(scale, fidelity, replace(fidelity, **self.whole), self.what, reason)]
 
     def rungs(self, scale: Scale) -> Rungs:
         return [(self.rung, Fidelity(samples=720, **self.less))] if self.is_there(scale.problem) else []
 
-    def away(self, problem: Problem) -> Rungs:
+    def without_part(self, problem: Problem) -> Rungs:
         return [(self.what, replace(problem.fidelity, **self.less))] if self.is_there(problem) else []
 
 
@@ -124,7 +128,9 @@ class _GasSamples(Knob):
     def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if not GAS.is_active(scale.problem, fidelity):
             return replace(fidelity, gas_samples=None)
-        return first_sufficient(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * allowed_error)
+        return first_sufficient(
+            fidelity, self.key, GAS_SAMPLES, lambda f: scale.relative_loss(f) <= GAS_SHARE * allowed_error
+        )
 
 
 class _Orders(Knob):
@@ -135,23 +141,23 @@ class _Orders(Knob):
         if fidelity.is_uneven:
             return fidelity
         return first_sufficient(
-            fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * allowed_error
+            fidelity, self.key, (*ORDERS, None), lambda f: scale.relative_loss(f) <= PHYSICS_SHARE * allowed_error
         )
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.decided]
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
+        wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.open_wrenches]
         parts = []
         idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
         if idle:
-            parts.append(LeftOut("loads " + ", ".join(idle), "nothing drives them"))
+            parts.append(OmittedPart("loads " + ", ".join(idle), "nothing drives them"))
         last = min(float(fidelity.orders or 8), 12.0)
         orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
-        silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.driving)]
+        silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.exciting_signals)]
         if silent:
-            parts.append(LeftOut("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
+            parts.append(OmittedPart("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
         if fidelity.orders is not None:
             what, restored = f"orders above {fidelity.orders}", replace(fidelity, orders=None)
-            parts.append(part_left_out(scale, fidelity, restored, what, "their forces are small"))
+            parts.append(omitted_part(scale, fidelity, restored, what, "their forces are small"))
         return parts
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -161,7 +167,7 @@ class _Orders(Knob):
             for orders, samples in ((4, 96), (8, 192), (24, 360))
         ]
 
-    def away(self, problem: Problem) -> Rungs:
+    def without_part(self, problem: Problem) -> Rungs:
         return [("orders above 2", replace(problem.fidelity, orders=2))]
 
 
@@ -170,7 +176,7 @@ class _GasOrders(Knob):
     key, kind = "gas_orders", int
     schema: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
 
-    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+    def refusal(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         return None if GAS.is_there(problem) else ("is a choice of gas", "leave it out, or add [gas]")
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -184,7 +190,7 @@ class _Crankshaft(Knob):
     key, kind, is_decided = "crankshaft", CrankshaftModel, False
     schema: ClassVar = {"description": "How main bearings share its loads: cut in its journals, or a continuous beam."}
 
-    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+    def refusal(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         return None if problem.engine.bearings else ("is a choice of main bearings", "leave it out, or list them")
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -210,19 +216,21 @@ class _Samples(Knob):
     def chosen(self, scale: Scale, fidelity: Fidelity, allowed_error: float) -> Fidelity:
         if fidelity.is_uneven:
             return fidelity
-        lost, steps = scale.loses(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
-        return first_sufficient(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= allowed_error)
+        lost, steps = scale.relative_loss(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
+        return first_sufficient(
+            fidelity, self.key, steps, lambda f: lost + scale.relative_sampling_error(f) <= allowed_error
+        )
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return [f"{fidelity.samples} steps over the cycle"]
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
         times = scale.repeats
-        again = LeftOut(f"{times - 1} of {times} parts of the cycle", "the loads repeat after each")
+        again = OmittedPart(f"{times - 1} of {times} parts of the cycle", "the loads repeat after each")
         finer = replace(fidelity, samples=REFERENCE_SAMPLES, gas_samples=fidelity.gas_steps)
-        share = scale.misses(fidelity) + scale.misses(finer)
+        share = scale.relative_sampling_error(fidelity) + scale.relative_sampling_error(finer)
         between = f"angles between {fidelity.samples} steps"
-        missed = LeftOut(between, "the force runs smoothly through them", share, finer)
+        missed = OmittedPart(between, "the force runs smoothly through them", share, finer)
         return [again, missed] if times > 1 else [missed]
 
     def rungs(self, scale: Scale) -> Rungs:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 from laufruhe.errors import UncarriedLoadError, plural
 from laufruhe.fidelity.error_bounds import Scale
-from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, part_left_out
+from laufruhe.fidelity.knob import PART_SHARE, Knob, OmittedPart, Rungs, omitted_part
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity, MountModel
 from laufruhe.problem.problem import Problem
@@ -22,7 +22,7 @@ RIGID = "rigid mounts, 720 steps"
 class _OfElasticMounts(Knob):
     """Knob for a block on elastic mounts; with open mounts only its exact value is allowed."""
 
-    def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
+    def refusal(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         if value == getattr(EXACT, self.key):
             return None
         if problem.engine.block is None:
@@ -45,22 +45,20 @@ class _Mounts(_OfElasticMounts):
             return fidelity
         rigid = replace(fidelity, mounts="rigid")
         try:
-            lost = scale.loses(rigid)
+            lost = scale.relative_loss(rigid)
         except UncarriedLoadError:
             return fidelity
-        return rigid if lost <= scale.loses(fidelity) + PART_SHARE * allowed_error else fidelity
+        return rigid if lost <= scale.relative_loss(fidelity) + PART_SHARE * allowed_error else fidelity
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["mounts as if they gave no way"] if scale.mounting and fidelity.mounts == "rigid" else []
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
         if scale.mounting is None or fidelity.mounts != "rigid":
             return []
         restored = replace(fidelity, mounts="frequency")
         return [
-            part_left_out(
-                scale, fidelity, restored, "motion of the block", "its mounts hardly give way at these orders"
-            )
+            omitted_part(scale, fidelity, restored, "motion of the block", "its mounts hardly give way at these orders")
         ]
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -82,12 +80,12 @@ class _Modes(_OfElasticMounts):
         """Return the fidelity without modes of small response; modes that open rotors excite stay."""
         if fidelity.mounts != "frequency" or not self.is_open(scale):
             return fidelity
-        allowed = scale.loses(fidelity) + PART_SHARE * allowed_error
+        allowed = scale.relative_loss(fidelity) + PART_SHARE * allowed_error
         result, modes = fidelity, scale.excited_modes
-        for mode in sorted(set(modes) - scale.decided_modes, key=lambda mode: scale.strengths[mode]):
+        for mode in sorted(set(modes) - scale.open_rotor_modes, key=lambda mode: scale.mode_contributions[mode]):
             modes = tuple(m for m in modes if m != mode)
             candidate = replace(fidelity, modes=modes)
-            if scale.loses(candidate) > allowed:
+            if scale.relative_loss(candidate) > allowed:
                 break
             result = candidate
         return result
@@ -99,23 +97,23 @@ class _Modes(_OfElasticMounts):
         note = "; modes are of the stiffness at rest, loads of that at each frequency" if scale.mounting.dynamic else ""
         return [f"{mode_names(scale.mounting, modes)} of the block on its mounts{note}"]
 
-    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
+    def left_out(self, scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
         if scale.mounting is None:
             return []
         parts, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
         if still:
-            parts.append(LeftOut(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+            parts.append(OmittedPart(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
         if fidelity.modes is not None:
             silent = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
             what, all_modes = f"{mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
-            parts.append(part_left_out(scale, fidelity, all_modes, what, "what they answer is small"))
+            parts.append(omitted_part(scale, fidelity, all_modes, what, "what they answer is small"))
         return parts
 
     def rungs(self, scale: Scale) -> Rungs:
         """Return variants with the one and the three modes of largest response."""
         if scale.mounting is None or not scale.terms:
             return []
-        by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
+        by_strength = sorted(scale.mode_contributions, key=lambda mode: -scale.mode_contributions[mode])
         maximum = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
         return [
             (f"{plural('mode', len(m))} {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.fidelity.automatic import Choice
-from laufruhe.fidelity.knob import LeftOut
+from laufruhe.fidelity.knob import OmittedPart
 from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.fidelity.mount_knobs import mode_names
 from laufruhe.machine import Mount
@@ -39,7 +39,7 @@ def needs(problem: Problem) -> Choice:
     parts = [*_loads(problem)] if _moved(initial, _values(replace(problem, points=()))) else []
     if not parts:
         part = "loads at every speed: gas, pistons, rods, rotors"
-        left.append(LeftOut(part, "nothing that is asked depends on them"))
+        left.append(OmittedPart(part, "nothing that is asked depends on them"))
     for name, changed in (*parts, *_of_the_block(problem)):
         change = _moved(initial, _values(changed))
         if change > SAME:
@@ -47,7 +47,7 @@ def needs(problem: Problem) -> Choice:
                 f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %"
             )
         else:
-            left.append(LeftOut(name, "nothing that is asked depends on it"))
+            left.append(OmittedPart(name, "nothing that is asked depends on it"))
     left += _modes_of_the_sag(problem)
     # mount force components that are sampled for these measures, and by an evaluation with all loads
     count = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
@@ -68,7 +68,7 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
     quick = tuple(replace(point, speed=MORE * point.speed) for point in problem.points)
     yield "crank speed", replace(problem, points=quick)
     for knob in KNOBS:
-        yield from ((name, replace(problem, fidelity=fidelity)) for name, fidelity in knob.away(problem))
+        yield from ((name, replace(problem, fidelity=fidelity)) for name, fidelity in knob.without_part(problem))
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -96,11 +96,11 @@ def _turned_stiffer(spring: Mount) -> Mount:
     return replace(spring, stiffness=(MORE * x, y, z / MORE))
 
 
-def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:
+def _modes_of_the_sag(problem: Problem) -> list[OmittedPart]:
     if {measure.channel for measure in problem.measures if measure.is_mounting} != {channels.SAG}:
         return []
     mounting = mounting_in(problem.engine)
     drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))
     still = [k + 1 for k in range(len(drive)) if drive[k] <= SAME * drive.max()]
     what = f"{mode_names(mounting, still)} of the block"
-    return [LeftOut(what, "weight does not move them")] if still else []
+    return [OmittedPart(what, "weight does not move them")] if still else []

@@ -29,7 +29,7 @@ class MainBearingTable(Table):
     friction: f.NonNegative | None = f.optional("Coefficient of friction; needed for friction power.")
 
 
-def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
+def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
     """Return one table for each bearing; `beside_throws` becomes bearings between and beyond the throws of a shaft."""
     single: list[MainBearingTable] = []
     for k, table in enumerate(tables, 1):

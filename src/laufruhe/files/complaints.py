@@ -18,7 +18,7 @@ from pydantic_core import PydanticCustomError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
-from laufruhe.extension import HOMES, INSTALL, Tables, lack
+from laufruhe.extension import HOMES, INSTALL, Tables, missing_extension
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
 
@@ -103,7 +103,7 @@ def key_path(loc: Sequence[str | int]) -> str:
     return text
 
 
-def short(value: Any) -> str:
+def value_text(value: Any) -> str:
     """Return a value as it stands in the file, cut after 60 characters."""
     if isinstance(value, dict | list):
         return printed(json.dumps(value, default=str, ensure_ascii=False), 60)
@@ -142,7 +142,7 @@ def nearest_file(path: Path, otherwise: str) -> str:
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden" and len(loc) == 1 and loc[0] in HOMES["keys"]:
-        return Complaint(where, "", *lack(HOMES["keys"][str(loc[0])]))
+        return Complaint(where, "", *missing_extension(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
         homes = [
@@ -153,7 +153,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")
         if loc[-1] == "unit":
             remedy = 'write the unit with its number, as in "120 mm"'
-        return Complaint(where, short(detail["input"]), "is not a key here", remedy)
+        return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
     if kind.startswith("union_tag_"):
@@ -167,19 +167,19 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         value = detail["ctx"].get("tag", detail["input"])
         table = _TABLES.get(where.rpartition(".")[2])
         if table and (extension := HOMES[table].get(str(value))):
-            return Complaint(where, short(value), *lack(extension))
+            return Complaint(where, value_text(value), *missing_extension(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # two or three words are all named, because the nearest spelling may be the wrong one
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
-        return Complaint(where, short(value), "is not allowed", remedy)
+        return Complaint(where, value_text(value), "is not allowed", remedy)
     if kind in _COUNTED:
         sense, key, remedy = _COUNTED[kind]
         rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} belong there"
-        return Complaint(where, short(detail["input"]), rule, remedy)
+        return Complaint(where, value_text(detail["input"]), rule, remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None
     rule, _, remedy = (form or _RULES.get(kind, message)).partition("; ")
-    return Complaint(where, short(detail["input"]), rule, remedy or "correct it")
+    return Complaint(where, value_text(detail["input"]), rule, remedy or "correct it")
 
 
 class Refused(LaufruheError):
@@ -196,11 +196,11 @@ class Refused(LaufruheError):
     """
 
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
-        self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
+        self.complaint = Complaint(where, "" if value is None else value_text(value), rule, remedy)
         super().__init__(str(self.complaint))
 
 
-def number_read(number: Number, place: Sequence[str | int], raw: Any) -> float | Open:
+def read_number(number: Number, place: Sequence[str | int], raw: Any) -> float | Open:
     """Return the number that a field reads from a raw value of a file [SI].
 
     Raises
@@ -216,7 +216,7 @@ def number_read(number: Number, place: Sequence[str | int], raw: Any) -> float |
 
 
 @contextmanager
-def in_file(source: object) -> Iterator[None]:
+def errors_in_file(source: object) -> Iterator[None]:
     """Turn `Refused` in the block into `InputError` with the name of the file, `source`."""
     try:
         yield
@@ -224,7 +224,7 @@ def in_file(source: object) -> Iterator[None]:
         raise InputError(str(source), (refused.complaint,)) from None
 
 
-def measured(text: str | float, unit: str, where: str, unit_text: str | None = None) -> float:
+def si_value(text: str | float, unit: str, where: str, unit_text: str | None = None) -> float:
     """Return the SI value of a text such as '120 mm', or of a plain number.
 
     Parameters
@@ -248,7 +248,7 @@ def measured(text: str | float, unit: str, where: str, unit_text: str | None = N
 
 
 @contextmanager
-def blamed_on(where: str, value: str = "") -> Iterator[None]:
+def errors_at_key(where: str, value: str = "") -> Iterator[None]:
     """Turn `ModelError` in the block into `Refused` at this key, with its value."""
     try:
         yield
@@ -257,7 +257,7 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
         raise Refused(complaint.where, complaint.value or None, complaint.rule, complaint.remedy) from None
 
 
-def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
+def require_one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
     """Raise `Refused` unless exactly one of two keys is given.
 
     Parameters
@@ -279,14 +279,14 @@ def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None
         raise Refused(f"{where}.{key}", shown, state, f"give {key} or {named or other}, one of them")
 
 
-def none_of(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
+def refuse_keys(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
     """Raise `Refused` if one of these keys differs from its default."""
     for key in keys:
         if getattr(table, key) != type(table).model_fields[key].default:
             raise Refused(f"{where}.{key}", None, rule, remedy)
 
 
-def all_different(things: Sequence[Any], where: str, rule: str, remedy: str = "rename one") -> None:
+def require_distinct(things: Sequence[Any], where: str, rule: str, remedy: str = "rename one") -> None:
     """Raise `Refused` if two values are equal; `rule` follows the word "two"."""
     for k, thing in enumerate(things):
         if thing in things[:k]:

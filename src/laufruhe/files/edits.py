@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest
-from laufruhe.files.nested import at, put
+from laufruhe.files.nested import at, with_value_at
 from laufruhe.files.problem_file import EXTENSION_KEYS, file_model
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.files.study_tables import keys_of
@@ -44,7 +44,7 @@ def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, An
     """Return tables with another value of one number; an open one starts there and stays open."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
-    return put(tables, keys, {**now, "start": value} if _is_open(now) else value)
+    return with_value_at(tables, keys, {**now, "start": value} if _is_open(now) else value)
 
 
 def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
@@ -52,7 +52,7 @@ def open_number(tables: Mapping[str, Any], name: str, low: Any, high: Any, start
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
     first = start if start is not None else now.get("start") if _is_open(now) else now
-    return put(tables, keys, {"between": [low, high], **({} if first is None else {"start": first})})
+    return with_value_at(tables, keys, {"between": [low, high], **({} if first is None else {"start": first})})
 
 
 def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def fix_number(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[
         if not _is_open(now):
             raise Refused(name, now, "is not open", "give a value for it")
         value = now.get("start", _default_start(*now["between"]))
-    edited = put(tables, keys, value)
+    edited = with_value_at(tables, keys, value)
     # an angle may be open only together with its size
     if keys[-1] in _SIZES and _is_open(at(edited, (*keys[:-1], "angle"))):
         return fix_number(edited, f"{name.rpartition('.')[0]}.angle")

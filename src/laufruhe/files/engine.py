@@ -11,7 +11,7 @@ from pydantic import BaseModel, Field
 from laufruhe import units
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.files.rotors import CounterweightTable, check_factors
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
@@ -175,7 +175,7 @@ class EngineTable(Table):
 
 def cycle_of(table: EngineTable) -> Cycle:
     """Return the working cycle."""
-    with blamed_on("engine.cycle"):
+    with errors_at_key("engine.cycle"):
         return table.kind.cycle(_CYCLES[table.cycle])
 
 
@@ -188,12 +188,12 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     _check_pistons(table)
     drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
     foreign_keys = [key.name for other_drive in DRIVES.values() for key in other_drive.keys if key not in drive.keys]
-    none_of(table, foreign_keys, "engine", rule, "leave it out")
+    refuse_keys(table, foreign_keys, "engine", rule, "leave it out")
     if kind.needs_rod and not drive.has_rod:
         remedy = "leave it out, or take another layout"
         raise Refused("engine.drive", table.drive, "has no rod, and this layout needs a master rod", remedy)
     if not drive.has_rod:
-        none_of(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
+        refuse_keys(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
@@ -202,7 +202,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
         return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
     inputs, layout = _layout_input(table, gas), layout_of(table)
     throws = _throws(table, layout)
-    with blamed_on("engine.firing_order" if table.listed_order else "engine"):
+    with errors_at_key("engine.firing_order" if table.listed_order else "engine"):
         parts, cranks = kind.parts(inputs, layout, throws)
     return _sharing_chambers(table, parts, gas), cranks
 
@@ -213,7 +213,7 @@ def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: boo
             if part.faces(previous) and minimum_room(part, previous) <= 0.0:
                 rule = f"leaves {part.name} and {previous.name} no chamber: their pins meet"
                 raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
-    with blamed_on("engine"):
+    with errors_at_key("engine"):
         return with_shared_chambers(parts, cycle_of(table).angle) if gas else tuple(parts)
 
 
@@ -223,13 +223,13 @@ def _check_pistons(table: EngineTable) -> None:
             if getattr(table, key) is None:
                 raise Refused(f"engine.{key}", None, "is missing", "add it")
     else:
-        none_of(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
+        refuse_keys(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
 
 
 def layout_of(table: EngineTable) -> Layout:
     """Return the layout of [engine]: positions, banks and pins, without masses."""
     _check_pistons(table)
-    with blamed_on("engine.cylinders"):
+    with errors_at_key("engine.cylinders"):
         return table.kind.place(_layout_input(table))
 
 
@@ -282,7 +282,7 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
         if len(layout.throw_positions) == 1:
             return (layout.banks[0] - layout.pin_offsets[0],)
         raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
-    with blamed_on("engine.firing_order"):
+    with errors_at_key("engine.firing_order"):
         return even_throws(cycle_of(table), layout, table.listed_order)
 
 
@@ -296,7 +296,7 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
     if table.rod is not None:
         if math.isinf(rod_length):
             raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
-        with blamed_on("engine.rod"):
+        with errors_at_key("engine.rod"):
             rod = rod_of("rod", table.rod.model_dump(), rod_length, "crank pin")
         if table.rod_inertia_deficit != 0.0:
             raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
@@ -327,8 +327,8 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     drive, sizes = DRIVES[table.drive], _sizes(table)
     ratio, length = sizes.rod_ratio, sizes.rod_length
     if drive.has_rod:
-        one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
-    with blamed_on("engine.offset"):
+        require_one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
+    with errors_at_key("engine.offset"):
         radius = drive.radius(sizes)
     rod = length if length is not None else (radius / ratio if ratio else math.inf)
     turning = (radius + abs(table.offset)) / rod
@@ -352,7 +352,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         where = f"engine.shafts[{k + 1}]"
         if shaft.name in shafts:
             raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
-        with blamed_on(where):
+        with errors_at_key(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     # slider-cranks on one throw share the rotating mass of the throw
     pins = [(part.shaft, part.x, direction(part.throw)) for part in table.slider_cranks if part.rotating_mass is None]
@@ -367,7 +367,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         carrying_shaft, rotating = shafts[part.shaft], part.rotating_mass
         if rotating is None:
             rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
-        with blamed_on(where):
+        with errors_at_key(where):
             mechanism, _ = _mechanism(table.model_copy(update=overrides))
             first = (part.bank_angle - part.throw) / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first

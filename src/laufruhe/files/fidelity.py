@@ -44,7 +44,7 @@ class FidelityTable(Table):
         return getattr(self, key)
 
 
-def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
+def with_fidelity(problem: Problem, table: FidelityTable) -> Problem:
     """Return the problem at the fidelity of a table."""
     is_auto = table.kinematics == "auto"
     if table.tolerance is not None and not is_auto:
@@ -57,7 +57,7 @@ def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
             continue
         if is_auto and knob.is_decided:
             raise Refused(f"fidelity.{knob.key}", value, 'is chosen by kinematics = "auto"', "leave it out")
-        refused = knob.refused(problem, value)
+        refused = knob.refusal(problem, value)
         if refused is not None:
             raise Refused(f"fidelity.{knob.key}", value, *refused)
         options[knob.key] = tuple(value) if isinstance(value, list) else value

@@ -21,7 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
-from laufruhe.extension import HOMES, extensions, lack
+from laufruhe.extension import HOMES, extensions, missing_extension
 from laufruhe.machine.crank_names import CRANKS
 from laufruhe.problem.decision import Decision, Drive
 from laufruhe.problem.sets import Interval
@@ -190,7 +190,7 @@ class Number:
 def _without_note(text: str) -> str:
     # complaint about a note of an extension that is not installed; empty for other texts
     home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
-    return "" if not home or any(one.name == home for one in extensions()) else "; ".join(lack(home))
+    return "" if not home or any(one.name == home for one in extensions()) else "; ".join(missing_extension(home))
 
 
 @dataclass(frozen=True)

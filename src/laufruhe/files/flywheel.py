@@ -9,7 +9,7 @@ from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, one_of
+from laufruhe.files.complaints import Refused, require_one_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Arms, Flywheel, GearedInertia, Rim
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
@@ -59,7 +59,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
     """Return the flywheel, or the inertia of [fidelity] as one, and the decisions about it."""
     if table is None:
         return None if crank_inertia is None else Flywheel(crank_inertia), []
-    one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
+    require_one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
     if table.rim is None:
         if table.crankshaft_inertia is not None:
             rule = "needs a rim; inertia is that of all that turns"

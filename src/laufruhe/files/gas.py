@@ -11,7 +11,7 @@ from pydantic import Field
 
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, all_different, blamed_on, measured
+from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.machine import (
@@ -155,13 +155,13 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
     if table is None:
         return None
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
-    with blamed_on("gas"):
+    with errors_at_key("gas"):
         if isinstance(table, ChambersTable):
             return Chambers(_chambers(table, folder, cycle, parts), air)
         if isinstance(table, TraceTable):
             return replace(_trace(table, folder, "gas"), crankcase_pressure=air)
         gas: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
-    with blamed_on("gas.compression_ratio"):
+    with errors_at_key("gas.compression_ratio"):
         for part in parts:
             check_chamber(gas, part)
     return gas
@@ -177,7 +177,7 @@ def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[
         rule = "has pistons that share a chamber, and each chamber of [gas] needs a cylinder head"
         raise Refused("engine.layout", None, rule, "give each piston its own cylinder, or leave gas out")
     chambers = tuple(_chamber(chamber_table, k, folder, parts) for k, chamber_table in enumerate(table.chambers, 1))
-    all_different([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
+    require_distinct([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
     return chambers
 
 
@@ -193,16 +193,16 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
         if number > len(parts):
             rule = f"is not among {counted(len(parts), 'cylinder')}"
             raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
-    with blamed_on(f"{where}.{key}"):
+    with errors_at_key(f"{where}.{key}"):
         is_trace = key == "trace"
         model = _trace(diagram, folder, f"{where}.trace") if is_trace else diagram.makes(**diagram.model_dump())
     names = tuple(parts[number - 1].name for number in numbers)
-    with blamed_on(f"{where}.rod"):
+    with errors_at_key(f"{where}.rod"):
         return Chamber(table.name or f"chamber {k}", names, table.end, table.bore, table.rod, model)
 
 
 def _trace(table: TraceTable | SideTraceTable, folder: Path, key: str) -> PressureTrace:
-    angle = measured(f"1 {table.angle_unit}", "rad", f"{key}.angle_unit", table.angle_unit)
-    pressure = measured(f"1 {table.pressure_unit}", "Pa", f"{key}.pressure_unit", table.pressure_unit)
+    angle = si_value(f"1 {table.angle_unit}", "rad", f"{key}.angle_unit", table.angle_unit)
+    pressure = si_value(f"1 {table.pressure_unit}", "Pa", f"{key}.pressure_unit", table.pressure_unit)
     pairs = rows_of(table.file, folder / table.file, f"{key}.file", ("crank angle", "pressure"))
     return PressureTrace(tuple(a * angle for a, _ in pairs), tuple(p * pressure for _, p in pairs))

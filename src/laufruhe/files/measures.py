@@ -11,9 +11,9 @@ from pydantic import Field, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import ModelError
-from laufruhe.extension import HOMES, lack
+from laufruhe.extension import HOMES, missing_extension
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, blamed_on, measured, nearest, one_of
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_one_of, si_value
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
@@ -134,12 +134,14 @@ class MeasureContext:
         """
         if name not in MEASURES:
             home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
-            raise Refused(where, name, *(lack(home) if home else ("is no quantity", nearest(name, list(MEASURES)))))
+            raise Refused(
+                where, name, *(missing_extension(home) if home else ("is no quantity", nearest(name, list(MEASURES))))
+            )
         channel, norm = MEASURES[name]
         key, names, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
         if not channel.needs.of(self.engine):
             raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)
-        with blamed_on(where):
+        with errors_at_key(where):
             channel.check_sizes(self.engine, self.points[0])
         for mount in self.engine.mounts if channel in _OF_CONSTANT_STIFFNESS else ():
             if mount.depends_on_frequency:
@@ -277,7 +279,7 @@ def objectives_of(
 
 def _terms(table: ObjectiveTable, scene: MeasureContext, where: str) -> tuple[Term, ...]:
     # norms of loads come before numbers of the mounts
-    one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
+    require_one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
         return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
     terms = [
@@ -339,7 +341,7 @@ def _limit(table: ConstraintTable, where: str, scene: MeasureContext) -> Limit:
 
 
 def _bound(text: str | float, measure: Measure, where: str) -> float:
-    value = measured(text, measure.unit, where)
+    value = si_value(text, measure.unit, where)
     if value < 0.0:
         rule = "is negative" if measure.channel.is_number else "is negative, and a limit on a norm cannot be"
         raise Refused(where, text, rule, "give a value of zero or more")

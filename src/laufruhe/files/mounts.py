@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, all_different, blamed_on, measured, nearest, none_of
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_distinct, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Block, Mount
@@ -194,7 +194,7 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
         raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
     (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
     x, y, z = block.centre_of_gravity
-    with blamed_on("block"):
+    with errors_at_key("block"):
         body = Block(block.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), block.turning_inertia)
     return _elastic(table, body, folder)
 
@@ -207,17 +207,17 @@ def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
     names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
     if len(names) != len(places):
         raise Refused("mounts.names", names, f"names {len(names)} of {len(places)} mounts", "name each once")
-    all_different(list(names), "mounts.names", "mounts have one name")
+    require_distinct(list(names), "mounts.names", "mounts have one name")
     return places, list(names)
 
 
 def _rigid(table: MountsTable) -> tuple[Mount, ...]:
-    none_of(table, ("stiffness", "loss_factor", "damping_per_stiffness", "stop"), "mounts", *_NOT_RIGID)
+    refuse_keys(table, ("stiffness", "loss_factor", "damping_per_stiffness", "stop"), "mounts", *_NOT_RIGID)
     places, names = _places(table)
     mounts = []
     for k, (name, place) in enumerate(zip(names, places, strict=True), 1):
         where = f"mounts.places[{k}]"
-        none_of(place, _ELASTIC, where, *_NOT_RIGID)
+        refuse_keys(place, _ELASTIC, where, *_NOT_RIGID)
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
             own = f"places[{k}]." if place.relative_stiffness else ""
@@ -227,7 +227,7 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
             values = _values(table, place, key, where, "add it, or mirror_of")
             numbers += [Open.from_value(value).start for value in values]
         mounts.append(mount_from_numbers(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
-    all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
+    require_distinct([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
     return tuple(mounts)
 
 
@@ -241,13 +241,13 @@ def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy:
 
 
 def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
-    none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
+    refuse_keys(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
     numbers, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
     springs = []
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
         where, stop = f"mounts.places[{k + 1}]", place.stop or table.stop
-        none_of(place, ("relative_stiffness",), where, *_NOT_ELASTIC)
+        refuse_keys(place, ("relative_stiffness",), where, *_NOT_ELASTIC)
         leader, followed = _leader(place, names, k, where), _followed(place)
         joined = _joined(place, names, joins, where)
         joins.append(joined)
@@ -269,7 +269,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
         for k in sorted(set(joins))
     )
     numbers.sort([j for k in sorted(set(joins)) for j, first in enumerate(joins) if first == k])
-    with blamed_on("mounts"):
+    with errors_at_key("mounts"):
         loose = free_motion(elastic_mounting(block, mounts).modes)
     if loose:
         remedy = "add a mount or a stiffness there; an open stiffness may need a start above zero"
@@ -291,8 +291,8 @@ def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
 
 
 def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> MeasuredStiffness:
-    hertz = measured(f"1 {table.frequency_unit}", "Hz", f"{where}.frequency_unit", table.frequency_unit)
-    unit = measured(f"1 {table.stiffness_unit}", "N/m", f"{where}.stiffness_unit", table.stiffness_unit)
+    hertz = si_value(f"1 {table.frequency_unit}", "Hz", f"{where}.frequency_unit", table.frequency_unit)
+    unit = si_value(f"1 {table.stiffness_unit}", "N/m", f"{where}.stiffness_unit", table.stiffness_unit)
     by_angle = table.columns == "amount and angle"
     names = ("frequency", *(("stiffness", "loss angle") if by_angle else ("stiffness", "loss stiffness")))
     rows = rows_of(table.file, folder / table.file, f"{where}.file", names)
@@ -305,7 +305,7 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
             raise Refused(f"{where}.file", table.file, rule, "give it from 0 to 180, or set columns")
         value = amount * np.exp(1j * math.radians(second)) if by_angle else complex(amount, second)
         values.append(complex(unit * value))
-    with blamed_on(f"{where}.file", table.file):
+    with errors_at_key(f"{where}.file", table.file):
         return MeasuredStiffness(
             _AXES.index(table.axis), tuple(math.tau * hertz * row[0] for row in rows), tuple(values)
         )
@@ -321,7 +321,7 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
         key = "like" if place.like else "mirror_of"
         remedy = nearest(leader, names[:k]) if k else "define the other mount first"
         raise Refused(f"{where}.{key}", leader, "is no mount defined before this one", remedy)
-    none_of(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
+    refuse_keys(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
     return names.index(leader)
 
 
@@ -337,7 +337,7 @@ def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: st
     if names[first] != leader:
         remedy = f"name that one, '{names[first]}'"
         raise Refused(f"{where}.joined_to", leader, "is joined to another mount itself", remedy)
-    none_of(place, (_AT,), where, f"is that of '{leader}' already", "leave one out")
+    refuse_keys(place, (_AT,), where, f"is that of '{leader}' already", "leave one out")
     return first
 
 
@@ -387,7 +387,7 @@ def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple
     if tables and block is None:
         rule = "needs elastic mounts"
         raise Refused("load_cases", None, rule, 'add [mounts] with kind = "elastic", and [block]')
-    all_different([table.name for table in tables], "load_cases", "load cases have one name")
+    require_distinct([table.name for table in tables], "load_cases", "load cases have one name")
     cases = []
     for k, table in enumerate(tables, 1):
         if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):

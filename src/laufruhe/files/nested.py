@@ -22,7 +22,7 @@ def at(node: Any, place: Sequence[Any]) -> Any:
     return node
 
 
-def put(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str, Any]:
+def with_value_at(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str, Any]:
     """Return a copy of the tables with another value at an address; unchanged parts are shared."""
     result = dict(tables)
     table: Any = result
@@ -33,7 +33,7 @@ def put(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str
     return result
 
 
-def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
+def walk(tables: Any) -> Iterator[tuple[Place, Any]]:
     """Yield (address, value) of all values in nested tables, outer ones first."""
     left = deque[tuple[Place, Any]]([((), tables)])
     while left:
@@ -45,7 +45,7 @@ def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
 
 def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
     """Yield (address, text) of all texts in nested tables."""
-    return ((place, node) for place, node in inside(tables) if isinstance(node, str))
+    return ((place, node) for place, node in walk(tables) if isinstance(node, str))
 
 
 def plain(raw: Any, depth: int) -> Any:

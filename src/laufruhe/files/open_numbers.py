@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path, number_read
-from laufruhe.files.nested import Place, annotations_at, at, inside, number_at, put, tables_on
+from laufruhe.files.complaints import Refused, key_path, read_number
+from laufruhe.files.nested import Place, annotations_at, at, number_at, tables_on, walk, with_value_at
 from laufruhe.files.problem_file import EXTENSION_KEYS, Note, ProblemFile, file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.machine.layouts import LAYOUTS
@@ -27,7 +27,7 @@ _TOGETHER = ("bank_angle", "split_pin_angle")
 def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decision, ...]]:
     """Return the tables with open numbers that no key reads replaced by their start, and the decisions about them."""
     closed, decisions = dict(tables), list[Decision]()
-    for place, node in inside(tables):
+    for place, node in walk(tables):
         if not isinstance(node, dict) or "between" not in node or not annotations_at(file_model(), place):
             continue
         number = number_at(file_model(), place)
@@ -40,10 +40,10 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
         if number is None:
             rule = "cannot be left open: it is a count, a name or a choice, not a physical number"
             raise Refused(key_path(place), node, rule, "give a value, and compare others in a study")
-        open_number = number_read(replace(number, openable=True), place, node)
+        open_number = read_number(replace(number, openable=True), place, node)
         assert isinstance(open_number, f.Open)
         drive = AddressDrive(place, number.unit)
-        closed = put(closed, place, drive.written(open_number.start))
+        closed = with_value_at(closed, place, drive.written(open_number.start))
         decisions += open_number.decisions(_name(tables, place), number.unit, drive)
     return closed, tuple(decisions)
 

@@ -12,7 +12,7 @@ from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, all_different, blamed_on, measured, one_of
+from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, require_one_of, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Table
 from laufruhe.machine import Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
@@ -78,7 +78,7 @@ class Brake:
 
     def __init__(self, table: FrictionTable, folder: Path, displacement: float, cycle: Cycle) -> None:
         self.table, self.displacement, self.turns = table, displacement, cycle.turns
-        one_of(table, "friction", "file", "fmep")
+        require_one_of(table, "friction", "file", "fmep")
         if table.file is not None and table.deviation is not None:
             raise Refused("friction.deviation", None, "follows from the file", "leave it out")
         self.said: list[str] = []
@@ -88,12 +88,12 @@ class Brake:
     def _read(self, file: str, folder: Path) -> list[tuple[float, ...]]:
         """Return the rows of the file: speed [rad/s], mean pressure [Pa] and, for kind fuel, fuel."""
         names = ("speed", "load", "fuel")[: 3 if self.table.kind == "fuel" else 2]
-        speed = measured(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
+        speed = si_value(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
         text, unit = f"1 {self.table.load_unit}", self.table.load_unit
         if units.dimension_of(text) == "N m":
-            load = self.pressure(measured(text, "N m", "friction.load_unit", unit))
+            load = self.pressure(si_value(text, "N m", "friction.load_unit", unit))
         else:
-            load = measured(text, "Pa", "friction.load_unit", unit)
+            load = si_value(text, "Pa", "friction.load_unit", unit)
         rows = rows_of(file, folder / file, "friction.file", names)
         for k, row in enumerate(rows, 1):
             if not all(map(math.isfinite, row)):
@@ -136,7 +136,7 @@ class Brake:
         if self.table.fmep is not None:
             return Friction(self.table.fmep, self.table.deviation or 0.0)
         readings = self._readings(speed)
-        with blamed_on("friction.file", self.table.file or ""):
+        with errors_at_key("friction.file", self.table.file or ""):
             if self.table.kind == "motoring":
                 return motoring_friction([row[0] for row in readings], [row[1] for row in readings], speed)
             if len(readings) < FEWEST:
@@ -180,13 +180,13 @@ def operating_points(
     if len(points) > MOST_POINTS:
         rule = f"makes {len(points)} operating points, more than {MOST_POINTS}"
         raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
-    all_different([p.name for p in points], "operating_points", "operating points have one name")
+    require_distinct([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
 
 
 def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tuple[float, ...]:
     """Return the speeds of a table [rad/s]: one, or equal steps over a range."""
-    one_of(table, where, "speed", "mean_piston_speed")
+    require_one_of(table, where, "speed", "mean_piston_speed")
     if table.speed is None and stroke is None:
         raise Refused(f"{where}.mean_piston_speed", None, "means nothing without pistons", "give the speed")
     # c_m = 2 s n (Roetscher eq. 290)

@@ -15,8 +15,8 @@ from pydantic import Field, create_model
 
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path, number_read
-from laufruhe.files.nested import Place, at, put
+from laufruhe.files.complaints import Refused, key_path, read_number
+from laufruhe.files.nested import Place, at, with_value_at
 from laufruhe.problem.decision import AddressDrive
 
 
@@ -71,7 +71,7 @@ QuantitiesTable = create_model(
 )  # fmt: skip
 
 
-def followed(tables: Mapping[str, Any]) -> Mapping[str, Any]:
+def with_followers(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the tables with all numbers that follow from [quantities] set.
 
     Raises
@@ -84,11 +84,11 @@ def followed(tables: Mapping[str, Any]) -> Mapping[str, Any]:
         return tables
     for name, quantity in QUANTITIES.items():
         if name in quantities:
-            value = number_read(_NUMBERS[name], ("quantities", name), quantities[name])
+            value = read_number(_NUMBERS[name], ("quantities", name), quantities[name])
             assert isinstance(value, float)
             given = {place: _given(tables, place, unit, name) for place, unit in quantity.follow.items()}
             for place, number in quantity.values(value, given).items():
-                tables = put(tables, place, AddressDrive(place, quantity.follow[place]).written(number))
+                tables = with_value_at(tables, place, AddressDrive(place, quantity.follow[place]).written(number))
     return tables
 
 
@@ -100,6 +100,6 @@ def _given(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> flo
     if number is None or isinstance(number, Mapping | list):
         rule = f"must be a number, because it follows from quantities.{name}"
         raise Refused(key_path(place), number, rule, "give a number, or leave the quantity out")
-    value = number_read(f.Number(unit), place, number)
+    value = read_number(f.Number(unit), place, number)
     assert isinstance(value, float)
     return value

@@ -18,20 +18,20 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
 from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
-from laufruhe.files.bearings import bearings_of, one_by_one
+from laufruhe.files.bearings import bearings_of, expand_bearings
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, in_file, key_path, nearest_file
+from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
-from laufruhe.files.fidelity import at_fidelity
+from laufruhe.files.fidelity import with_fidelity
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
-from laufruhe.files.nested import inside, plain, put
+from laufruhe.files.nested import plain, walk, with_value_at
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
-from laufruhe.files.quantities import followed
+from laufruhe.files.quantities import with_followers
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.toml_text import line_deeper_than, toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
@@ -85,12 +85,12 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     if "study" in tables:
         raise refused("study", "", "makes this a study file", "use laufruhe study", path)
     try:
-        with in_file(path):
+        with errors_in_file(path):
             closed, parts = dict(tables), {}
             # notes are removed in reverse order, because an open number may have a note of an extension
             for note in reversed(notes()):
                 closed, parts[note] = note.part(closed)
-            file = file_model().model_validate(followed(closed))
+            file = file_model().model_validate(with_followers(closed))
             problem = _of_file(file, path)
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
@@ -139,7 +139,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
 
 def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
     # problem after one of the functions of `edits`
-    with in_file(origin.path):
+    with errors_in_file(origin.path):
         tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
     return load_tables(tables, origin.path)
 
@@ -153,9 +153,9 @@ def _rebuilt(
         options = {key: value for key, value in fidelity.items() if key not in ("kinematics", "tolerance")}
         tables = {**tables, "fidelity": options}
     for place, value in changes.items():
-        tables = put(tables, place, value)
+        tables = with_value_at(tables, place, value)
     try:
-        rebuilt = _of_file(file_model().model_validate(followed(tables)), path)
+        rebuilt = _of_file(file_model().model_validate(with_followers(tables)), path)
         if candidate is not None and rebuilt.phasing is not None:
             rebuilt = rebuilt.phasing.realise(candidate)
     except (ValidationError, Refused, ModelError) as error:
@@ -190,13 +190,13 @@ def tables_of(path: Path) -> dict[str, Any]:
 def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     # checked tables, an engine of the catalogue written out
     _check_shape(tables, path)
-    with in_file(path):
+    with errors_in_file(path):
         return with_catalogue(tables)
 
 
 def _check_shape(tables: dict[str, Any], path: Path) -> None:
     """Raise `InputError` for control characters in texts, and for tables that are too deep or too long."""
-    for place, node in inside(tables):
+    for place, node in walk(tables):
         where = key_path(place)
         if len(place) > DEEPEST:
             raise refused(where, "", f"is nested more than {DEEPEST} deep", "flatten it", path)
@@ -248,7 +248,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     """Return the problem of a file with this table [engine], which has no open throws, firing order or bank angles."""
     loaded = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
     cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in loaded))
-    bearings = bearings_of(one_by_one(file.main_bearings, throws), cylinders)
+    bearings = bearings_of(expand_bearings(file.main_bearings, throws), cylinders)
     keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
     for key in keys:
         if (key_table := getattr(file, key.name)) is not None:
@@ -295,7 +295,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         limits=limits_of(file.constraints, scene),
         friction=tuple(brake.tests if brake else ()),
     )
-    return at_fidelity(problem, file.fidelity)
+    return with_fidelity(problem, file.fidelity)
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:

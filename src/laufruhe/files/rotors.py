@@ -11,7 +11,7 @@ from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
@@ -179,7 +179,7 @@ class _Pin:
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     key = table.factor_key or FACTORS[0]
     excluded = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
-    none_of(table, excluded, where, f"cannot stand beside {key}", "leave one of them out")
+    refuse_keys(table, excluded, where, f"cannot stand beside {key}", "leave one of them out")
     fraction, drives = Open.from_value(getattr(table, key)), []
     for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
         pin = _pin(pins, number, f"{where}.throws")
@@ -202,7 +202,7 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     reference, x = 0.0, None if table.x is None else Open.from_value(table.x).start
-    none_of(table, ("throws",), where, "is for balance_factor only", "use opposite_throw")
+    refuse_keys(table, ("throws",), where, "is for balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
         reference, x = pin.angle + math.pi, pin.x if x is None else x
@@ -220,7 +220,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
         where = f"balancer_shafts[{k + 1}]"
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
             raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
-        with blamed_on(f"{where}.ratio"):
+        with errors_at_key(f"{where}.ratio"):
             shaft = Shaft(
                 table.name, table.ratio, *(Open.from_value(coordinate).start for coordinate in table.position)
             )
@@ -266,7 +266,7 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
 
     `reference` is the angle from which the angle of the table counts [rad].
     """
-    one_of(table, where, "unbalance", "mass")
+    require_one_of(table, where, "unbalance", "mass")
     key, size, gain = "unbalance", Open.from_value(table.unbalance), 1.0
     if table.mass is not None:
         if table.radius is None:

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files import nested
-from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.complaints import Refused, nearest, si_value
 from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.files.measures import SIDES, limit_name
 from laufruhe.files.nested import number_at
@@ -85,7 +85,7 @@ def at(tables: dict[str, Any], where: str) -> Any:
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     """Return a copy of tables with another value at a path; `Refused` if there is no such path."""
-    return nested.put(tables, keys_of(tables, where), value)
+    return nested.with_value_at(tables, keys_of(tables, where), value)
 
 
 def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
@@ -308,7 +308,7 @@ def _measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, 
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
         return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
-    si = [measured(text, unit_needed, key) for text in texts]
+    si = [si_value(text, unit_needed, key) for text in texts]
     if plain:
         raise Refused(key, list(values), "mixes numbers with and without a unit", "write all alike")
     unit = units.unit_of(texts[0])

@@ -7,7 +7,14 @@ from dataclasses import replace
 from functools import partial
 
 from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import error_bound, missed, missed_of_gas, reference, relative, sampling_error
+from laufruhe.fidelity.error_bounds import (
+    error_bound,
+    gas_sampling_errors,
+    measure_sampling_error,
+    reference,
+    relative,
+    sampling_error,
+)
 from laufruhe.numerics.budget import is_time_over, until_time_limit
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
@@ -33,7 +40,7 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     if not runs or evaluation.resonance:
         return load_error
     load_share = value_of_loads(problem, evaluation) * load_error
-    run_error = sum(term.weight * missed(term.measure, evaluation) for term in runs)
+    run_error = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in runs)
     return relative(load_share + run_error, objective_value(problem, evaluation))
 
 
@@ -63,19 +70,28 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
         or not problem.load_terms
     ):
         return result
-    (missed, interpolated), steps = missed_of_gas(problem, result.final), fidelity.gas_steps
+    (gas_error, interpolated), steps = gas_sampling_errors(problem, result.final), fidelity.gas_steps
     while (
-        missed > problem.tolerance * value_of_loads(problem, result.final) and steps < MOST_GAS and not is_time_over()
+        gas_error > problem.tolerance * value_of_loads(problem, result.final)
+        and steps < MOST_GAS
+        and not is_time_over()
     ):
         steps *= TIMES
         result = solve(problem.at(replace(fidelity, gas_samples=steps)))
         if result.certificate is None:
             return result
-        missed, interpolated = missed_of_gas(result.problem, result.final)
-    proof, objective, missed = result.certificate, result.objective, missed + interpolated
-    if objective is None or proof is None or missed <= problem.tolerance * value_of_loads(problem, result.final):
+        gas_error, interpolated = gas_sampling_errors(result.problem, result.final)
+    proof, objective, gas_error = (
+        result.certificate,
+        result.objective,
+        gas_error + interpolated,
+    )
+    if objective is None or proof is None or gas_error <= problem.tolerance * value_of_loads(problem, result.final):
         return result
-    bound, zero_level = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
+    bound, zero_level = (
+        max(proof.lower_bound - gas_error, 0.0),
+        numerical_zero(result.problem, result.final.engine),
+    )
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
         gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less the error of the gas pressure",

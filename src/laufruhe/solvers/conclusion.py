@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from laufruhe.errors import ModelError
-from laufruhe.fidelity.error_bounds import missed, relative
+from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision, Kind
@@ -224,7 +224,7 @@ def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price
     fine = with_fine_sampling(evaluation) if problem.limits else evaluation
     if fine.violation(problem.limits) > FEASIBLE:
         return math.inf
-    error = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
+    error = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
         standing = fine.check_limit(limit)
         if standing.side == side and price.relaxed > 0.0:
@@ -418,7 +418,7 @@ def _limit_value(
     price = (
         price.floored(price_floor * value / abs(standing.edge) if standing.edge else 0.0) if active else Price(0.0, 0.0)
     )
-    error = relative(missed(limit.measure, evaluation), standing.value)
+    error = relative(measure_sampling_error(limit.measure, evaluation), standing.value)
     return LimitValue(
         limit.name,
         standing.value,

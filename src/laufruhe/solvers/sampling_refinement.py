@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from laufruhe.fidelity.error_bounds import missed
+from laufruhe.fidelity.error_bounds import measure_sampling_error
 from laufruhe.numerics.budget import timed_rounds
 from laufruhe.numerics.witness import check_bound
 from laufruhe.problem.evaluation import (
@@ -63,7 +63,7 @@ def _with_fine_values(result: Result) -> Result:
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
     zero_level = numerical_zero(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, zero_level)
-    doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
+    doubt = sum(term.weight * measure_sampling_error(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, zero_level + doubt)
     weaker_kind = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
     is_feasible = (

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from laufruhe.errors import BoundError, LaufruheError
-from laufruhe.fidelity.error_bounds import missed, relative
+from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Domain, decision_vector, domains_of, projected_vector
@@ -416,7 +416,7 @@ def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -
             return False
     standings = ((limit, evaluation.check_limit(limit)) for limit in problem.limits)
     is_feasible = all(
-        standing.violation + relative(missed(limit.measure, evaluation), standing.value) <= 0.0
+        standing.violation + relative(measure_sampling_error(limit.measure, evaluation), standing.value) <= 0.0
         for limit, standing in standings
     )
     return is_feasible and violation_at_fine_sampling(problem, evaluation) <= 0.0

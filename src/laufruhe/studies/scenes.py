@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError, refused
-from laufruhe.files.complaints import in_file, nearest, nearest_file
+from laufruhe.files.complaints import errors_in_file, nearest, nearest_file
 from laufruhe.files.nested import texts_in
 from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
@@ -102,7 +102,7 @@ class Scenes:
 
     def named(self, case: CaseTable) -> AbstractContextManager[None]:
         """Prefix errors about a case's scene with the name of its problem file."""
-        return in_file(self.folder / case.problem)
+        return errors_in_file(self.folder / case.problem)
 
     @contextmanager
     def blamed(self, point: Point, where: str = "point") -> Iterator[None]:

@@ -27,7 +27,7 @@ from laufruhe.extensions.robust.tolerance import (
     Tolerances,
 )
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path, measured
+from laufruhe.files.complaints import Refused, key_path, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import ExtensionContext, Key, Note
@@ -367,7 +367,7 @@ def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext)
     engine = problem.engine
     if context.file.geared_inertias:
         raise Refused("geared_inertias", None, "are not supported with [assembly]", "leave one of the two out")
-    unit = measured(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
+    unit = si_value(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
     lots = []
     for key, columns in COLUMNS.items():
         file, where = getattr(table, key), f"assembly.{key}"

@@ -27,7 +27,7 @@ from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit,
 from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
 from laufruhe.extensions.served_page.scenes import scene_of
 from laufruhe.files import edits
-from laufruhe.files.complaints import in_file
+from laufruhe.files.complaints import errors_in_file
 from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
 from laufruhe.live import decided
@@ -81,7 +81,7 @@ def _held_kinds(source: Source, state: PageState) -> set[Kind]:
 
 
 def _requested(source: Source, state: PageState, with_held: bool) -> tuple[dict[str, Any], Problem]:
-    with in_file(source.path.name):
+    with errors_in_file(source.path.name):
         state.check(_names_and_kinds(source)[0])
         tables = state.tables(source.tables, with_held)
     return tables, load_tables(tables, Path(source.path))
@@ -271,7 +271,7 @@ def save(source: Source, state: PageState) -> dict[str, Any]:
     """Return the state of the page as a problem file."""
     tables, problem = _requested(source, state, with_held=True)
     units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
-    with in_file(source.path.name):
+    with errors_in_file(source.path.name):
         for name, value in state.design.items():
             if name in units:
                 tables = edits.with_value(tables, name, as_typed(value, units[name]))

@@ -24,8 +24,8 @@ from laufruhe.extensions.sizes.machine import (
     on,
 )
 from laufruhe.files import fields as f
-from laufruhe.files.bearings import MainBearingTable, one_by_one
-from laufruhe.files.complaints import Refused, blamed_on
+from laufruhe.files.bearings import MainBearingTable, expand_bearings
+from laufruhe.files.complaints import Refused, errors_at_key
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open, Table
 from laufruhe.files.problem_file import ExtensionContext, Key
@@ -109,7 +109,7 @@ def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequ
     if any(part.master_bank is not None for part in parts):
         rule = "needs rods on the crank pin, and these are hinged to a master rod"
         raise Refused("running_gear", None, rule, "leave it out")
-    with blamed_on("running_gear"):
+    with errors_at_key("running_gear"):
         return RunningGear(
             table.elastic_modulus,
             table.density,
@@ -158,7 +158,7 @@ def _sizes_in_file(
 def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionContext) -> Problem:
     engine, throws = problem.engine, [throw for throw in context.throws if throw.shaft == CRANKSHAFT]
     decisions = _decisions(
-        table, context.engine, one_by_one(context.file.main_bearings, context.throws), engine.bearings
+        table, context.engine, expand_bearings(context.file.main_bearings, context.throws), engine.bearings
     )
     if decisions and table is not None and table.density is not None:
         check_factors(context.file.counterweights, "counts masses that follow from sizes, which are open")

@@ -12,7 +12,7 @@ from pydantic import Field
 from laufruhe import units
 from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, ShaftSection, Torsion, stiffness_of
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, require_one_of
 from laufruhe.files.fields import ListOrSingle, Name, Number, Open, Table
 from laufruhe.files.nested import Place
 from laufruhe.files.problem_file import ExtensionContext, Key
@@ -167,7 +167,7 @@ def _chain(
     absorbers = [
         _absorber(a, names, f"torsion.absorbers[{k + 1}]", open_numbers) for k, a in enumerate(table.absorbers)
     ]
-    with blamed_on("torsion"):
+    with errors_at_key("torsion"):
         speeds = None if table.speeds is None else (table.speeds[0], table.speeds[1])
         return Torsion(discs, sections, tuple(absorbers), table.output or "", speeds), open_numbers.decisions
 
@@ -184,7 +184,7 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     for n, (names, unbalance) in enumerate(zip(at, turning, strict=True)):
         radius = max((parts[k].crank_radius for k in names), default=0.0)
         total = inertias[n] + unbalance * radius + sum(reduced_inertia(parts[k]) for k in names)
-        with blamed_on("torsion.throw_inertia"):
+        with errors_at_key("torsion.throw_inertia"):
             discs.append(Disc(f"throw {n + 1}", total, dampings[n], tuple(parts[k].name for k in names)))
     return discs
 
@@ -212,7 +212,7 @@ def _section(
     links: Sequence[str], open_numbers: _OpenNumbers,
 ) -> list[ShaftSection]:  # fmt: skip
     """Shafts that are alike, by the names of what they join."""
-    one_of(shaft, where, "stiffness", "pieces")
+    require_one_of(shaft, where, "stiffness", "pieces")
     diameter, bore, length = shaft.diameter, shaft.bore, None
     if stiffness_given is not None:
         stiffness = open_numbers.number(stiffness_given, "stiffness", "N m/rad", name, links)
@@ -227,7 +227,7 @@ def _section(
         elif any(isinstance(piece.diameter, Open) for piece in shaft.pieces):
             raise Refused(f"{where}.diameter", None, "is given beside one that is open", "leave it out")
     loss = table.loss_factor if shaft.loss_factor is None else shaft.loss_factor
-    with blamed_on(where):
+    with errors_at_key(where):
         return [
             ShaftSection(link, stiffness, shaft.damping, loss, diameter, bore, length, table.shear_modulus)
             for link in links
@@ -262,7 +262,7 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbe
             ("damping", "N m s/rad", table.damping),
         )
     )
-    with blamed_on(where):
+    with errors_at_key(where):
         return Absorber(
             table.name, table.on, inertia, stiffness, table.loss_factor, damping, table.order or 0.0,
             table.damping_ratio,

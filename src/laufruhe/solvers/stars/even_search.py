@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extension import lack
+from laufruhe.extension import missing_extension
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -138,7 +138,7 @@ def refuse_long(problem: Problem) -> None:
 
 
 def _too_many() -> ModelError:
-    rule, remedy = lack("long_cranks")
+    rule, remedy = missing_extension("long_cranks")
     return ModelError(f"a crank of more than {MOST_LISTED} even stars {rule}; {remedy}")
 
 

@@ -12,7 +12,7 @@ import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import measured, nearest
+from laufruhe.files.complaints import nearest, si_value
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
@@ -115,7 +115,7 @@ class SpeedMapStudy(Part):
             for k, table in enumerate(self.measures, 1):
                 measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
                 where = f"measures[{k}].limit"
-                limits[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
+                limits[measure] = math.inf if table.limit is None else si_value(table.limit, measure.unit, where)
         narrowed = {"operating_points", "orders"}
         return {replace(m, points=None): limit for m, limit in limits.items() if narrowed <= set(m.channel.keys)}
 
