@@ -44,17 +44,17 @@ def install(folder: Path, name: str, drawn: str) -> None:
     path = folder / f"{name}.ttf"
     made.save(path)
     fontManager.addfont(path)
-    letters._others.cache_clear()
+    letters._other_fonts.cache_clear()
 
 
 @pytest.fixture(autouse=True)
 def few_fonts(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Those that come with matplotlib; what a test installs is gone after it."""
     monkeypatch.setattr(fontManager, "ttflist", [e for e in fontManager.ttflist if e.name.startswith("DejaVu")])
-    monkeypatch.setattr(letters, "_found", {})
-    letters._others.cache_clear()
+    monkeypatch.setattr(letters, "_stand_ins", {})
+    letters._other_fonts.cache_clear()
     yield
-    letters._others.cache_clear()
+    letters._other_fonts.cache_clear()
 
 
 def named(title: str) -> Result:
@@ -90,7 +90,7 @@ def test_a_letter_has_one_font_whatever_was_asked_before(tmp_path: Path) -> None
     for name, has in (("Both Sans", SUN + MOON), ("A Sun Sans", SUN), ("Moon", MOON)):
         install(tmp_path, name, has)
     for texts in ([MOON, SUN], [SUN, MOON], [SUN + MOON]):
-        letters._found.clear()
+        letters._stand_ins.clear()
         for text in texts:
             letters.prepare([text])
         assert letters.families() == [letters.FONT, "Both Sans"]

@@ -29,11 +29,11 @@ def write_draft(file: Path, name: str | None) -> str:
         entry = ready.ready_named(source)
         command = "study" if entry.is_study else "solve"
         copies = ready.copies([source]).items()
-        texts = {file.name if other == entry.path.name else other: text for other, text in copies}
+        texts = {file.name if copy_name == entry.path.name else copy_name: text for copy_name, text in copies}
     else:
         draft = drafts.draft_of_table(*ask_engine(), file) if source is None else drafts.draft_of_engine(source)
         texts = {file.name: draft, **dict([ready.schema_file()])}
-    _write({file.parent / other: text for other, text in texts.items()})
+    _write({file.parent / copy_name: text for copy_name, text in texts.items()})
     return f"{printed(str(file))}: ready to be changed; then: {typed('laufruhe', command, str(file))}\n"
 
 
@@ -85,8 +85,8 @@ def _write(texts: Mapping[Path, str]) -> None:
 def ready_list() -> str:
     """Return the list of ready problems by use."""
     lines = ["Copy one with: laufruhe examples NAME, or begin with it: laufruhe init --from NAME"]
-    for use, group in groupby(ready.ready().values(), lambda one: one.use):
-        lines += ["", use[:1].upper() + use[1:], *(f"  {one.name:42}{one.title}" for one in group)]
+    for use, group in groupby(ready.ready().values(), lambda problem: problem.use):
+        lines += ["", use[:1].upper() + use[1:], *(f"  {problem.name:42}{problem.title}" for problem in group)]
     return "\n".join(lines) + "\n"
 
 
@@ -94,9 +94,9 @@ def engine_list() -> str:
     """Return the list of catalogue engines by number of cylinders."""
     lines = ['In a problem file: engine = "KEY". As a file to begin with: laufruhe init --from KEY', ""]
     lines += [f"{'key':22}{'bore x stroke [mm]':>20}{'cm^3':>8}   engine"]
-    for one in sorted(engines().values(), key=lambda one: one.engine["cylinders"]):
-        size = " x ".join(str(one.engine[key]).removesuffix(" mm") for key in ("bore", "stroke"))
-        lines.append(f"{one.key:22}{size:>20}{one.displacement.removesuffix(' cm^3'):>8}   {one.name}")
+    for engine in sorted(engines().values(), key=lambda engine: engine.engine["cylinders"]):
+        size = " x ".join(str(engine.engine[key]).removesuffix(" mm") for key in ("bore", "stroke"))
+        lines.append(f"{engine.key:22}{size:>20}{engine.displacement.removesuffix(' cm^3'):>8}   {engine.name}")
     return "\n".join(lines) + "\n"
 
 
@@ -105,10 +105,10 @@ def engine_details(names: Sequence[str]) -> str:
     with errors_in_file("laufruhe"):
         entries = [engine_named(name, "engine") for name in names]
     lines = []
-    for k, one in enumerate(entries):
+    for k, engine in enumerate(entries):
         lines += [""] if k else []
-        lines += [one.name, f"Source: {one.source}.", f"Displacement, as published: {one.displacement}."]
-        lines += [one.note] if one.note else []
-        for key, value in one.engine.items():
-            lines.append(f"    {key} = {toml_value(value)}" + ("   # assumed" if key in one.assumed else ""))
+        lines += [engine.name, f"Source: {engine.source}.", f"Displacement, as published: {engine.displacement}."]
+        lines += [engine.note] if engine.note else []
+        for key, value in engine.engine.items():
+            lines.append(f"    {key} = {toml_value(value)}" + ("   # assumed" if key in engine.assumed else ""))
     return "\n".join(lines) + "\n"

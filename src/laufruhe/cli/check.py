@@ -1,4 +1,4 @@
-"""Check of a problem file: evaluate the design as given, and list what is open.
+"""Check of a problem file: evaluate the initial design, and list what is open.
 
 An editor may call this on every save, so libraries of reports and solvers are loaded for JSON only.
 """
@@ -18,7 +18,7 @@ from laufruhe.solvers.methods import refuse
 
 
 def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
-    """Return the summary of a problem, and a function that makes JSON of the design as given."""
+    """Return the summary of a problem, and a function that returns the initial design as JSON."""
     problem = load(path)
     warn(problem, path)
     drawing = problem.drawing
@@ -41,5 +41,5 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
 def warn(problem: Problem, path: Path) -> None:
     """Print plausibility warnings."""
-    for one in () if is_quiet() else problem.plausibility_warnings:
-        complain(printed(f"{path}: warning: {one}"))
+    for warning in () if is_quiet() else problem.plausibility_warnings:
+        complain(printed(f"{path}: warning: {warning}"))

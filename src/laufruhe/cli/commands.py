@@ -47,10 +47,10 @@ class _Commands(TyperGroup):
 
     @cached_property
     def _further(self) -> dict[str, Any]:
-        every = extended("commands", CommandInfo, app.registered_commands, _name)
+        commands = extended("commands", CommandInfo, app.registered_commands, _name)
         return {
-            name: get_command_from_info(one, pretty_exceptions_short=False, rich_markup_mode=None)
-            for name, one in every.items()
+            name: get_command_from_info(command, pretty_exceptions_short=False, rich_markup_mode=None)
+            for name, command in commands.items()
             if name not in self.commands
         }
 
@@ -71,10 +71,12 @@ class _Commands(TyperGroup):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse as typer, but explain an option that belongs behind the command."""
         before = [arg.partition("=")[0] for arg in takewhile(lambda arg: arg.startswith("-"), args)]
-        own = {option for param in self.get_params(ctx) for option in param.opts}
-        for option in (option for option in before if option not in own):
-            every = {**self.commands, **self._further}
-            takers = [name for name, one in every.items() if any(option in param.opts for param in one.params)]
+        common = {option for param in self.get_params(ctx) for option in param.opts}
+        for option in (option for option in before if option not in common):
+            commands = {**self.commands, **self._further}
+            takers = [
+                name for name, command in commands.items() if any(option in param.opts for param in command.params)
+            ]
             if takers:
                 command = next((word for word in args if word in takers), takers[0])
                 remedy = f"write it there, as in: laufruhe {command} ... {option}"
@@ -188,7 +190,7 @@ def evaluate(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Evaluate the design as given.
+    """Evaluate the initial design.
 
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
@@ -291,8 +293,8 @@ def trade(
             hand_out(lambda stream: show_document(document, stream, folder, page), data)
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(is_requested: bool) -> None:
+    if is_requested:
         typer.echo(f"laufruhe {__version__}")
         raise typer.Exit(DONE)
 

@@ -43,19 +43,19 @@ def artist(kinds: Sequence[str]) -> Iterator[Ask]:
 
 
 def _request(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:
-    here = partial(call_by_name, name, *args)
+    call = partial(call_by_name, name, *args)
     if workers is None:
-        return here
+        return call
     try:
         future = workers.submit(call_by_name, name, *args)
     except (AttributeError, TypeError, ValueError):
         # classes of a user may have no pickle
-        return here
+        return call
 
     def result() -> Any:
         with suppress(BrokenExecutor):
             return future.result()
-        return here()
+        return call()
 
     return result
 

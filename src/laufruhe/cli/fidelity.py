@@ -37,15 +37,17 @@ def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
     """Return the text on the fidelity that a problem needs, and a function that makes JSON of it."""
     problem = _with_objective(path)
     choice = choose(problem, tolerance) if problem.load_terms else needs(problem)
-    both = _load_times(problem, choice) if problem.load_terms else _mount_times(problem, choice)
-    return explain.as_text(problem, choice, tolerance, both), lambda: explain.as_json(problem, choice, tolerance, both)
+    times = _load_times(problem, choice) if problem.load_terms else _mount_times(problem, choice)
+    return explain.as_text(problem, choice, tolerance, times), lambda: explain.as_json(
+        problem, choice, tolerance, times
+    )
 
 
 def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     # milliseconds of one design at the chosen fidelity, and exactly over the whole cycle
-    whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
+    exact = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
-    for fidelity, prune in ((choice.fidelity, True), (whole, False)):
+    for fidelity, prune in ((choice.fidelity, True), (exact, False)):
         # the time does not depend on the other decisions
         fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
         designs = prepare(fixed, prune)
@@ -75,8 +77,8 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         *((path, problem) for path, problem in read if Kind.FLYWHEEL not in open_kinds(problem)), strict=True
     )
     trades: dict[int, Trade] = {}
-    for k, one, pages in _measured(paths, problems, say):
-        trades[k] = one
+    for k, trade_result, pages in _measured(paths, problems, say):
+        trades[k] = trade_result
         names = [f"{problems[k].name}.{end}" for end in ("md", "png", "html")]
         with files.staged(files.FileSet(folder, "--out", "trade", names, adds=True)) as stage:
             for name, page in pages.items():
@@ -87,7 +89,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     ordered = [trades[k] for k in range(len(problems))]
 
     def as_json() -> str:
-        return "[" + ",\n".join(report.as_json(one).strip() for one in ordered) + "]\n"
+        return "[" + ",\n".join(report.as_json(trade_result).strip() for trade_result in ordered) + "]\n"
 
     if len(read) == 1:
         return _page(paths[0], ordered[0]), f"{problems[0].name}.html", as_json
@@ -102,8 +104,8 @@ def _measured(
 ) -> Iterator[tuple[int, Trade, Pages]]:
     """Yield index, measurements and pages of every problem; several are measured in parallel."""
     if len(problems) == 1 and current_executor() is None:
-        one = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
-        yield 0, one, _pages(paths[0], one)
+        trade_result = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
+        yield 0, trade_result, _pages(paths[0], trade_result)
         return
     # longest first, so that all end at about the same time
     order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
@@ -114,39 +116,39 @@ def _measured(
     ):
         for place, answer in answers:
             if answer is not None:
-                k, (one, pages) = order[place], answer
+                k, (trade_result, pages) = order[place], answer
                 say(f"{problems[k].name} is measured")
-                yield k, replace(one, problem=traded_part(problems[k])), pages
+                yield k, replace(trade_result, problem=traded_part(problems[k])), pages
 
 
 def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
     # leaves out functions, which have no pickle; None if time is over
     path, tables = piece
     try:
-        one = trade(load_tables(tables, path))
+        trade_result = trade(load_tables(tables, path))
     except SolverError:
         if is_time_over():
             return None
         raise
-    return replace(one, problem=replace(one.problem, phasing=None)), _pages(path, one)
+    return replace(trade_result, problem=replace(trade_result.problem, phasing=None)), _pages(path, trade_result)
 
 
-def _pages(path: Path, one: Trade) -> Pages:
+def _pages(path: Path, trade_result: Trade) -> Pages:
     # Markdown, HTML, and the picture if there is one
     from laufruhe.plots.style import as_png, as_svg
     from laufruhe.plots.trade import figure, has_picture
 
-    name, pages, pictures = one.problem.name, Pages(), dict[str, str]()
-    if has_picture(one):
-        drawn = figure(one)
-        pages[f"{name}.png"], pictures[name] = as_png(drawn), as_svg(drawn)
-    document = _page(path, one, next(iter(pictures), None))
+    name, pages, pictures = trade_result.problem.name, Pages(), dict[str, str]()
+    if has_picture(trade_result):
+        picture = figure(trade_result)
+        pages[f"{name}.png"], pictures[name] = as_png(picture), as_svg(picture)
+    document = _page(path, trade_result, next(iter(pictures), None))
     texts = {"md": document.as_markdown(".png"), "html": as_html(document, pictures)}
     return pages | {f"{name}.{end}": text.encode() for end, text in texts.items()}
 
 
-def _page(path: Path, one: Trade, picture: str | None = None) -> Document:
-    return report.trade_document(one, picture, typed("laufruhe", "trade", str(path)))
+def _page(path: Path, trade_result: Trade, picture: str | None = None) -> Document:
+    return report.trade_document(trade_result, picture, typed("laufruhe", "trade", str(path)))
 
 
 def _with_objective(path: Path) -> Problem:

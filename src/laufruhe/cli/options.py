@@ -20,8 +20,8 @@ def _completed(kinds: str) -> Callable[[str], list[str]]:
         from laufruhe.files.catalogue import engines
         from laufruhe.files.ready import ready
 
-        both = {"engines": engines, "problems": ready}
-        return [name for kind in kinds.split() for name in both[kind]() if name.startswith(incomplete)]
+        names_by_kind = {"engines": engines, "problems": ready}
+        return [name for kind in kinds.split() for name in names_by_kind[kind]() if name.startswith(incomplete)]
 
     return names
 

@@ -114,8 +114,8 @@ def _read(question: _Question, before: Answers, text: str) -> Any:
     # the answer as a file has it
     if question.among and text not in question.among:
         raise refused(question.key, text, "is none of these", nearest(text, question.among))
-    between = _SEPARATORS.get(question.key)
-    value = _value(text) if between is None else [_value(part) for part in re.split(between, text) if part]
+    separators = _SEPARATORS.get(question.key)
+    value = _value(text) if separators is None else [_value(part) for part in re.split(separators, text) if part]
     _check({**before, question.key: value})
     return value
 
@@ -138,16 +138,16 @@ def _check(answers: Answers) -> None:
     except InputError as error:
         # missing keys may be answered later
         later = {f"engine.{question.key}" for question in _QUESTIONS if question.key not in answers}
-        blamed = [one for one in error.complaints if one.where not in later]
+        blamed = [complaint for complaint in error.complaints if complaint.where not in later]
         if blamed:
             raise InputError(error.source, tuple(blamed)) from None
 
 
 def _usual_order(answers: Answers) -> str:
     # firing order of the first possible engine of the catalogue
-    for one in engines().values():
-        order = one.engine.get("firing_order", ())
-        if one.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:
+    for engine in engines().values():
+        order = engine.engine.get("firing_order", ())
+        if engine.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:
             with suppress(InputError):
                 _check({**answers, "firing_order": order})
                 return written(order)

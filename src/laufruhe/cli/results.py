@@ -20,14 +20,14 @@ from laufruhe.solvers.result import Result, Status
 
 
 def write_results(
-    request: Request, result: Result, stage: Path, copy: Path | None, drawn: Callable[[], dict[str, str]],
+    request: Request, result: Result, stage: Path, copy: Path | None, wait_for_pictures: Callable[[], dict[str, str]],
     say: Callable[[str], None],
 ) -> None:  # fmt: skip
     """Write all files of a result into a folder, and a copy of its JSON.
 
     Parameters
     ----------
-    drawn
+    wait_for_pictures
         Function that waits for the pictures: SVG by their names.
     """
     if request.animated:
@@ -37,9 +37,9 @@ def write_results(
         with timed(result.timing, "animation"):
             animate(result, stage / files.MOTION)
     say("writing tables")
-    with ExitStack() as until_then:
+    with ExitStack() as stack:
         with timed(result.timing, "tables"):
-            tables = until_then.enter_context(write_tables(result, stage))
+            tables = stack.enter_context(write_tables(result, stage))
         live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
         if request.kinds:
             say("drawing")
@@ -48,7 +48,7 @@ def write_results(
             template()
             if not is_quiet():
                 import_module("laufruhe.report.screen")
-            pictures = drawn()
+            pictures = wait_for_pictures()
         document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
         files.write(stage / files.PAGE, as_html(document, pictures, live))

@@ -74,13 +74,13 @@ def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[ProofDa
     with ExitStack() as places:
         place = json_file(json, problems, places)
 
-        def hand_out(shown: ProofData, data: Callable[[], str]) -> None:
+        def hand_out(text: ProofData, data: Callable[[], str]) -> None:
             if not is_quiet():
                 stream = sys.stderr if json == "-" else sys.stdout
-                if isinstance(shown, str):
-                    stream.write(shown)
+                if isinstance(text, str):
+                    stream.write(text)
                 else:
-                    shown(stream)
+                    text(stream)
                 # errors of writing are raised here
                 stream.flush()
             if json == "-":

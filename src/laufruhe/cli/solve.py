@@ -35,7 +35,7 @@ def run(request: Request, answer: Answer) -> None:
 
 
 def evaluate(problem: Problem, _: Listener) -> Result:
-    """Return the result of the design as given."""
+    """Return the result of the initial design."""
     from laufruhe.solvers import evaluate_only
 
     return evaluate_only(problem)
@@ -71,10 +71,10 @@ def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tupl
         what = " and ".join(name for extra in problem.extras for name in extra.open_names) or what
         say(f"deciding {what}" if problem.open_names else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
-        drawn = drawing(request.ask, result, stage, request.kinds)
+        wait_for_pictures = drawing(request.ask, result, stage, request.kinds)
         # imported while pictures are drawn
         from laufruhe.cli.results import show, write_results
 
         result = replace(result, timing={**result.timing, **seconds})
-        write_results(request, result, stage, copy, drawn, say)
+        write_results(request, result, stage, copy, wait_for_pictures, say)
     return result, partial(show, request, result, folder)

@@ -67,9 +67,11 @@ class _Progress:
             self._first = (now, done)
         elif now - self._last < pace() and done < whole:
             return
-        self._last, left = now, ""
+        self._last, remaining = now, ""
         began, before = self._first
         if before < done < whole:
             seconds = (now - began) / (done - before) * (whole - done)
-            left = f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
-        self._say(f"{done} of {whole} points{left}")
+            remaining = (
+                f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
+            )
+        self._say(f"{done} of {whole} points{remaining}")

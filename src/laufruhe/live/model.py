@@ -97,8 +97,8 @@ def _filled(
     affine = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
     # source of values that the page cannot compute
-    known = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
-    aside = f"cannot be followed live; {known.format(file=bare.file)}"
+    source_text = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
+    aside = f"cannot be followed live; {source_text.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)
     curves = _curves(collected, result)
     measures = collected.measures()
@@ -161,14 +161,18 @@ class _Collected:
         if stays and limit is None:
             return [replace(base, value=self.model.bare.value(measure))]
         if stays and limit is not None:
-            standing = self.model.bare.check_limit(limit)
-            return [replace(base, sides=((standing.side, standing.edge),), value=standing.value)]
+            limit_state = self.model.bare.check_limit(limit)
+            return [replace(base, sides=((limit_state.side, limit_state.edge),), value=limit_state.value)]
         if follows:
             return [replace(base, signal=self.signal(measure))]
         self.unmoved.append((name, self.aside))
-        known = self.decided.get(name)
+        limit_value = self.decided.get(name)
         base = replace(base, followed=False, value=math.nan)
-        return [replace(base, value=known.value, sides=((known.side, known.limit),)) if known else base]
+        return [
+            replace(base, value=limit_value.value, sides=((limit_value.side, limit_value.limit),))
+            if limit_value
+            else base
+        ]
 
 
 def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:

@@ -47,7 +47,7 @@ def pack_part(part: Any, block: PackedBlock) -> Any:
     if isinstance(part, np.ndarray):
         return block.add(part)
     if isinstance(part, tuple):
-        return [pack_part(one, block) for one in part]
+        return [pack_part(entry, block) for entry in part]
     if not is_dataclass(part):
         return part
     return {field.name: pack_part(getattr(part, field.name), block) for field in fields(part)}

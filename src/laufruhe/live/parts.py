@@ -186,8 +186,12 @@ class LiveModel:
             "version": VERSION,
             **{key: getattr(self, key) for key in as_they_are},
             "signals": signals,
-            "measures": [{**asdict(one), "value": _or_none(one.value), **with_unit(one.unit)} for one in self.measures],
-            "designs": {one.name: {"x": one.x, "measured": [*map(_or_none, one.measured)]} for one in self.designs},
+            "measures": [
+                {**asdict(entry), "value": _or_none(entry.value), **with_unit(entry.unit)} for entry in self.measures
+            ],
+            "designs": {
+                entry.name: {"x": entry.x, "measured": [*map(_or_none, entry.measured)]} for entry in self.designs
+            },
             "objective": {"name": self.objective, **with_unit(self.unit)},
             "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
             "whyNot": self.why_not,

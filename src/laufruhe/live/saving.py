@@ -1,4 +1,4 @@
-"""The problem file of what a page shows: all decided, the numbers of the sliders to be filled in."""
+"""Problem file of the displayed design, with placeholders for the numbers of the sliders."""
 
 from __future__ import annotations
 
@@ -120,9 +120,11 @@ def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
     return edits.with_star(tables, star, gone)
 
 
-def _equal_engines(one: Engine, other: Engine) -> bool:
-    left, right = map(_numbers, (one, other))
-    return left.shape == right.shape and bool(np.all(np.abs(left - right) <= SAME * (1.0 + np.abs(left))))
+def _equal_engines(engine: Engine, other_engine: Engine) -> bool:
+    numbers, other_numbers = map(_numbers, (engine, other_engine))
+    return numbers.shape == other_numbers.shape and bool(
+        np.all(np.abs(numbers - other_numbers) <= SAME * (1.0 + np.abs(numbers)))
+    )
 
 
 def _numbers(engine: Engine) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Loads of a design as numbers that a page adds up: constant + slope x per order, and where they bend (P1, L5a)."""
+"""Loads of a design as numbers that a page adds up: constant + slope x per order, and kinks (P1, L5a)."""
 
 from __future__ import annotations
 

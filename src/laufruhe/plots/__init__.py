@@ -51,7 +51,7 @@ def _words(result: Result) -> Iterator[str]:
     yield from (problem.title, problem.source)
     named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
     named += [*engine.cylinders, *engine.mounts, *engine.rotors, *engine.bearings]
-    yield from (one.name for one in named)
+    yield from (part.name for part in named)
     for extra in engine.extras:
         yield from extra.labels
 
@@ -61,9 +61,9 @@ def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple
     return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds, names(result)) for name in figure_names)
 
 
-def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]) -> dict[str, str]:
+def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], picture_names: Iterable[str]) -> dict[str, str]:
     """Write some pictures as `draw` does, and return them as SVG by name."""
-    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, wanted)}
+    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, picture_names)}
 
 
 def get_ready() -> None:
@@ -76,24 +76,24 @@ def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: in
     """Write all pictures as `draw_and_show` does, in several processes."""
     # find fonts once, for all processes
     prepare(_words(result))
-    wanted, (left, put) = names(result), os.pipe()
-    os.write(put, bytes(range(len(wanted))))
-    os.close(put)
+    picture_names, (read_end, write_end) = names(result), os.pipe()
+    os.write(write_end, bytes(range(len(picture_names))))
+    os.close(write_end)
     # an idle process takes the next picture: only one process reads a byte of the pipe
-    numbered = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
+    numbered = (picture_names[number[0]] for number in iter(partial(os.read, read_end, 1), b""))
     parts = fork_map(lambda _: draw_and_show(result, folder, kinds, numbered), count)
-    os.close(left)
-    drawn = {name: svg for part in parts for name, svg in part.items()}
+    os.close(read_end)
+    svg_by_name = {name: svg for part in parts for name, svg in part.items()}
     # pictures of a process that died
-    drawn |= draw_and_show(result, folder, kinds, [name for name in wanted if name not in drawn])
-    return {name: drawn[name] for name in wanted}
+    svg_by_name |= draw_and_show(result, folder, kinds, [name for name in picture_names if name not in svg_by_name])
+    return {name: svg_by_name[name] for name in picture_names}
 
 
 def _drawn(
-    result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]
+    result: Result, folder: Path, kinds: Sequence[str], picture_names: Iterable[str]
 ) -> Iterator[tuple[str, list[str], Figure]]:
     folder.mkdir(parents=True, exist_ok=True)
-    for name in wanted:
+    for name in picture_names:
         drawn, files = figure(result, name), [f"{name}.{kind}" for kind in kinds]
         for file in files:
             save(drawn, folder / file)

@@ -1,4 +1,4 @@
-"""Fonts of pictures: one for all words, and for letters that it lacks the installed ones that have them."""
+"""Fonts of pictures: DejaVu Sans, and installed fonts for letters that it lacks."""
 
 from __future__ import annotations
 
@@ -13,18 +13,20 @@ from laufruhe.errors import LaufruheWarning
 
 FONT = "DejaVu Sans"
 _STAND_IN = "Last Resort"
-"""Fonts of this name draw boxes."""
+"""Name of fonts that draw boxes for missing letters."""
 _REGULAR = (400, "normal", "regular", "book")
-_found: dict[str, str] = {}
-"""The font that stands in for a letter, empty where none is installed: of every letter that was asked for."""
+_stand_ins: dict[str, str] = {}
+"""Substitute font by letter; empty if no installed font has the letter."""
 
 
 def prepare(texts: Iterable[str]) -> None:
     """Find fonts for all letters of the texts; warn about letters that no installed font has."""
     letters = {letter for text in texts if not text.isascii() for letter in text if letter.isprintable()}
-    new = sorted(letter for letter in letters - _found.keys() if ord(letter) not in _own())
-    _found.update((letter, next((name for name, has in _others() if ord(letter) in has), "")) for letter in new)
-    if lacking := "".join(letter for letter in new if not _found[letter]):
+    new = sorted(letter for letter in letters - _stand_ins.keys() if ord(letter) not in _main_letters())
+    _stand_ins.update(
+        (letter, next((name for name, has in _other_fonts() if ord(letter) in has), "")) for letter in new
+    )
+    if lacking := "".join(letter for letter in new if not _stand_ins[letter]):
         warnings.warn(
             f"no installed font has {lacking[:20]!r}, so pictures show boxes in its place; install one that has it, "
             "such as Noto Sans",
@@ -35,17 +37,17 @@ def prepare(texts: Iterable[str]) -> None:
 
 def families() -> list[str]:
     """Return fonts in the order of their use; a letter always comes from the same font."""
-    used = set(_found.values())
-    return [FONT, *(name for name, _ in (_others() if used - {""} else ()) if name in used)]
+    used = set(_stand_ins.values())
+    return [FONT, *(name for name, _ in (_other_fonts() if used - {""} else ()) if name in used)]
 
 
 @cache
-def _own() -> frozenset[int]:
+def _main_letters() -> frozenset[int]:
     return _letters_in(fontManager.findfont(FONT))
 
 
 @cache
-def _others() -> tuple[tuple[str, frozenset[int]], ...]:
+def _other_fonts() -> tuple[tuple[str, frozenset[int]], ...]:
     paths = {
         entry.name: entry.fname
         for entry in reversed(fontManager.ttflist)

@@ -48,13 +48,13 @@ def at(place: complex) -> tuple[float, float]:
     return MM * place.imag, MM * place.real
 
 
-def bar(axes: Axes, one: tuple[complex, float], other: tuple[complex, float], order: float, **look: Any) -> None:
+def bar(axes: Axes, start: tuple[complex, float], end: tuple[complex, float], order: float, **look: Any) -> None:
     """Draw a rod or a web as two circles and the area between them."""
-    (first, wide), (second, narrow) = one, other
+    (first, start_radius), (second, end_radius) = start, end
     along = cmath.phase(second - first)
     turns = np.linspace(0.5 * math.pi, 1.5 * math.pi, 13)
-    corners = [first + wide * cmath.exp(1j * (along + turn)) for turn in turns]
-    corners += [second + narrow * cmath.exp(1j * (along + turn + math.pi)) for turn in turns]
+    corners = [first + start_radius * cmath.exp(1j * (along + turn)) for turn in turns]
+    corners += [second + end_radius * cmath.exp(1j * (along + turn + math.pi)) for turn in turns]
     axes.add_patch(Polygon([at(corner) for corner in corners], closed=True, linewidth=0.8, zorder=order, **look))
 
 
@@ -149,8 +149,10 @@ class Scene:
         numbers, sizes = driven("mount"), {part for part, _ in driven("key", Kind.SIZE)}
         masses = frozenset(part for part, _ in driven("key", Kind.PISTON))
         mounts = frozenset(mount.name for k, mount in enumerate(engine.mounts) if k in numbers)
-        every = frozenset(part.shaft.name for part in engine.slider_cranks)
-        cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("key", Kind.LEAD) & every
+        shaft_names = frozenset(part.shaft.name for part in engine.slider_cranks)
+        cranks = (
+            shaft_names if problem.phasing is not None or sizes - _OF_RODS else driven("key", Kind.LEAD) & shaft_names
+        )
         state = "optimised" if is_changed(result) else "open"
         return cls(engine, driven("rotor"), mounts, masses, cranks, bool(sizes & _OF_RODS), state)
 
@@ -172,7 +174,7 @@ class Scene:
         return len(banks) > 2 and len(set(banks)) == len(banks)
 
     @property
-    def beside(self) -> str:
+    def side_view(self) -> str:
         """Viewpoint of the second view."""
         return "from above" if self.is_flat else "from the left"
 
@@ -186,19 +188,19 @@ def views(scene: Scene) -> Page:
     front, side = (np.array(points) for points in reaches(scene))
     sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (front, side)])
     scale = min((WIDE - NARROW) / sizes[1, 0], WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
-    high = float(scale * sizes[:, 1].max())
-    drawn = page(1, 2, (0.5 * WIDE, high), across=ACROSS)
+    height = float(scale * sizes[:, 1].max())
+    drawn = page(1, 2, (0.5 * WIDE, height), across=ACROSS)
     inches, left = drawn.figure.get_figwidth(), 0.0
     for axes, points, size, is_side in zip(drawn.panels, (front, side), sizes, (False, True), strict=True):
-        wide = max(float(scale * size[0]), NARROW)
-        axes.set_position((left / inches, 0.0, wide / inches, 1.0))
-        left += wide + ACROSS
+        width = max(float(scale * size[0]), NARROW)
+        axes.set_position((left / inches, 0.0, width / inches, 1.0))
+        left += width + ACROSS
         # limits [mm] about the middle of the area over all angles
-        (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * wide / scale, 0.5 * high / scale)
+        (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * width / scale, 0.5 * height / scale)
         across, up = (x - half[0], x + half[0]), (y - half[1], y + half[1])
         down = is_side and scene.is_flat
         axes.set(xlim=across[::-1] if is_side else across, ylim=up[::-1] if down else up)
-        for axis, steps in ((axes.xaxis, wide / 0.8), (axes.yaxis, high / 0.5)):
+        for axis, steps in ((axes.xaxis, width / 0.8), (axes.yaxis, height / 0.5)):
             round_ticks(axis, min(max(int(steps), 2), 7))
     return drawn
 
@@ -209,7 +211,7 @@ def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
     _front(front, scene, phi)
     _side(side, scene, phi)
     front.set_title("from the front, turning clockwise", loc="left", size=SMALL)
-    side.set_title(scene.beside, loc="left", size=SMALL)
+    side.set_title(scene.side_view, loc="left", size=SMALL)
 
 
 def _front(axes: Axes, scene: Scene, phi: float) -> None:
@@ -307,8 +309,8 @@ def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, 
         if not number or width_of(number) > (0.45 if lean else 0.9) * 0.96 * MM * bore / inch:
             continue
         place = MM * (pose.part.x - 0.25 * bore * lean)
-        near = (names for x, z, names in labels if max(abs(x - place), abs(z - up)) < 0.16 * inch)
-        if (names := next(near, None)) is None:
+        names_nearby = (names for x, z, names in labels if max(abs(x - place), abs(z - up)) < 0.16 * inch)
+        if (names := next(names_nearby, None)) is None:
             labels.append((place, up, [number]))
         elif number not in names and width_of(", ".join([*names, number])) < 0.9 * MM * bore / inch:
             names.append(number)

@@ -1,4 +1,4 @@
-"""The engine turning, with the forces that it leaves free and those on its mounts, as an animated GIF."""
+"""Animated GIF of the engine in motion, with shaking force and mount forces."""
 
 from __future__ import annotations
 
@@ -37,28 +37,28 @@ def animate(result: Result, path: Path) -> None:
 
     scene = Scene.from_result(result)
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
-    loads = [_loads(one, k) for one in series] if has_loads(result) else []
-    largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
+    loads = [_loads(item, k) for item in series] if has_loads(result) else []
+    largest = max((float(np.abs(item[:, :, 1:]).max()) for item in loads), default=0.0)
     frames, (factor, unit) = [], in_thousands(largest, "N")
     for step in range(FRAMES):
         drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
         draw_views(drawn, scene, phi)
         _firings(drawn, scene, phi)
-        for one, forces in zip(series, loads, strict=False):
-            _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
+        for item, forces in zip(series, loads, strict=False):
+            _arrows(drawn.panels[0], scene, forces[step], largest, item.colour)
         angle = f"{math.degrees(phi):.1f}° of crank angle"
         scale = f"; longest arrow {number(factor * largest, 3)} {unit}" if largest else ""
         where = f", at {point_name(result, k)}" if loads else ""
         fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
-        legend = [*legend_of(scene), fires, *(one.entry(": forces") for one in series[: len(loads)])]
+        legend = [*legend_of(scene), fires, *(item.entry(": forces") for item in series[: len(loads)])]
         finish_page(drawn, result, f"The engine turning{where}", f"{angle}{scale}.", legend)
         drawn.figure.set_dpi(DPI)
         drawn.figure.canvas.draw()
         pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
         frames.append(Image.fromarray(pixels).convert("RGB"))
     # one palette for all frames avoids flicker
-    some = np.concatenate([np.asarray(frame) for frame in frames[:: max(FRAMES // 4, 1)]])
-    colours = Image.fromarray(some).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
+    sampled_frames = np.concatenate([np.asarray(frame) for frame in frames[:: max(FRAMES // 4, 1)]])
+    colours = Image.fromarray(sampled_frames).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
     reduced = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
     reduced[0].save(path, save_all=True, append_images=reduced[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
 
@@ -75,8 +75,8 @@ def _firings(drawn: Page, scene: Scene, phi: float) -> None:
             axes.plot(x, y, "o", color=VERMILION, markersize=7.0, zorder=9.5)
 
 
-def _loads(one: Series, k: int) -> Array:
-    fields = {field.name: field.values[0, k] for field in forces_of({one.name: one.design}, FRAMES).fields}
+def _loads(item: Series, k: int) -> Array:
+    fields = {field.name: field.values[0, k] for field in forces_of({item.name: item.design}, FRAMES).fields}
     shaking = fields["shaking_force"][:, None]
     return np.concatenate([shaking, fields["mount_force"]], axis=1) if "mount_force" in fields else shaking
 

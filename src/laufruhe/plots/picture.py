@@ -1,4 +1,4 @@
-"""Any picture that is described as data, drawn."""
+"""Draw a picture that is described as data."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
 
 LIMIT = VERMILION
-MOST_NAMES, _APART = 5, 0.1
+MOST_NAMES, _NAME_GAP = 5, 0.1
 """Operating points that are all named, and room between two names [inch]."""
 # line styles distinguish orders in print
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
@@ -45,14 +45,16 @@ def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
     for point in points:
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
     named = points if len(points) <= MOST_NAMES else [points[0], points[-1]]
-    wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
-    names = [fit_line(point.name, wide / len(named) - _APART) for point in named]
-    (low, high), widest = axes.get_xlim(), max(map(width_of, names)) + _APART
-    at = (np.array([point.speed * RPM for point in named]) - low) / (high - low)
-    half = 0.5 * widest / wide
-    for name, place, moved in zip(names, at, spread(at, 2.0 * half, half, max(1.0 - half, half)), strict=True):
+    width, height = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
+    names = [fit_line(point.name, width / len(named) - _NAME_GAP) for point in named]
+    (low, high), widest = axes.get_xlim(), max(map(width_of, names)) + _NAME_GAP
+    shares = (np.array([point.speed * RPM for point in named]) - low) / (high - low)
+    half = 0.5 * widest / width
+    for name, place, label_place in zip(
+        names, shares, spread(shares, 2.0 * half, half, max(1.0 - half, half)), strict=True
+    ):
         leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
-            name, (place, 1.0), (moved, 1.0 + lift / tall), "axes fraction", "axes fraction", size=SMALL, color=FAINT,
-            ha="center", va="bottom", annotation_clip=False, arrowprops=leader,
+            name, (place, 1.0), (label_place, 1.0 + lift / height), "axes fraction", "axes fraction", size=SMALL,
+            color=FAINT, ha="center", va="bottom", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip

@@ -101,16 +101,16 @@ def page(
         Above each panel, for a heading of its own [inch].
     """
     across = gap if across is None else across
-    wide = columns * panel[0] + (columns - 1) * across
-    high = rows * (panel[1] + lead) + (rows - 1) * gap
+    width = columns * panel[0] + (columns - 1) * across
+    height = rows * (panel[1] + lead) + (rows - 1) * gap
     with styled():
-        figure = Figure(figsize=(wide, high), dpi=DPI, facecolor="white")
+        figure = Figure(figsize=(width, height), dpi=DPI, facecolor="white")
         FigureCanvasAgg(figure)
         panels = []
         for k in range(rows * columns if count is None else count):
             row, column = divmod(k, columns)
             left, bottom = column * (panel[0] + across), (rows - 1 - row) * (panel[1] + lead + gap)
-            panels.append(figure.add_axes((left / wide, bottom / high, panel[0] / wide, panel[1] / high)))
+            panels.append(figure.add_axes((left / width, bottom / height, panel[0] / width, panel[1] / height)))
             for axis in (panels[-1].xaxis, panels[-1].yaxis):
                 maximum = 6 if axis is panels[-1].yaxis else min(max(int(panel[0] / _PER_TICK), 3), 7)
                 round_ticks(axis, maximum)
@@ -124,35 +124,35 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
             axis.set_label_text(typeset(axis.get_label_text()))
         for artist in legend:
             artist.set_label(typeset(str(artist.get_label())))
-        drawn = Bbox.union([box for axes in figure.axes if (box := axes.get_tightbbox()) is not None])
-        inside = drawn.transformed(figure.dpi_scale_trans.inverted())
-        wide = max(inside.width + 2.0 * EDGE, NARROWEST)
-        room = wide - 2.0 * EDGE
+        bounds = Bbox.union([box for axes in figure.axes if (box := axes.get_tightbbox()) is not None])
+        inside = bounds.transformed(figure.dpi_scale_trans.inverted())
+        width = max(inside.width + 2.0 * EDGE, NARROWEST)
+        room = width - 2.0 * EDGE
         words = [(title, _TITLE, "bold", INK), (engine, _ENGINE, "normal", INK), (lines, SMALL, "normal", FAINT)]
         head = [(wrap_lines(text, room, size, weight), size, weight, ink) for text, size, weight, ink in words if text]
         foot = wrap_lines(source, room)
         rows, columns = _legend_shape([str(artist.get_label()) for artist in legend], room)
         above = sum(len(text) * size * _LINE + 0.03 for text, size, _, _ in head) + rows * 1.05 * SMALL * _LINE
         below = EDGE + len(foot) * SMALL * _LINE + _ABOVE_FOOT
-        high = EDGE + above + _BELOW_HEAD + inside.height + below
-        _moved(figure, (wide, high), (EDGE - inside.x0, below - inside.y0))
-        top, left = high - EDGE, EDGE / wide
+        height = EDGE + above + _BELOW_HEAD + inside.height + below
+        _resize(figure, (width, height), (EDGE - inside.x0, below - inside.y0))
+        top, left = height - EDGE, EDGE / width
         for text, size, weight, ink in head:
-            figure.text(left, top / high, "\n".join(text), size=size, weight=weight, va="top", color=ink,
+            figure.text(left, top / height, "\n".join(text), size=size, weight=weight, va="top", color=ink,
                         linespacing=1.2)  # fmt: skip
             top -= len(text) * size * _LINE + 0.03
         if legend:
-            _legend(figure, legend, room, columns, (left, top / high))
-        figure.text(left, EDGE / high, "\n".join(foot), size=SMALL, va="bottom", color=FAINT, linespacing=1.2)
+            _legend(figure, legend, room, columns, (left, top / height))
+        figure.text(left, EDGE / height, "\n".join(foot), size=SMALL, va="bottom", color=FAINT, linespacing=1.2)
 
 
-def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -> None:
-    before = figure.get_size_inches()
+def _resize(figure: Figure, size: tuple[float, float], offset: tuple[float, float]) -> None:
+    old_size = figure.get_size_inches()
     places = [axes.get_position(original=True) for axes in figure.axes]
     figure.set_size_inches(size)
     for axes, box in zip(figure.axes, places, strict=True):
-        corner = (np.array([box.x0, box.y0]) * before + by) / size
-        axes.set_position((*corner, *(np.array([box.width, box.height]) * before / size)))
+        corner = (np.array([box.x0, box.y0]) * old_size + offset) / size
+        axes.set_position((*corner, *(np.array([box.width, box.height]) * old_size / size)))
 
 
 def finish_page(
@@ -166,9 +166,11 @@ def finish_page(
     return drawn.figure
 
 
-def _legend(figure: Figure, entries: Sequence[Artist], room: float, columns: int, at: tuple[float, float]) -> Legend:
+def _legend(
+    figure: Figure, entries: Sequence[Artist], room: float, columns: int, corner: tuple[float, float]
+) -> Legend:
     legend = figure.legend(
-        handles=list(entries), loc="upper left", bbox_to_anchor=at, ncols=columns, frameon=False, fontsize=SMALL,
+        handles=list(entries), loc="upper left", bbox_to_anchor=corner, ncols=columns, frameon=False, fontsize=SMALL,
         borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_APART, labelcolor=INK,
     )  # fmt: skip
     for text in legend.get_texts():
@@ -180,8 +182,8 @@ def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:
     size = SMALL / 72.0
     for columns in range(len(labels), 0, -1):
         split = [list(part) for part in np.array_split(list(labels), columns)]
-        wide = sum(max(map(width_of, part)) + (_HANDLE + 0.8 + _APART) * size for part in split)
-        if wide - _APART * size <= room or columns == 1:
+        width = sum(max(map(width_of, part)) + (_HANDLE + 0.8 + _APART) * size for part in split)
+        if width - _APART * size <= room or columns == 1:
             return max(map(len, split)), columns
     return 0, 1
 
@@ -209,8 +211,8 @@ def series_of(result: Result, loads: bool = False) -> list[Series]:
     """Return the initial and the final design; only one if nothing was decided, or if one lacks loads."""
     if not is_changed(result):
         return [Series(result.final, AFTER, INITIAL)]
-    both = [Series(result.initial, BEFORE, INITIAL), Series(result.final, AFTER, FINAL)]
-    return both[-len(evaluations_with_loads(result)) :] if loads else both
+    designs = [Series(result.initial, BEFORE, INITIAL), Series(result.final, AFTER, FINAL)]
+    return designs[-len(evaluations_with_loads(result)) :] if loads else designs
 
 
 def entry(label: str, **look: Any) -> Line2D:

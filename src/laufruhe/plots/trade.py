@@ -46,8 +46,8 @@ def figure(trade: Trade) -> Figure:
 
 @styled()
 def _drawn(trade: Trade) -> Figure:
-    drawn = page(1, 1, PANEL)
-    axes, rows = drawn.panels[0], trade.rows
+    sheet = page(1, 1, PANEL)
+    axes, rows = sheet.panels[0], trade.rows
     times = np.array([1e6 * row.evaluation for row in rows])
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
     axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
@@ -57,7 +57,7 @@ def _drawn(trade: Trade) -> Figure:
     axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
     decides = np.array([row.decides and not math.isnan(row.regret) for row in rows])
     axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
-    regrets = [max(row.regret, LEAST_REGRET) for row, one in zip(rows, decides, strict=True) if one]
+    regrets = [max(row.regret, LEAST_REGRET) for row, is_drawn in zip(rows, decides, strict=True) if is_drawn]
     dots = axes.scatter(
         times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
         edgecolors=INK, linewidths=0.5,
@@ -72,30 +72,30 @@ def _drawn(trade: Trade) -> Figure:
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     _name(axes, rows, times, errors)
     if regrets:
-        _colour_bar(drawn, dots)
+        _colour_bar(sheet, dots)
     hollow = "" if decides.all() else " Hollow: no design, or one beyond a limit."
     heading(
-        drawn.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
+        sheet.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
         f"Line: fidelities that no other beats in time and error. Regrets below {_power(LEAST_REGRET)} are drawn there."
         f"{hollow} Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip
-    return drawn.figure
+    return sheet.figure
 
 
 def _places(axes: Axes, errors: Array, times: Array) -> Array:
     """Return the drawn errors; very small ones stand in a band under the axis."""
     small = errors < LEAST_ERROR
-    wide, high = PANEL
+    width, height = PANEL
     low, end = np.log10(axes.get_xlim())
-    across = wide * (np.log10(times) - low) / (end - low)
+    across = width * (np.log10(times) - low) / (end - low)
     levels = np.zeros(len(errors), dtype=int)
     for j, k in enumerate(order := [k for k in np.argsort(times, kind="stable") if small[k]]):
-        taken = {levels[other] for other in order[:j] if across[k] - across[other] < DOT}
-        levels[k] = next(level for level in range(len(errors)) if level not in taken)
+        used = {levels[neighbour] for neighbour in order[:j] if across[k] - across[neighbour] < DOT}
+        levels[k] = next(level for level in range(len(errors)) if level not in used)
     band = DOT * (levels.max(initial=0) + 1.5) if small.any() else 0.0
     minimum = LEAST_ERROR if small.any() else 0.5 * errors.min()
     top = 2.0 * max(errors.max(), 2.0 * minimum)
-    decades = (math.log10(top) - math.log10(minimum)) / max(high - band, 0.5 * high)
+    decades = (math.log10(top) - math.log10(minimum)) / max(height - band, 0.5 * height)
     axes.set_ylim(minimum * 10.0 ** (-decades * band), top)
     if small.any():
         axes.axhspan(axes.get_ylim()[0], minimum, color="#f0f2f4", linewidth=0.0, zorder=0.4)

@@ -1,4 +1,4 @@
-"""Words and numbers in pictures: how wide they are, where they break, their colour, and where they find room."""
+"""Words and numbers in pictures: width, line breaks, colour and placement."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ INK, FAINT = "#222222", "#5c5c5c"
 SMALL = 9.0
 """Smallest size of letters [points]."""
 READ = 4.5
-"""Least contrast of letters, as WCAG 2 asks."""
+"""Smallest contrast of letters (WCAG 2)."""
 THIN_SPACE = "\u2009"
 _POINTS = 72.0
 _ROUND = (1.0, 2.0, 5.0, 10.0)
 UNSEEN = 1e-5
-"""Share of the largest load at which another is told and not drawn."""
+"""Share of the largest load below which a load is stated in words and not drawn."""
 LARGE = 1e4
-"""Numbers from here on are given in thousands of their unit."""
+"""Smallest number that is printed in thousands of its unit."""
 
 
 def width_of(text: str, size: float = SMALL, weight: str = "normal") -> float:
@@ -60,20 +60,20 @@ def wrap_lines(text: str, inches: float, size: float = SMALL, weight: str = "nor
     """Break text into lines of this width [inch]; a wider word is cut."""
     lines: list[str] = []
     # widths of words add up; most stand in several pictures
-    space, wide = width_of("n n", size, weight) - width_of("nn", size, weight), 0.0
+    space, width = width_of("n n", size, weight) - width_of("nn", size, weight), 0.0
     for word in text.split():
-        longer = wide + space + width_of(word, size, weight)
+        longer = width + space + width_of(word, size, weight)
         if lines and longer <= inches:
-            lines[-1], wide = f"{lines[-1]} {word}", longer
+            lines[-1], width = f"{lines[-1]} {word}", longer
         else:
             lines.append(fit_line(word, inches, size))
-            wide = width_of(lines[-1], size, weight)
+            width = width_of(lines[-1], size, weight)
     return lines
 
 
-def contrast(one: str, other: str) -> float:
+def contrast(colour: str, background: str) -> float:
     """Return the contrast of two colours, 1 to 21 (WCAG 2)."""
-    low, high = sorted(_luminance(colour) for colour in (one, other))
+    low, high = sorted(map(_luminance, (colour, background)))
     return (high + 0.05) / (low + 0.05)
 
 
@@ -115,8 +115,8 @@ def _rising(values: Array) -> Array:
     for value in values:
         mean, count = float(value), 1
         while shared and shared[-1][0] > mean:
-            other, many = shared.pop()
-            mean, count = (mean * count + other * many) / (count + many), count + many
+            other_mean, other_count = shared.pop()
+            mean, count = (mean * count + other_mean * other_count) / (count + other_count), count + other_count
         shared.append((mean, count))
     return np.repeat([mean for mean, _ in shared], [count for _, count in shared])
 
@@ -161,14 +161,14 @@ def omitted_words(largest: float, maximum: float, unit: str) -> str:
 
 def separate_texts(texts: Sequence[Text]) -> None:
     """Move overlapping words up and down, as little as possible."""
-    left = [(text, text.get_window_extent()) for text in texts]
-    while left:
-        group = [left.pop(0)]
+    remaining = [(text, text.get_window_extent()) for text in texts]
+    while remaining:
+        group = [remaining.pop(0)]
         # texts over the same part of the axis are spread together
-        for text, box in left[:]:
-            if any(box.x0 < other.x1 and other.x0 < box.x1 for _, other in group):
+        for text, box in remaining[:]:
+            if any(box.x0 < other_box.x1 and other_box.x0 < box.x1 for _, other_box in group):
                 group.append((text, box))
-                left.remove((text, box))
+                remaining.remove((text, box))
         heights = np.array([0.5 * (box.y0 + box.y1) for _, box in group])
         minimum = 1.15 * max(box.height for _, box in group)
         moved = spread(heights, minimum, -math.inf, math.inf)
@@ -213,14 +213,14 @@ class PlainNumbers(ScalarFormatter):
 
 def grouped(number: str) -> str:
     """Return a number with thin spaces between thousands, from five digits on."""
-    integer, point, rest = number.partition(".")
+    integer, point, decimals = number.partition(".")
     digits = integer.lstrip("-−")
     if not digits.isdecimal() or len(digits) < 5:
         return number
-    return integer[: len(integer) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
+    return integer[: len(integer) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + decimals
 
 
-def round_ticks(axis: Axis, maximum: int, **more: Any) -> None:
+def round_ticks(axis: Axis, maximum: int, **options: Any) -> None:
     """Set ticks at steps of 1, 2 or 5, their numbers in full."""
-    axis.set_major_locator(MaxNLocator(maximum, steps=_ROUND, **more))
+    axis.set_major_locator(MaxNLocator(maximum, steps=_ROUND, **options))
     axis.set_major_formatter(PlainNumbers())

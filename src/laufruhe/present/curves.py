@@ -110,7 +110,10 @@ def is_twin(result: Result) -> bool:
     if len(engine.cylinders) != 2 or not has_loads(result):
         return False
     k = hardest_point(result)
-    initial, final = (abs(np.array([*parts_of(result, each, k).values()])) for each in (result.initial.engine, engine))
+    initial, final = (
+        abs(np.array([*parts_of(result, design_engine, k).values()]))
+        for design_engine in (result.initial.engine, engine)
+    )
     return bool(final.max() > NEXT_TO_NOTHING * max(initial.max(), final.max()))
 
 

@@ -57,13 +57,15 @@ def places_of(result: Result) -> list[Places]:
     """Return the quantities that a result shows by place; inside the crankcase requested ones, or all with bearings."""
     engine, problem = result.problem.engine, result.problem
     requested, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
-    shown = [MOUNTS] if engine.mounts else []
+    places_list = [MOUNTS] if engine.mounts else []
     rubs = all(bearing.friction is not None for bearing in engine.bearings)
     has_data = {BEARINGS: bool(engine.bearings), PINS: bool(engine.bearings), FRICTION: bool(engine.bearings) and rubs}
-    shown += [places for places, known in has_data.items() if inside and (known or places.channel in requested)]
+    places_list += [
+        places for places, is_available in has_data.items() if inside and (is_available or places.channel in requested)
+    ]
     loads = [Measure(channel).load for channel in CHANNELS.values() if channel.title and not problem.fidelity.is_uneven]
     loads_of = [load for load in loads if load.needs.of(engine) and load.places(engine)]
-    return [*shown, *(Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads_of)]
+    return [*places_list, *(Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads_of)]
 
 
 def hardest_point(result: Result) -> int:

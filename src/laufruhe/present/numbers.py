@@ -1,4 +1,4 @@
-"""Numbers and units as an engineer reads them."""
+"""Numbers and units as text."""
 
 from __future__ import annotations
 

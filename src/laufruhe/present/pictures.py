@@ -1,4 +1,4 @@
-"""Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
+"""List of a result's pictures in the order of a report; `plots.results` has a module for each."""
 
 from __future__ import annotations
 

@@ -34,15 +34,15 @@ class Pose:
         centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
         turn = part.throw + part.shaft.ratio * phi
         rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
-        moved = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
-        way = part.crank_radius + rod + moved
+        offset = complex(part.motion(np, np.float64(turn - part.bank)).points[0][1][0])
+        distance = part.crank_radius + rod + offset
         bodies = tuple(
             replace(body, points=centre + axis * body.points) for body in part.outlines(float(turn - part.bank))
         )
         pin = part.crank_radius * cmath.exp(1j * turn)
         # the pin of a Scotch yoke slides across its rod, which stays on the axis
         foot = pin if math.isfinite(part.rod_length) else axis * (pin / axis).real
-        return cls(part, centre, centre + pin, centre + foot, centre + way * axis, bodies)
+        return cls(part, centre, centre + pin, centre + foot, centre + distance * axis, bodies)
 
 
 def half_disc(unbalance: float) -> float:

@@ -14,16 +14,16 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
     if part is None:
         return ""
     unit = problem.objective_unit or ""
-    alone, rest, total = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
+    static, alternating, total = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
     if with_alternating_loads(problem).objective == problem.objective:
-        return f"The steady reaction to the mean torque, {alone} alone, is left out; with it the objective is {total}."
-    lead = f"The steady reaction to the mean torque alone makes {alone}"
+        return f"The steady reaction to the mean torque, {static} alone, is left out; with it the objective is {total}."
+    lead = f"The steady reaction to the mean torque alone makes {static}"
     if part.is_floor:
         return (
-            f"{lead}. No rotating part can bring the objective below it. Without that mean it is {rest}; "
+            f"{lead}. No rotating part can bring the objective below it. Without that mean it is {alternating}; "
             "alternating = true minimises this."
         )
     return (
         f"{lead} ({share(part.static / part.whole)}), which no rotating part can balance. "
-        f"Without that mean the objective is {rest} (alternating = true)."
+        f"Without that mean the objective is {alternating} (alternating = true)."
     )

@@ -1,4 +1,4 @@
-"""Tables as data: screen, Markdown, page, CSV files and workbook are written from them."""
+"""Tables as data, from which screen, Markdown, page, CSV files and workbook are written."""
 
 from __future__ import annotations
 

@@ -23,10 +23,10 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     """
     pruned, exact = choice.numbers
     ratio = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""
-    met = "" if choice.error_estimate <= tolerance else "; the reference is no better: use a smoother gas trace"
+    remark = "" if choice.error_estimate <= tolerance else "; the reference is no better: use a smoother gas trace"
     lines = [
         f"{problem.title}",
-        f"Error of the objective: at most {choice.error_estimate:.1e} (tolerance {tolerance:g}{met})",
+        f"Error of the objective: at most {choice.error_estimate:.1e} (tolerance {tolerance:g}{remark})",
         "",
         "Computed:",
         *(f"  {text}" for text in choice.description),

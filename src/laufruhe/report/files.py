@@ -82,7 +82,7 @@ class FileSet:
         above = next(path for path in (folder, *folder.parents) if path.exists())
         if not above.is_dir():
             raise self.refused(f"cannot be written ('{above}' is not a folder)")
-        if folder in (here := Path.cwd(), *here.parents) or os.path.ismount(folder):
+        if folder in (working_folder := Path.cwd(), *working_folder.parents) or os.path.ismount(folder):
             raise self.refused("cannot be replaced while it is worked in or mounted")
         if not folder.exists():
             return frozenset()
@@ -101,7 +101,7 @@ class FileSet:
 
 
 @contextmanager
-def staged(wanted: FileSet) -> Iterator[Path]:
+def staged(target: FileSet) -> Iterator[Path]:
     """Yield a hidden folder that replaces the target folder atomically when all files are made.
 
     Whether it can is found out on entry. After an error, an interrupt or a kill at any
@@ -114,44 +114,44 @@ def staged(wanted: FileSet) -> Iterator[Path]:
         If the folder cannot be written, holds what Laufruhe did not make and would
         overwrite, or holds the results of another command.
     """
-    wanted = replace(wanted, folder=Path(os.path.realpath(wanted.folder)))
-    with ExitStack() as until_then:
-        with _reporting(wanted):
-            above = wanted.folder.parent
+    target = replace(target, folder=Path(os.path.realpath(target.folder)))
+    with ExitStack() as stack:
+        with _reporting(target):
+            above = target.folder.parent
             # wait while another run swaps the folder
             with folder_lock(above) if above.is_dir() else nullcontext():
-                wanted.checked()
-            stage = until_then.enter_context(_stage_for(wanted.folder))
+                target.checked()
+            stage = stack.enter_context(_stage_for(target.folder))
             # the folder may be missing, also while another run swaps it
             with suppress(FileNotFoundError):
-                shutil.copymode(wanted.folder, stage)
-        with _with_final_name(stage, wanted.folder):
+                shutil.copymode(target.folder, stage)
+        with _with_final_name(stage, target.folder):
             yield stage
-        with folder_lock(wanted.folder.parent):
-            made = wanted.checked()
-            if wanted.adds:
+        with folder_lock(target.folder.parent):
+            made = target.checked()
+            if target.adds:
                 for name in made - {entry.name for entry in stage.iterdir()}:
-                    shutil.copy2(wanted.folder / name, stage)
-            _note(stage, wanted.verb, sorted({entry.name for entry in stage.iterdir()} - {MADE}))
-            _swap(stage, wanted.folder)
-            _clear(stage, wanted.folder)
+                    shutil.copy2(target.folder / name, stage)
+            _note(stage, target.verb, sorted({entry.name for entry in stage.iterdir()} - {MADE}))
+            _swap(stage, target.folder)
+            _clear(stage, target.folder)
 
 
 @contextmanager
-def _reporting(wanted: FileSet) -> Iterator[None]:
+def _reporting(target: FileSet) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise wanted.refused(f"cannot be written ({error.strerror or error})") from None
+        raise target.refused(f"cannot be written ({error.strerror or error})") from None
 
 
 @contextmanager
-def _with_final_name(stage: Path, wanted: Path) -> Iterator[None]:
+def _with_final_name(stage: Path, target: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
         if error.filename is None or stage in Path(os.fsdecode(error.filename)).parents:
-            error.filename = str(wanted)
+            error.filename = str(target)
         raise
 
 
@@ -176,9 +176,9 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         raise refused(option, str(path), "cannot be written", "check its permissions")
     if path.is_file() and not is_ours(path):
         raise place.refused("is a file that Laufruhe did not make")
-    with ExitStack() as until_then:
+    with ExitStack() as stack:
         with _reporting(place):
-            stage = until_then.enter_context(_stage_for(path))
+            stage = stack.enter_context(_stage_for(path))
         with _with_final_name(stage, path):
             yield stage / path.name
         if (stage / path.name).exists():
@@ -198,14 +198,14 @@ def write(path: Path, text: str) -> None:
 
 def write_all(texts: Mapping[Path, str]) -> None:
     """Write all texts as files, or none; create folders."""
-    with ExitStack() as undone:
+    with ExitStack() as stack:
         staged = {}
         for path, text in texts.items():
             missing = [above for above in path.parents if not above.exists()]
-            undone.callback(_remove_empty, missing)
+            stack.callback(_remove_empty, missing)
             path.parent.mkdir(parents=True, exist_ok=True)
             stage = staged[path] = path.with_name(f".unfinished-{secrets.token_hex(8)}")
-            undone.callback(stage.unlink, missing_ok=True)
+            stack.callback(stage.unlink, missing_ok=True)
             try:
                 write(stage, text)
             except OSError as error:
@@ -220,19 +220,19 @@ def _stage_for(place: Path) -> Iterator[Path]:
     """Yield an unfinished folder beside a place; remove those that killed runs left there."""
     missing = [path for path in place.parents if not path.exists() and not path.is_symlink()]
     mark = f".unfinished-{hashlib.sha256(place.name.encode(errors='surrogateescape')).hexdigest()[:8]}-"
-    with ExitStack() as undone:
-        undone.callback(_remove_empty, missing)
+    with ExitStack() as stack:
+        stack.callback(_remove_empty, missing)
         place.parent.mkdir(parents=True, exist_ok=True)
         with folder_lock(place.parent):
-            for left in place.parent.glob(f"{mark}*"):
-                with folder_lock(left, wait=False) as ours:
-                    if ours:
-                        _clear(left, place)
+            for abandoned in place.parent.glob(f"{mark}*"):
+                with folder_lock(abandoned, wait=False) as is_free:
+                    if is_free:
+                        _clear(abandoned, place)
             stage = place.parent / f"{mark}{secrets.token_hex(4)}"
             stage.mkdir()
-            undone.callback(_clear, stage, place)
+            stack.callback(_clear, stage, place)
             _note(stage, "", None)
-            undone.enter_context(folder_lock(stage))
+            stack.enter_context(folder_lock(stage))
         yield stage
 
 
@@ -244,35 +244,35 @@ def _note(folder: Path, verb: str, names: list[str] | None) -> None:
 def _made(folder: Path) -> tuple[str, frozenset[str]]:
     # command that made the files in a folder, and their names; empty for a foreign folder
     try:
-        noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
-        verb, names = noted["made_by"], noted["files"]
-        here = {entry.name for entry in folder.iterdir() if names is None or entry.is_file()}
+        record: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
+        verb, names = record["made_by"], record["files"]
+        entries = {entry.name for entry in folder.iterdir() if names is None or entry.is_file()}
         if isinstance(verb, str) and isinstance(names, list | None):
             # ignore names that are not in this folder
-            return verb, frozenset(here if names is None else here.intersection(map(str, names)))
+            return verb, frozenset(entries if names is None else entries.intersection(map(str, names)))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
     return "", frozenset()
 
 
-def _clear(left: Path, place: Path) -> None:
+def _clear(abandoned: Path, place: Path) -> None:
     """Delete files that Laufruhe made in an abandoned folder; move all others back to their place."""
-    if not left.is_dir():
+    if not abandoned.is_dir():
         return
-    verb, made = _made(left)
+    verb, made = _made(abandoned)
     with suppress(OSError):
         if verb and not place.exists():
             # killed between two renames: this is the only whole set
-            left.rename(place)
+            abandoned.rename(place)
             return
-        for entry in [entry for entry in left.iterdir() if entry.name != MADE]:
+        for entry in [entry for entry in abandoned.iterdir() if entry.name != MADE]:
             if entry.name in made or entry.name == _NEXT:
                 entry.unlink()
             elif not (place / entry.name).exists():
                 entry.rename(place / entry.name)
         # last: it identifies the other files
-        (left / MADE).unlink(missing_ok=True)
-        left.rmdir()
+        (abandoned / MADE).unlink(missing_ok=True)
+        abandoned.rmdir()
 
 
 def _swap(stage: Path, folder: Path) -> None:
@@ -282,8 +282,11 @@ def _swap(stage: Path, folder: Path) -> None:
         stage.rename(folder)
         return
     if os.name == "posix":
-        libc, one, other = ctypes.CDLL(None), os.fsencode(stage), os.fsencode(folder)
-        for call, words in (("renameat2", (_HERE, one, _HERE, other, _SWAP)), ("renamex_np", (one, other, _SWAP))):
+        libc, source, destination = ctypes.CDLL(None), os.fsencode(stage), os.fsencode(folder)
+        for call, words in (
+            ("renameat2", (_HERE, source, _HERE, destination, _SWAP)),
+            ("renamex_np", (source, destination, _SWAP)),
+        ):
             if hasattr(libc, call) and getattr(libc, call)(*words) == 0:
                 return
     # a file system that cannot swap: what is left after a kill in between, the next run puts in its place

@@ -1,4 +1,4 @@
-"""`result.json`, the contract with scripts: SI, full precision, null where there is nothing."""
+"""Write `result.json`: SI units, full precision, null for missing values."""
 
 from __future__ import annotations
 
@@ -100,7 +100,7 @@ def _plain(value: Any) -> Any:
 def _running(result: Result) -> Record:
     engine = result.final.engine
     return {
-        "balance_factors": [_attributes(one, "cylinders factor") for one in balance_factors(engine)],
+        "balance_factors": [_attributes(balance, "cylinders factor") for balance in balance_factors(engine)],
         "firing_intervals": list(engine.firing_intervals),
         "warnings": [str(doubt) for doubt in result.problem.plausibility_warnings],
     }
@@ -200,12 +200,12 @@ def _all_points(result: Result, mounts: list[list[Record]]) -> list[Record]:
     share = share / share.sum()
     return [
         {
-            "name": same[0]["name"],
-            **_over_points(same, share),
-            "orders": _largest_orders([entry["orders"] for entry in same]),
-            "initial": _over_points([entry["initial"] for entry in same], share),
+            "name": entries[0]["name"],
+            **_over_points(entries, share),
+            "orders": _largest_orders([entry["orders"] for entry in entries]),
+            "initial": _over_points([entry["initial"] for entry in entries], share),
         }
-        for same in zip(*mounts, strict=True)
+        for entries in zip(*mounts, strict=True)
     ]
 
 
@@ -277,20 +277,21 @@ def _ranks(result: Result) -> Record:
         }
         for rank in result.ranks
     ]
-    free = None if result.free is None else [_attributes(one, "name unit low high") for one in result.free]
+    free = None if result.free is None else [_attributes(decision, "name unit low high") for decision in result.free]
     return {"free_decisions": free, **({"objectives": entries} if entries else {})}
 
 
 def _reached(result: Result) -> Record:
     if result.status.has_design:
         return {}
-    names, near, more = "name side limit unit value", result.nearest, "bound why ended"
+    names, nearest, keys = "name side limit unit value", result.nearest, "bound why ended"
     reached = [
-        {**_attributes(one, f"{names} {more}"), "proof": str(one.proof), **_values(one)} for one in result.reached
+        {**_attributes(limit, f"{names} {keys}"), "proof": str(limit.proof), **_values(limit)}
+        for limit in result.reached
     ]
     return {
         "reached": reached,
-        "nearest": near and {**_attributes(near, f"{names} excess=violation broken"), **_values(near)},
+        "nearest": nearest and {**_attributes(nearest, f"{names} excess=violation broken"), **_values(nearest)},
     }
 
 

@@ -44,5 +44,5 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     yield Paragraph(fidelity_of(result))
     yield Heading("Reproduce")
     yield Code(" ".join(command.split()))
-    made = ", ".join(f"{name} {version}" for name, version in versions().items())
-    yield Paragraph(f"Made with {made}.", marked=True)
+    version_list = ", ".join(f"{name} {version}" for name, version in versions().items())
+    yield Paragraph(f"Made with {version_list}.", marked=True)

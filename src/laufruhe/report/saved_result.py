@@ -1,4 +1,4 @@
-"""`result.json` written, and read back: what a script knows of a design that was decided before."""
+"""Write `result.json` and read it back as `SavedResult`."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ def _numbers(entry: Any) -> Any:
     if not isinstance(entry, dict):
         return entry
     # an equal tightening price is stored twice
-    same = entry.get("tightening_price") in (None, entry.get("shadow_price"))
-    entries = {k: v for k, v in entry.items() if not (same and k == "tightening_price")}
+    is_same = entry.get("tightening_price") in (None, entry.get("shadow_price"))
+    entries = {k: v for k, v in entry.items() if not (is_same and k == "tightening_price")}
     return {k: math.nan if v is None else v for k, v in entries.items()}
 
 
 def _named(entries: Any) -> Any:
     if not isinstance(entries, dict):
         return entries
-    return {name: {"name": name, **each} if isinstance(each, dict) else each for name, each in entries.items()}
+    return {name: {"name": name, **values} if isinstance(values, dict) else values for name, values in entries.items()}
 
 
 _NULLS = BeforeValidator(_numbers)

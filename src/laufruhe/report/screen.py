@@ -1,4 +1,4 @@
-"""Tables and documents on the screen, as wide as that is."""
+"""Print results and documents on the screen, wrapped to its width."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
 BETWEEN = 3
-"""Blanks between two columns."""
+"""Number of blanks between two columns."""
 _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE: "red", Status.FAILED: "red"}
 
 

@@ -1,4 +1,4 @@
-"""Report sections of extensions: tables, files of numbers, and an entry of result.json."""
+"""Report sections of extensions: tables, number files, and an entry of result.json."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ class Section:
     name
         Key in result.json.
     applies
-        Return whether a result has any of it.
+        Function that returns True if a result has this section.
     tables
-        Return the tables of the report.
+        Function that returns the tables of the report.
     record
-        Return the entry of result.json, if there is one.
+        Function that returns the entry of result.json; None without one.
     printed
-        Names of the tables that are files as they are printed.
+        Names of tables that are also written as CSV files, as printed.
     number_tables
-        Further files of numbers.
+        Further CSV files with numbers in full precision.
     """
 
     name: str

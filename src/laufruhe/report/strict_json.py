@@ -1,4 +1,4 @@
-"""JSON as scripts can rely on it: no NaN, and one line feed at the end."""
+"""Strict JSON for scripts: no NaN, the maker first, one line feed at the end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 MADE_BY = {"made_by": "laufruhe"}
 _BEGIN = re.compile(rb'(\[\s*)?{\s*"made_by": "laufruhe"')
 LONGEST_BEGIN = 200
-"""Bytes of a file in which it has to say who made it."""
+"""Number of bytes at the start of a file that must name its maker."""
 
 
 def is_ours(path: Path) -> bool:

@@ -48,7 +48,7 @@ def write_study(
     ending
         Ending of the picture files of the Markdown page.
     """
-    drawn, tables = {}, {}
+    pending, tables = {}, {}
     for part in study.study.parts:
         say(f"writing {part.name}")
         name, data = part.name, datasets[part.name]
@@ -60,11 +60,11 @@ def write_study(
             tables[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
             write_csv(tables[name], folder / f"{name}.csv")
         if "png" in part.ends:
-            drawn[name] = draw(part.picture(data), folder / name)
+            pending[name] = draw(part.picture(data), folder / name)
     if tables:
         write_book(tables, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
-    pictures = {name: picture() for name, picture in drawn.items()}
+    pictures = {name: picture() for name, picture in pending.items()}
     files.write(folder / files.REPORT, document.as_markdown(ending))
     files.write(folder / files.PAGE, as_html(document, pictures))
 

@@ -79,16 +79,18 @@ def _as_number(cell: str) -> str | float:
 
 
 def _values(entries: Sequence[DecisionValue | LimitValue]) -> Table:
-    return Table([field.name for one in entries[:1] for field in fields(one)], [list(astuple(one)) for one in entries])
+    return Table(
+        [field.name for entry in entries[:1] for field in fields(entry)], [list(astuple(entry)) for entry in entries]
+    )
 
 
 def _measures(result: Result) -> Table:
     rows = [
-        [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
+        [places.title, point.name, design, name, cycle.mean, cycle.max, cycle.rms, places.channel.unit]
         for places in places_of(result)
         for k, point in enumerate(result.problem.points)
         for design, evaluation in designs_with_loads(result).items()
-        for name, each in zip(
+        for name, cycle in zip(
             places.channel.places(evaluation.engine), place_measures(evaluation, k, places.channel), strict=True
         )
     ]  # fmt: skip
@@ -142,8 +144,8 @@ def _torque(result: Result) -> Table:
     points, fidelity = result.problem.points, result.problem.fidelity
     angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
     columns_by_point = [
-        {f"{name}: {of}": values for name, design in result.designs.items()
-         for of, values in _torques(design.engine, point, fidelity, angles).items()}
+        {f"{name}: {column}": values for name, design in result.designs.items()
+         for column, values in _torques(design.engine, point, fidelity, angles).items()}
         for point in points
     ]  # fmt: skip
     # an operating point may lack gas
@@ -165,37 +167,37 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: 
     swing, inertia = swing_of(engine, point, fidelity), turning_inertia(engine, fidelity)
     if inertia is not None and swing.irregularity(inertia) <= 1.0:
         speeds = RPM * swing.speeds(inertia)[: len(swing.work)]
-        at = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
-        columns["speed [rpm]"] = np.interp(angles, at, speeds, period=engine.cycle.angle)
+        speed_angles = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
+        columns["speed [rpm]"] = np.interp(angles, speed_angles, speeds, period=engine.cycle.angle)
     return columns
 
 
 def _uneven_firing(result: Result) -> Table:
     unit = objective_unit(result) or "-"
     rows = [
-        [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
-        for one in ranking_of(result).trade
+        [math.degrees(point.allowed), math.degrees(point.deviation), point.value, point.lower_bound]
+        for point in ranking_of(result).trade
     ]
     return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"lower bound [{unit}]"], rows)
 
 
 def _indicator(result: Result) -> Table:
-    parts, rows, named = result.final.engine.slider_cranks, [], dict[str, None]()
+    parts, rows, chamber_names = result.final.engine.slider_cranks, [], dict[str, None]()
     diagrams = [
         (point.name, part.name, indicator_of(gas, part, point, TURN))
         for point, gas in points_with_chambers(result)
         for part in parts
         if gas.of(part)
     ]
-    for _, _, one in diagrams:
-        named |= dict.fromkeys(one.pressures)
-    for point, part, one in diagrams:
+    for _, _, diagram in diagrams:
+        chamber_names |= dict.fromkeys(diagram.pressures)
+    for point, part, diagram in diagrams:
         # a cylinder may lack a chamber
-        pressures = (one.pressures.get(name, np.full(STEPS, math.nan)) for name in named)
-        columns = np.column_stack([np.degrees(TURN), one.travel, one.force, one.needed, *pressures])
+        pressures = (diagram.pressures.get(name, np.full(STEPS, math.nan)) for name in chamber_names)
+        columns = np.column_stack([np.degrees(TURN), diagram.travel, diagram.force, diagram.needed, *pressures])
         rows += [[point, part, *row] for row in columns.tolist()]
     head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
-            "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in named)]  # fmt: skip
+            "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in chamber_names)]  # fmt: skip
     return Table(head, rows)
 
 
@@ -232,7 +234,9 @@ def _on_crank(result: Result) -> Table:
         rows += [[point.name, *row] for row in np.column_stack([angles, *columns]).tolist()]
     for name in designs:
         lead = f"{name}: force on " if len(designs) > 1 else "force on "
-        heads += [f"{lead}{bearing} {way} the crank [N]" for bearing in names for way in ("along", "across")]
+        heads += [
+            f"{lead}{bearing} {direction} the crank [N]" for bearing in names for direction in ("along", "across")
+        ]
     return Table(["point", "angle [deg]", *heads], rows)
 
 
@@ -241,8 +245,8 @@ def _wear(result: Result) -> Table:
     rows = []
     for name, design in designs_with_loads(result).items():
         for k, point in enumerate(result.problem.points):
-            shares = [wear_of(path, angles) for path in bearing_paths(design, k).T]
-            rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *shares]).tolist()]
+            wear = [wear_of(path, angles) for path in bearing_paths(design, k).T]
+            rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *wear]).tolist()]
     head = ["design", "point", "direction from z towards y [deg]", *(f"wear of {name} [-]" for name in names)]
     return Table(head, rows)
 

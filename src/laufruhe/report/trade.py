@@ -1,4 +1,4 @@
-"""Speed against accuracy as a page, and which fidelity to take."""
+"""Report on time and error of every fidelity, with a recommendation."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
 
 
 def _beyond(trade: Trade) -> list[str]:
-    """Return what the fidelities at constant speed, or in the frequency domain, neglect."""
+    """Return sentences on effects that no fidelity at constant speed or in the frequency domain includes."""
     lines = []
     if trade.flywheel is not None:
         inertia, change = trade.flywheel

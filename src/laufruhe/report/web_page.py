@@ -1,4 +1,4 @@
-"""`report.html`: a report as one page that needs nothing beside it, for screens, paper and readers aloud."""
+"""Write `report.html`: a report as one self-contained page for screens, paper and screen readers."""
 
 from __future__ import annotations
 

@@ -14,13 +14,13 @@ from laufruhe.report.sections.reach import sentences
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import RankedStar
 
-# A change that would be printed as 0.0 %.
-UNFELT = 5e-4
+# relative change that is printed as zero
+NO_CHANGE = 5e-4
 NO_BOUND = "no useful bound was found in the time given"
 NEGLIGIBLE = 1e-9
 """Relative error of the objective that is not stated as a number."""
-LOOSE = 1e-3
-"""Residual of the optimality conditions from which they are not said to hold."""
+LARGE_RESIDUAL = 1e-3
+"""Residual above which the optimality conditions count as not met."""
 
 
 def headline(result: Result) -> str:
@@ -36,7 +36,7 @@ def headline(result: Result) -> str:
     if math.isinf(o.initial):
         text = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
         return f"{text}; the initial design is on a resonance."
-    if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
+    if abs(o.value - o.initial) <= NO_CHANGE * max(abs(o.value), abs(o.initial)):
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     # a zero objective has no relative change
     change = f" ({percent(-o.reduction)})" if o.initial else ""
@@ -55,7 +55,7 @@ def details(result: Result) -> list[str]:
 
 
 def fidelity_of(result: Result) -> str:
-    """Return the computed physics, and the error of the objective."""
+    """Return the computed physics and the numerical error of the objective, in words."""
     f = result.problem.fidelity
     text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
@@ -67,7 +67,7 @@ def fidelity_of(result: Result) -> str:
 
 
 def fired(result: Result) -> str:
-    """Return firing order and intervals, and simultaneous firings; empty for one cylinder."""
+    """Return firing order, intervals and simultaneous firings in words; empty for one cylinder."""
     engine = result.final.engine
     if len(engine.cylinders) < 2:
         return ""
@@ -84,37 +84,37 @@ def fired(result: Result) -> str:
 
 
 def why_star(result: Result) -> str:
-    """Return what distinguishes the best star from the next; empty without another."""
+    """Return a sentence that compares the best star with the next; empty for a single star."""
     stars = result.phasing.ranking if result.phasing is not None else ()
     k, rival = next(((k, star) for k, star in enumerate(stars, 1) if star.throws != stars[0].throws), (0, None))
     if rival is None or not rival.value:
         return ""
     gain, differences = 1.0 - stars[0].value / rival.value, _differences(result, stars[0], rival)
-    less = [text for ours, theirs, text in differences if ours < theirs]
-    more = [text for ours, theirs, text in differences if ours > theirs]
+    less = [text for best_size, rival_size, text in differences if best_size < rival_size]
+    more = [text for best_size, rival_size, text in differences if best_size > rival_size]
     if not differences:
-        return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < UNFELT else ""
-    if gain < UNFELT:
+        return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < NO_CHANGE else ""
+    if gain < NO_CHANGE:
         return f"Star {k} is as good."
-    said = f"Star 1 beats star {k} by {share(gain, 3)}."
-    said += f" Its throws leave a smaller {' and '.join(less)}." if less else ""
+    text = f"Star 1 beats star {k} by {share(gain, 3)}."
+    text += f" Its throws leave a smaller {' and '.join(less)}." if less else ""
     lead = "It leaves" if less else "Its throws leave"
-    return said + (f" {lead} a larger {' and '.join(more)}." if more else "")
+    return text + (f" {lead} a larger {' and '.join(more)}." if more else "")
 
 
 def _differences(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
     """Return the free loads in which two stars differ, of both stars and in words."""
     requested = {order for measure in result.problem.measures for order in measure.orders or best.orders}
-    moved = {drive.rotor for decision in result.problem.unbalances for drive in decision.rotor_drives}
-    acting = {abs(rotor.shaft.ratio) for rotor in result.final.engine.rotors if rotor.name in moved}
+    driven = {drive.rotor for decision in result.problem.unbalances for drive in decision.rotor_drives}
+    acting = {abs(rotor.shaft.ratio) for rotor in result.final.engine.rotors if rotor.name in driven}
     differences = []
     for j, order in enumerate(best.orders):
         pairs = (("force", best.forces[j], rival.forces[j]), ("couple", best.couples[j], rival.couples[j]))
-        for kind, ours, theirs in pairs if order in requested else ():
-            if abs(ours - theirs) > UNFELT * max(ours, theirs):
+        for kind, best_size, rival_size in pairs if order in requested else ():
+            if abs(best_size - rival_size) > NO_CHANGE * max(best_size, rival_size):
                 also = ", the part that counterweights can cancel" if order in acting else ""
-                sizes = f"{number(ours, 3, 1.0)} against {number(theirs, 3, 1.0)}"
-                differences.append((ours, theirs, f"{kind} of order {order} ({sizes}{also})"))
+                sizes = f"{number(best_size, 3, 1.0)} against {number(rival_size, 3, 1.0)}"
+                differences.append((best_size, rival_size, f"{kind} of order {order} ({sizes}{also})"))
     return differences
 
 
@@ -136,7 +136,9 @@ def explained(result: Result) -> str:
     c, o = result.certificate, result.objective
     if result.status is Status.INFEASIBLE:
         ruled_out = "All allowed stars and firing orders are ruled out" if result.problem.phasing is not None else ""
-        needed = bool(result.conflict) and {one.name for one in result.reached if one.decisions} >= {*result.conflict}
+        needed = bool(result.conflict) and {limit.name for limit in result.reached if limit.decisions} >= {
+            *result.conflict
+        }
         text = f"{ruled_out or 'It is proven that no design meets the limits named'}."
         return text + needed * " Without any one of these limits, the others can be met."
     if c is None or o is None:
@@ -167,7 +169,7 @@ def explained(result: Result) -> str:
 def _conditions(residual: float) -> str:
     if not math.isfinite(residual):
         return "the optimality conditions are not known, because no search ended there"
-    if residual > LOOSE:
+    if residual > LARGE_RESIDUAL:
         return f"the optimality conditions are met to {share(residual)} only; no bound depends on them"
     how = f"with a residual of {residual:.1e}" if residual else "exactly"
     return f"the optimality conditions hold {how}"

@@ -68,7 +68,9 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
 
 
 def _layout(layout: Layout, scale: EqualPowerScale) -> Layout:
-    places, throws = (tuple(scale.length * x for x in of) for of in (layout.positions, layout.throw_positions))
+    places, throws = (
+        tuple(scale.length * x for x in positions) for positions in (layout.positions, layout.throw_positions)
+    )
     return replace(layout, positions=places, throw_positions=throws)
 
 

@@ -25,13 +25,13 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
     of line, so that neither a cut line nor another study in the same folder spoils them.
     """
 
-    def __init__(self, path: Path, wanted: Collection[str]) -> None:
+    def __init__(self, path: Path, marks: Collection[str]) -> None:
         self.path = path
         self._records: Record = {}
         self.seconds: dict[str, float] = {}
         self._stream: FileIO | None = None
         for mark, seconds, record in _intact_lines(path):
-            if mark in wanted:
+            if mark in marks:
                 self._records[mark], self.seconds[mark] = record, seconds
 
     def read(self, mark: str) -> Record:
@@ -44,10 +44,10 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = FileIO(self.path, "a")
         line = json.dumps([mark, round(seconds, 6), record]).encode()
-        rest = memoryview(b"\n%b %b\n" % (_checksum(line), line))
-        while rest:
+        unwritten = memoryview(b"\n%b %b\n" % (_checksum(line), line))
+        while unwritten:
             # a full disk writes a part before it fails
-            rest = rest[self._stream.write(rest) :]
+            unwritten = unwritten[self._stream.write(unwritten) :]
         self._records[mark], self.seconds[mark] = record, seconds
 
     def __exit__(self, *_: object) -> None:
@@ -60,9 +60,9 @@ def _intact_lines(path: Path) -> Iterator[tuple[str, float, Record]]:
     if path.is_file():
         with path.open("rb") as lines:
             for line in lines:
-                checksum, _, rest = line.rstrip(b"\n").partition(b" ")
-                if checksum == _checksum(rest):
-                    yield json.loads(rest)
+                checksum, _, content = line.rstrip(b"\n").partition(b" ")
+                if checksum == _checksum(content):
+                    yield json.loads(content)
 
 
 def _checksum(line: bytes) -> bytes:

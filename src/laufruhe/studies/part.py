@@ -22,7 +22,7 @@ Record: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True)
 class Column:
-    """A number of every draw."""
+    """Column of numbers, one for every draw."""
 
     unit: str
     words: str
@@ -120,7 +120,7 @@ class Part(Table):
 
     @staticmethod
     def summary(datasets: Iterable[xr.Dataset]) -> str:  # noqa: ARG004
-        """Return what a report says of the datasets of all parts together; may be empty."""
+        """Return a summary of the datasets of all parts; may be empty."""
         return ""
 
     @property
@@ -128,9 +128,9 @@ class Part(Table):
         """Endings of the files of this part."""
         return ("nc", "csv", "png")
 
-    def about(self, **more: Any) -> dict[str, Any]:
+    def about(self, **attributes: Any) -> dict[str, Any]:
         """Return the attributes of the dataset."""
-        return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **more}
+        return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **attributes}
 
 
 def variable(dims: str | tuple[str, ...], values: Any, words: str, unit: str = "1") -> tuple[Any, Any, dict[str, str]]:

@@ -1,4 +1,4 @@
-"""Engines side by side in several quantities: a panel each, a lying bar an engine, the best above."""
+"""Picture that ranks engines in several quantities, a panel each, the best engine first."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
     # values over decades need a logarithmic axis
     low = 10.0 ** math.floor(math.log10(minimum)) if 0.0 < minimum < maximum / SPREAD else 0.0
     span = math.log(maximum / low) if low else maximum
-    known, places = np.isfinite(values), np.arange(len(values), dtype=float)
-    marks: list[p.Mark] = [p.Bars(places[known], values[known], 0.62, upright=False)]
+    finite, places = np.isfinite(values), np.arange(len(values), dtype=float)
+    marks: list[p.Mark] = [p.Bars(places[finite], values[finite], 0.62, upright=False)]
     for place, value in zip(places.tolist(), values.tolist(), strict=True):
         is_known = math.isfinite(value)
         text = number(value, scale=maximum) if is_known else "no value"
-        at = value if is_known else low
-        marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, text))
-    ticks = [(float(row), each) for row, each in enumerate(names)]
+        start = value if is_known else low
+        marks.append(p.Words(start * math.exp(0.03 * span) if low else start + 0.03 * span, place, text))
+    ticks = [(float(row), name) for row, name in enumerate(names)]
     side = p.Axis(ends=(len(values) - 0.4, -0.6), ticks=ticks, grid=False)
     end = low * math.exp(1.7 * span) if low else 1.7 * span
     return p.Panel(marks, p.Axis(ends=(low, end), log=(1.0,) if low else (), ticks=_decades(low, end)), side, title)

@@ -1,7 +1,7 @@
-"""Many numbers of a study in one Zarr store: laid out before anything is known, a region for each piece of work.
+"""Draws of a study in one Zarr store, with a region for each piece of work.
 
-What is known of a piece is written first, that it is done last, with a checksum of both. A region that was cut, changed
-or belongs to something else does not fit its checksum, counts as not done, and is worked out again.
+Values of a piece are written first, then a mark with a checksum of both. A region that is cut, changed or foreign
+does not match its checksum and is computed again.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class Regions:
     ----------
     root
         Folder of the store, which all parts of a study share; this part is a group in it.
-    wanted
+    regions
         Region of every piece, by fingerprint.
 
     Raises
@@ -54,11 +54,11 @@ class Regions:
         If something else stands there.
     """
 
-    def __init__(self, root: Path, name: str, template: Template, wanted: Mapping[str, Region]) -> None:
-        self._wanted, self._chunk, self._columns = wanted, template.chunk, template.columns
+    def __init__(self, root: Path, name: str, template: Template, regions: Mapping[str, Region]) -> None:
+        self._wanted, self._chunk, self._columns = regions, template.chunk, template.columns
         self._values, self._done = _laid_out(root, name, template)
         self.seconds: dict[str, float] = {}
-        for mark, region in wanted.items():
+        for mark, region in regions.items():
             seconds = self._found(mark, region)
             if seconds is not None:
                 self.seconds[mark] = seconds
@@ -178,14 +178,14 @@ def locked_store(root: Path) -> Iterator[None]:
     except ImportError:
         rule = "needs Zarr, which is not installed"
         raise refused("results", str(root), rule, "pip install 'laufruhe[cluster]'") from None
-    with ExitStack() as until_then:
+    with ExitStack() as stack:
         try:
             root.mkdir(parents=True, exist_ok=True)
-            ours = until_then.enter_context(folder_lock(root, wait=False))
+            is_locked = stack.enter_context(folder_lock(root, wait=False))
         except OSError as error:
             rule = f"cannot be written ({error.strerror})"
             raise refused("results", str(root), rule, "name another place by --out") from None
-        if ours is False:
+        if is_locked is False:
             rule = "is being written by another run"
             raise refused("results", str(root), rule, "wait for it, or name another --out")
         yield

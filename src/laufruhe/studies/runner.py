@@ -1,4 +1,4 @@
-"""Running a study: points on one core or several, each kept on disk, so that one that stopped goes on."""
+"""Run a study: its points on one core or several, each saved on disk, so that a stopped study resumes."""
 
 from __future__ import annotations
 
@@ -50,10 +50,10 @@ def run(
     ----------
     folder
         Folder that the paths of problem files are relative to.
-    kept
+    finished
         File of the finished points; points in it are not solved again.
     say
-        Told how many points are done, of how many.
+        Function called with the number of finished points and of all points.
     jobs
         Processes that may be used; the results do not depend on it.
     """
@@ -61,16 +61,16 @@ def run(
     work = [(part, point) for part in study.study.parts for point in part.points(scenes)]
     marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
     # equal scenes of several parts are solved once
-    wanted = dict(zip(marks, work, strict=True))
+    tasks = dict(zip(marks, work, strict=True))
     with ExitStack() as stores:
         store = {
             mark: points_of
-            for points_of, marked in stores_of(study, scenes, finished, wanted, stores)
+            for points_of, marked in stores_of(study, scenes, finished, tasks, stores)
             for mark in marked
         }
-        todo = {mark: task for mark, task in wanted.items() if mark not in store[mark].seconds}
-        names, whole = list(todo), len(wanted)
-        say(whole - len(todo), whole)
+        todo = {mark: task for mark, task in tasks.items() if mark not in store[mark].seconds}
+        names, total = list(todo), len(tasks)
+        say(total - len(todo), total)
         with closing(answers(list(todo.values()), scenes, jobs)) as results:
             for count, answer in enumerate(results, 1):
                 mark = names[answer.task]
@@ -78,7 +78,7 @@ def run(
                     raise _other_files(answer, todo[mark])
                 with _disk_errors():
                     store[mark].keep(mark, answer.seconds, answer.record)
-                say(whole - len(todo) + count, whole)
+                say(total - len(todo) + count, total)
         datasets, seconds = {}, {}
         for part in study.study.parts:
             points_of = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]

@@ -1,4 +1,4 @@
-"""Parts of many random draws, in pieces whose numbers depend on nothing but the seed and the draw."""
+"""Study parts of many random draws, in pieces that depend only on the seed and the draw."""
 
 from __future__ import annotations
 
@@ -104,13 +104,13 @@ def in_unit(values: xr.DataArray) -> tuple[Array, str]:
 
 def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[float] = ()) -> p.Line:
     """Return the line of the share of values [%] below each value."""
-    known = values[np.isfinite(values)]
-    if not len(known):
+    finite = values[np.isfinite(values)]
+    if not len(finite):
         return p.Line((), (), colour, label, dash=dash)
-    return p.Line(np.percentile(known, CURVE), CURVE, colour, label, dash=dash)
+    return p.Line(np.percentile(finite, CURVE), CURVE, colour, label, dash=dash)
 
 
 def percentiles_of(values: Array) -> list[float]:
     """Return the values that 5, 50 and 95 % stay below; NaN without values."""
-    known = values[np.isfinite(values)]
-    return [float(one) for one in np.percentile(known, LISTED)] if len(known) else [float("nan")] * len(LISTED)
+    finite = values[np.isfinite(values)]
+    return [float(value) for value in np.percentile(finite, LISTED)] if len(finite) else [float("nan")] * len(LISTED)

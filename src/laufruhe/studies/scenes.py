@@ -1,4 +1,4 @@
-"""The scenes of a study: read once, changed point by point, solved, and told apart by all that they hang on."""
+"""Scenes of a study: read once, changed point by point, and identified by a fingerprint of all their inputs."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 class Point:
     """Piece of work: a scene, changed values by their paths, a metric in place of its objective.
 
-    Of balancer shafts those named are kept, all when None; it starts from `base` in place of
-    the tables of the case's problem file. A span is that of many draws, from one number to another.
+    `shafts` names the balancer shafts that remain, all if None. `base` replaces the tables of the
+    case's problem file. `span` is the range of draws, first number and end.
     """
 
     case: CaseTable

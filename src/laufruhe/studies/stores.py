@@ -39,19 +39,19 @@ def stores_of(
     study: StudyFile, scenes: Scenes, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
     """Yield every store with the fingerprints that it holds: regions for draws, one file for all other points."""
-    rest, root = set(tasks), regions_in(finished.parent)
+    marks, root = set(tasks), regions_in(finished.parent)
     templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
     if templates:
         stores.enter_context(locked_store(root))
     for part, template in templates:
         regions = {
             mark: Region(template.cases.index(point.case.name), *point.span)
-            for mark, (of, point) in tasks.items()
-            if of is part and point.span is not None
+            for mark, (task_part, point) in tasks.items()
+            if task_part is part and point.span is not None
         }
         yield Regions(root, part.name, template, regions), regions
-        rest -= set(regions)
-    yield stores.enter_context(FinishedPoints(finished, rest)), rest
+        marks -= set(regions)
+    yield stores.enter_context(FinishedPoints(finished, marks)), marks
 
 
 def regions_in(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Parts whose scenes are each solved: every case at every combination of the swept values, and what is kept of each."""
+"""Study parts whose scenes are each solved: every case at every combination of swept values."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
         return evaluate_only(problem, allow_resonance=True), FAILED, "none"
     if result.objective is None:
         return evaluate_only(problem, allow_resonance=True), str(result.status), "none"
-    is_closed = not problem.decisions and problem.phasing is None
-    proof = str(result.certificate.kind) if result.certificate else NOTHING_OPEN if is_closed else "none"
+    has_no_decisions = not problem.decisions and problem.phasing is None
+    proof = str(result.certificate.kind) if result.certificate else NOTHING_OPEN if has_no_decisions else "none"
     return result, str(result.status), proof
 
 
@@ -68,10 +68,11 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
     limits = limits_of(result)
     designed = status not in (FAILED, "infeasible")
     quantities = {
-        name: _value_or_reason(result.final, of) if designed else (math.nan, "") for name, of in (further or {}).items()
+        name: _value_or_reason(result.final, quantity) if designed else (math.nan, "")
+        for name, quantity in (further or {}).items()
     }
-    nothing = dict.fromkeys(result.initial.mount_names, (math.nan, math.nan))
-    before, after = _on_mounts(problem, result.initial), _on_mounts(problem, result.final) if designed else nothing
+    no_forces = dict.fromkeys(result.initial.mount_names, (math.nan, math.nan))
+    initial, final = _on_mounts(problem, result.initial), _on_mounts(problem, result.final) if designed else no_forces
     return {
         "metric": objective.name if objective else "",
         "unit": objective.unit if objective else "",
@@ -80,10 +81,10 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
         "objective_given": _finite(objective.initial) if objective else math.nan,
         "objective": objective.value if objective and designed else math.nan,
         "lower_bound": bound,
-        "mean_given": {name: _finite(mean) for name, (mean, _) in before.items()},
-        "maximum_given": {name: _finite(maximum) for name, (_, maximum) in before.items()},
-        "mean": {name: mean for name, (mean, _) in after.items()},
-        "maximum": {name: maximum for name, (_, maximum) in after.items()},
+        "mean_given": {name: _finite(mean) for name, (mean, _) in initial.items()},
+        "maximum_given": {name: _finite(maximum) for name, (_, maximum) in initial.items()},
+        "mean": {name: mean for name, (mean, _) in final.items()},
+        "maximum": {name: maximum for name, (_, maximum) in final.items()},
         "decided": {decision.name: decision.value for decision in result.decisions},
         "units": {decision.name: decision.unit for decision in result.decisions},
         "order_force_given": _by_order(result.initial),
@@ -96,9 +97,9 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
     }
 
 
-def _value_or_reason(design: Evaluation, of: Further) -> tuple[float, str]:
+def _value_or_reason(design: Evaluation, quantity: Further) -> tuple[float, str]:
     try:
-        return _finite(of(design)), ""
+        return _finite(quantity(design)), ""
     except ModelError as error:
         return math.nan, str(error).partition("; ")[0]
 
@@ -121,11 +122,14 @@ def _finite(value: float) -> float:
 def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[float, float]]:
     if not evaluation.engine.mounts:
         return {}
-    each = [place_measures(evaluation, k) for k in range(len(problem.points))]
+    measures = [place_measures(evaluation, k) for k in range(len(problem.points))]
     weights = [point.weight for point in problem.points]
     return {
-        name: (sum(w * m.mean for w, m in zip(weights, of, strict=True)) / sum(weights), max(m.max for m in of))
-        for name, of in zip(evaluation.mount_names, zip(*each, strict=True), strict=True)
+        name: (
+            sum(w * m.mean for w, m in zip(weights, mount_measures, strict=True)) / sum(weights),
+            max(m.max for m in mount_measures),
+        )
+        for name, mount_measures in zip(evaluation.mount_names, zip(*measures, strict=True), strict=True)
     }
 
 
@@ -165,8 +169,8 @@ def dataset(
         "proof": ("point", [record["proof"] for record in records]),
     }
     values = {**variables, "decided": (("point", "decision"), _table("decided", records, list(units)), in_unit)}
-    more, named = _orders_and_limits(records, unit)
-    return xr.Dataset({**values, **more}, {**coords, **named, **extra}, {**about, "metric": metric})
+    further_variables, limit_coords = _orders_and_limits(records, unit)
+    return xr.Dataset({**values, **further_variables}, {**coords, **limit_coords, **extra}, {**about, "metric": metric})
 
 
 def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -174,7 +178,7 @@ def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple
     names = {order for record in records for order, size in record["order_force_given"].items() if size}
     names |= {order for record in records for order, size in record["order_force"].items() if size}
     orders = sorted(names, key=float)
-    units = {name: of for record in records for name, of in record["limit_units"].items()}
+    units = {name: unit_of_limit for record in records for name, unit_of_limit in record["limit_units"].items()}
     initial, final = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
     variables = {
         "order_force_given": variable(("point", "order"), initial, "amplitude by order, initial design", "N"),
@@ -187,7 +191,7 @@ def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple
     words = "decrease of the metric per unit by which the limit is relaxed, in price_unit"
     variables["limit_value"] = (("point", "limit"), value, {"long_name": "value of the limited measure, in limit_unit"})
     variables["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
-    prices = [f"{unit or '1'} per {of}" if of else unit for of in units.values()]
+    prices = [f"{unit or '1'} per {unit_of_limit}" if unit_of_limit else unit for unit_of_limit in units.values()]
     return variables, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
                    "price_unit": ("limit", prices)}  # fmt: skip
 
@@ -247,7 +251,7 @@ class SweptPart(Part):
         first = {axis.quantity: axis.values[0] for axis in axes}
         problems = []
         for case in self.cases:
-            self._check_apart(case, scenes)
+            self._check_distinct(case, scenes)
             problems.append(scenes.problem(Point(case, first, self.metric)))
             for axis in axes:
                 scenes.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, self.metric))
@@ -262,7 +266,7 @@ class SweptPart(Part):
             raise scenes.refused(self.cases[0], "objective", rule, "give the part one metric")
         return problems
 
-    def _check_apart(self, case: CaseTable, scenes: Scenes) -> None:
+    def _check_distinct(self, case: CaseTable, scenes: Scenes) -> None:
         """Refuse a number that is swept and set, or swept twice, however its path is written."""
         tables, reasons = scenes.tables(Point(case.model_copy(update={"set": {}}))), {}
         for path, value in case.set.items():
@@ -272,8 +276,8 @@ class SweptPart(Part):
         for sweep in self.sweep:
             with scenes.named(case):
                 keys = keys_of(tables, sweep.quantity)
-            for other, rule in reasons.items():
-                if keys[: len(other)] == other[: len(keys)]:
+            for earlier, rule in reasons.items():
+                if keys[: len(earlier)] == earlier[: len(keys)]:
                     raise scenes.refused(case, sweep.quantity, rule, "leave out one of the two")
             reasons[keys] = "is swept twice"
 

@@ -1,4 +1,4 @@
-"""Tables and pictures of parts whose scenes are solved: a row a point, bars side by side, lines over what is swept."""
+"""Tables and pictures of solved scenes: a row for each point, bars, and lines over the swept values."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def readable_metric(data: xr.Dataset) -> xr.Dataset:
 
 
 def claim_of(data: xr.Dataset) -> str:
-    """Return the claim that holds for all decided designs."""
+    """Return the strongest claim that holds for all final designs."""
     decided = (data["proof"].values != NOTHING_OPEN) & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
 
@@ -93,11 +93,11 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     return [f"**{cell}**" for cell in cells] if optimum else cells
 
 
-def over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> p.Picture:
+def over_sweep(data: xr.Dataset, line_coords: Sequence[str], words: str) -> p.Picture:
     """Draw one line per case and combination over the last sweep."""
     data = readable_metric(data)
     names = swept_names(data)
-    panel = p.Panel(lines(data, [*told_apart, *names]), swept_axis(data, names[-1]), metric_axis(data))
+    panel = p.Panel(lines(data, [*line_coords, *names]), swept_axis(data, names[-1]), metric_axis(data))
     return p.Picture(data.attrs["title"], words, [panel], p.credit(data))
 
 
@@ -126,16 +126,20 @@ def swept_axis(data: xr.Dataset, name: str, named: bool = True) -> p.Axis:
     values, label = data[name].values, with_unit(data[name]) if named else ""
     if values.dtype.kind not in "fi":
         return p.Axis(label, ticks=[(float(k), str(text)) for k, text in enumerate(dict.fromkeys(values.tolist()))])
-    each = np.unique(values[np.isfinite(values)])
-    if len(each) < 4 or each[0] <= 0.0 or not np.allclose(np.diff(np.log(each)), np.log(each[1] / each[0]), rtol=1e-6):
+    distinct = np.unique(values[np.isfinite(values)])
+    if (
+        len(distinct) < 4
+        or distinct[0] <= 0.0
+        or not np.allclose(np.diff(np.log(distinct)), np.log(distinct[1] / distinct[0]), rtol=1e-6)
+    ):
         return p.Axis(label)
-    return p.Axis(label, log=(1.0, 2.0, 5.0) if each[-1] > 20.0 * each[0] else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0))
+    return p.Axis(label, log=(1.0, 2.0, 5.0) if distinct[-1] > 20.0 * distinct[0] else (1.0, 2.0, 3.0, 4.0, 6.0, 8.0))
 
 
-def metric_axis(data: xr.Dataset, *drawn: str) -> p.Axis:
+def metric_axis(data: xr.Dataset, *names: str) -> p.Axis:
     """Return an axis from zero to a little over the largest drawn value."""
     unit = data["objective"].attrs["units"]
-    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
+    top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *names))
     return p.Axis(f"{data.attrs['metric']} [{unit}]" if unit else data.attrs["metric"], (0.0, 1.08 * top or 1.0))
 
 
@@ -144,12 +148,12 @@ def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Col
     keyed_by = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
     columns = [data[name].values.tolist() for name in keyed_by]
     keys = list(zip(*columns, strict=True)) if keyed_by else [()] * data.sizes["point"]
-    each = list(dict.fromkeys(keys))
+    distinct = list(dict.fromkeys(keys))
     line_groups = []
-    for k, key in enumerate(each):
+    for k, key in enumerate(distinct):
         words = ", ".join(_with_unit(data[name], value) for name, value in zip(keyed_by, key, strict=True))
-        chosen = np.array([one == key for one in keys])
-        line_groups.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
+        chosen = np.array([row_key == key for row_key in keys])
+        line_groups.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(distinct))))
     return line_groups
 
 
@@ -164,22 +168,22 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     """Draw initial and final bars; one bar for points without decisions, or where `once` is true."""
     data = readable_metric(data)
     count = data.sizes["point"]
-    alone = data["proof"].values == NOTHING_OPEN
-    single = alone if once is None else np.ones(count, dtype=bool)
-    plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
+    has_no_decisions = data["proof"].values == NOTHING_OPEN
+    single = has_no_decisions if once is None else np.ones(count, dtype=bool)
+    plain = has_no_decisions | (np.zeros(count, dtype=bool) if once is None else once)
     initial, best = data["objective_given"].values, data["objective"].values
     maximum = max(np.nanmax(initial, initial=0.0), np.nanmax(best, initial=0.0))
     marks: list[tuple[float, p.Mark]] = []
     for k in range(count):
-        one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
+        single_bar = [(k + 0.0, best[k], "before" if plain[k] else "after")]
         pair = [(k - 0.2, initial[k], "before"), (k + 0.2, best[k], "after")]
         width = 0.5 if single.all() else 0.36
-        marks += [(bar[0], _bar(*bar, width, maximum)) for bar in (one if single[k] else pair)]
+        marks += [(bar[0], _bar(*bar, width, maximum)) for bar in (single_bar if single[k] else pair)]
     labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
     widest = max(len(line) for label in labels for line in str(label).split("\n"))
-    each = max(1.15, 0.2 + LETTER * widest)
+    width_of_group = max(1.15, 0.2 + LETTER * widest)
     up = metric_axis(data, *(() if single.all() else ("objective_given",)))
-    rows, side = rows_of(count, max(int(p.WIDEST / each), 1))
+    rows, side = rows_of(count, max(int(p.WIDEST / width_of_group), 1))
     ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
     panels = [
         p.Panel(
@@ -193,7 +197,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     legend = [p.Bars(colour="before", label=grey)] if plain.any() or not single.all() else []
     legend += [p.Bars(label=claim_of(data))] if not plain.all() else []
     lines = max(str(label).count("\n") for label in labels)
-    size = (max(p.WIDE, side * each), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
+    size = (max(p.WIDE, side * width_of_group), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
     gap = 0.42 + 0.16 * lines
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=size, gap=gap, legend=legend)
 

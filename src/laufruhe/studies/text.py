@@ -33,7 +33,7 @@ class Verdict:
 
     statement: str
     paper: str
-    ours: float
+    computed: float
     unit: str
     agrees: bool
     why: str
@@ -53,9 +53,9 @@ def statement_table(verdicts: Sequence[Verdict]) -> list[Text]:
     """Return the table of a source's statements; empty without statements."""
     if not verdicts:
         return []
-    ours = [f"{v.ours:{'+' if '%' in v.unit else ''}.3g} {v.unit}" for v in verdicts]
+    computed = [f"{v.computed:{'+' if '%' in v.unit else ''}.3g} {v.unit}" for v in verdicts]
     rows = [
         [v.statement, v.paper, value, "yes" if v.agrees else "**no**", v.why]
-        for v, value in zip(verdicts, ours, strict=True)
+        for v, value in zip(verdicts, computed, strict=True)
     ]
     return [marked_table(["statement", "source", "computed", "confirmed", "reason"], rows)]

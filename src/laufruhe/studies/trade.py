@@ -199,13 +199,13 @@ class _Decided:
         self._problem = problem = scale.problem
         self.given, self.minimum = objective_value(problem, scale.best), math.nan
         self._known: Result | None = None
-        at = problem.at(Fidelity(samples=REFERENCE_STEPS))
+        sampled = problem.at(Fidelity(samples=REFERENCE_STEPS))
         engine = None
         with suppress(SolverError, ModelError):
             if is_open(problem) and is_convex(problem):
-                engine = solve_by_cones(at, REFERENCE_STEPS)
+                engine = solve_by_cones(sampled, REFERENCE_STEPS)
             elif is_open(problem):
-                self._known = first_search(at)
+                self._known = first_search(sampled)
                 engine = None if self._known is None else self._known.final.engine
         if engine is not None:
             self.of(engine)
@@ -303,7 +303,10 @@ def _price_of_time(problem: Problem) -> TimeDomain | None:
         )
     )
     peak = float(np.abs(viscous).max())
-    return TimeDomain(point.name, *(float(np.abs(in_time - other).max()) / peak for other in (viscous, hysteretic)))
+    return TimeDomain(
+        point.name,
+        *(float(np.abs(in_time - reference_forces).max()) / peak for reference_forces in (viscous, hysteretic)),
+    )
 
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:

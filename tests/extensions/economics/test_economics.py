@@ -13,7 +13,7 @@ import xarray as xr
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extensions.economics.part import Economics, check_comparable
-from laufruhe.extensions.economics.worth import NEXT, PLAIN, SHAFTS, Judgement, best, front, verdicts, worths
+from laufruhe.extensions.economics.worth import MORE_CYLINDERS, PLAIN, SHAFTS, Judgement, best, front, verdicts, worths
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
@@ -153,7 +153,7 @@ def test_each_reading_of_the_force_is_least_for_the_designs_that_it_decides(four
 
 def test_efficient_points_are_those_that_nothing_beats(four: xr.Dataset) -> None:
     """Against the definition: no other point has as little force, mass and shafts, and less of one."""
-    own = four.where(four["standing"] != NEXT, drop=True)
+    own = four.where(four["standing"] != MORE_CYLINDERS, drop=True)
     points = [
         (float(own["force"][b, k]), float(own["mass_limit"][k]), int(own["shafts"][b]), bool(own["efficient"][b, k]))
         for b in range(own.sizes["build"])
@@ -177,7 +177,7 @@ def test_verdicts_of_the_four(four: xr.Dataset) -> None:
     assert better.agrees
     assert not falls.agrees
     assert falls.paper == "-53 %"
-    assert falls.ours == pytest.approx(-14.2, abs=0.3)
+    assert falls.computed == pytest.approx(-14.2, abs=0.3)
     assert "Fig. 22" in falls.statement
 
 
@@ -198,7 +198,7 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
     better, falls = verdicts(data)["both"]
     assert better.agrees
     assert falls.agrees
-    assert falls.ours == pytest.approx(-54.9, abs=0.3)
+    assert falls.computed == pytest.approx(-54.9, abs=0.3)
     evaluate_design = {worth.build: worth for worth in worths(data)}
     assert evaluate_design["both"].worth
     assert not evaluate_design["force pair"].worth
@@ -242,7 +242,7 @@ def _made_up(force: float, following: float, says: str = "") -> xr.Dataset:
         coords={
             "build": ["plain", "shaft", "next"],
             "shafts": ("build", [0, 1, 0]),
-            "standing": ("build", [PLAIN, SHAFTS, NEXT]),
+            "standing": ("build", [PLAIN, SHAFTS, MORE_CYLINDERS]),
             "claim": ("build", ["", says, ""]),
             "claimed_fall": ("build", [np.nan] * 3),
             "claimed_against": ("build", ["plain"] * 3),

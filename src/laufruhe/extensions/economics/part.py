@@ -11,7 +11,16 @@ import xarray as xr
 from pydantic import Field, field_validator, model_validator
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.extensions.economics.worth import NEXT, PLAIN, SHAFTS, FrontPoint, Judgement, front, verdicts, worths
+from laufruhe.extensions.economics.worth import (
+    MORE_CYLINDERS,
+    PLAIN,
+    SHAFTS,
+    FrontPoint,
+    Judgement,
+    front,
+    verdicts,
+    worths,
+)
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Name, Table
@@ -154,8 +163,13 @@ class Economics(Part):
             points = front(problem, self.mass_limits)
         except SolverError as error:
             raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
-        of = {"objective": problem.objective_name, "unit": problem.objective_unit or ""}
-        return {**of, "shafts": len(shafts_of(problem)), "cylinders": len(problem.engine.cylinders), "points": points}
+        names = {"objective": problem.objective_name, "unit": problem.objective_unit or ""}
+        return {
+            **names,
+            "shafts": len(shafts_of(problem)),
+            "cylinders": len(problem.engine.cylinders),
+            "points": points,
+        }
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
         """Return fronts side by side, the plain engine first, with the claims about each."""
@@ -168,14 +182,14 @@ class Economics(Part):
             name: variable(("build", "mass_limit"), fronts[:, :-1, fields.index(name)], words, per.format(unit))
             for name, (words, per) in _AT_LIMITS.items()
         }
-        for name, (of, words, per) in _FREE.items():
-            values[name] = variable("build", fronts[:, -1, fields.index(of)], words, per.format(unit))
+        for name, (field, words, per) in _FREE.items():
+            values[name] = variable("build", fronts[:, -1, fields.index(field)], words, per.format(unit))
         coords = {
             "build": names,
             "mass_limit": variable("mass_limit", self.mass_limits, "mass allowed on shafts", "kg"),
             "shafts": variable("build", [record["shafts"] for record in records], "balancer shafts"),
             "cylinders": ("build", [record["cylinders"] for record in records], {"units": "1"}),
-            "standing": ("build", [PLAIN, *(SHAFTS for _ in self.builds), *(NEXT for _ in following)]),
+            "standing": ("build", [PLAIN, *(SHAFTS for _ in self.builds), *(MORE_CYLINDERS for _ in following)]),
             "claim": ("build", [claim.says or "" for claim in claims], {"long_name": "claim of the source"}),
             "claimed_fall": ("build", [claim.falls_by or np.nan for claim in claims], {"units": "1"}),
             "claimed_against": ("build", [claim.against for claim in claims]),
@@ -196,14 +210,14 @@ class Economics(Part):
         for name in data["build"].values:
             row = data.sel(build=name)
             force, worth = float(row["optimum"]), evaluate_design.get(str(name))
-            label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == NEXT else str(name)
+            label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == MORE_CYLINDERS else str(name)
             cells = [label, str(int(row["shafts"])), fixed(float(row["optimum_mass"]), 2), number(force)]
             change = NOTHING if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
             rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
         return [
             marked_table(head, rows),
-            *statement_table([v for own in verdicts(data).values() for v in own]),
+            *statement_table([v for claims in verdicts(data).values() for v in claims]),
             *_front_rows(data),
         ]
 
@@ -285,10 +299,10 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:
     # points of the common front: no other has less force with no more shafts and mass
     force, shafts = data["force"].values, data["shafts"].values
-    same = data["standing"].values != NEXT
+    is_same_engine = data["standing"].values != MORE_CYLINDERS
     on_front = np.zeros(force.shape, dtype=bool)
-    for b in np.flatnonzero(same):
-        rivals, fewer = force[same & (shafts <= shafts[b])], force[same & (shafts < shafts[b])]
+    for b in np.flatnonzero(is_same_engine):
+        rivals, fewer = force[is_same_engine & (shafts <= shafts[b])], force[is_same_engine & (shafts < shafts[b])]
         for k in range(force.shape[1]):
             beaten = min(rivals[:, :k].min(initial=np.inf), fewer[:, k].min(initial=np.inf))
             on_front[b, k] = force[b, k] <= rivals[:, k].min() and force[b, k] < (1.0 - SAME) * beaten
@@ -306,8 +320,8 @@ def _with_shafts(data: xr.Dataset) -> list[str]:
 def _front_rows(data: xr.Dataset) -> list[Text]:
     built = _with_shafts(data)
     rows = []
-    for limit, here in data.sel(build=built).groupby("mass_limit"):
-        best = zip(here["force"].values.ravel(), here["efficient"].values.ravel(), strict=True)
+    for limit, selected in data.sel(build=built).groupby("mass_limit"):
+        best = zip(selected["force"].values.ravel(), selected["efficient"].values.ravel(), strict=True)
         rows.append([f"{limit:g}", *(f"**{force:.1f}**" if efficient else f"{force:.1f}" for force, efficient in best)])
     words = (
         f"Smallest {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, proven "
@@ -340,11 +354,11 @@ def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
     engines = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)
     for name in engines["build"].values:
         force = float(engines["optimum"].sel(build=name))
-        more = str(engines["standing"].sel(build=name).item()) == NEXT
-        dash, colour = (next(dashes), "ink") if more else ((), "before")
+        has_more_cylinders = str(engines["standing"].sel(build=name).item()) == MORE_CYLINDERS
+        dash, colour = (next(dashes), "ink") if has_more_cylinders else ((), "before")
         marks.append(p.Line([0.0, right], [force, force], colour, dash=dash, width=1.2, behind=True))
         # stack the names of close levels
         top = min(force, top - LINE * high)
-        place, colour = top + 0.15 * LINE * high, "ink" if more else "faint"
+        place, colour = top + 0.15 * LINE * high, "ink" if has_more_cylinders else "faint"
         marks.append(p.Words(right, place, f"{name}: {force:.0f}", colour, "right", "bottom", boxed=True))
     return marks

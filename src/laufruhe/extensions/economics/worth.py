@@ -42,10 +42,10 @@ from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 
 MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 LIMIT_NAME = "mass on shafts"
-PLAIN, SHAFTS, NEXT = "plain", "with shafts", "more cylinders"
+PLAIN, SHAFTS, MORE_CYLINDERS = "plain", "with shafts", "more cylinders"
 """Roles of engines in a comparison; the first is also the name of the engine without shafts."""
 Judgement: TypeAlias = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
-_ALLOWED = f"tolerance {100.0 * PRINTED_FALL:.0f} points: effect of the unprinted rod ratio and gas trace"
+_TOLERANCE_WORDS = f"tolerance {100.0 * PRINTED_FALL:.0f} points: effect of the unprinted rod ratio and gas trace"
 
 
 class FrontPoint(NamedTuple):
@@ -76,9 +76,11 @@ def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
     mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
     price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
     bound, gap = (proof.lower_bound, proof.gap) if proof else (value, 0.0)
-    other = with_alternating_loads(problem)
-    other = with_mean_loads(problem) if other.objective == problem.objective else other
-    return FrontPoint(value, bound, gap, mass, price, objective_value(other, result.final))
+    counterpart_problem = with_alternating_loads(problem)
+    counterpart_problem = (
+        with_mean_loads(problem) if counterpart_problem.objective == problem.objective else counterpart_problem
+    )
+    return FrontPoint(value, bound, gap, mass, price, objective_value(counterpart_problem, result.final))
 
 
 def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
@@ -125,12 +127,14 @@ def _engines(data: xr.Dataset) -> dict[str, _Engine]:
 def worths(data: xr.Dataset) -> tuple[Worth, ...]:
     """Judge every set of shafts of an economics dataset by W3."""
     engines = _engines(data)
-    return tuple(_worth(engines, one) for one in engines.values() if one.standing == SHAFTS and one.shafts)
+    return tuple(_worth(engines, engine) for engine in engines.values() if engine.standing == SHAFTS and engine.shafts)
 
 
 def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
-    plain, next_one = (next(e for e in engines.values() if e.standing == standing) for standing in (PLAIN, NEXT))
-    fewer = min(e.force for e in engines.values() if e.standing != NEXT and e.shafts < engine.shafts)
+    plain, next_one = (
+        next(e for e in engines.values() if e.standing == standing) for standing in (PLAIN, MORE_CYLINDERS)
+    )
+    fewer = min(e.force for e in engines.values() if e.standing != MORE_CYLINDERS and e.shafts < engine.shafts)
     following = next_one.name
     further, ratio = 1.0 - engine.force / fewer, engine.force / next_one.force
     if further < 0.0:
@@ -159,17 +163,17 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
         by_claim: list[Verdict] = []
         fall = 1.0 - engines[name].force / engines[against].force
         if says:
-            agrees, why = _judged(engines, engines[name], engines[against], says)
+            agrees, why = _apply_rule(engines, engines[name], engines[against], says)
             by_claim.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
         if not np.isnan(falls):
             agrees, claim = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
-            by_claim.append(Verdict(statement, claim, -100.0 * fall, "% of the force", agrees, _ALLOWED))
+            by_claim.append(Verdict(statement, claim, -100.0 * fall, "% of the force", agrees, _TOLERANCE_WORDS))
         if by_claim:
             by_build[name] = tuple(by_claim)
     return by_build
 
 
-def _judged(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
+def _apply_rule(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
     # whether a judgement holds, and by which rule
     if says == "negligible":
         maximum = 1.0 - engine.bound / against.force

@@ -1,4 +1,4 @@
-"""Decide cranks that have more than a million even stars, of eleven to 48 throws (S5, S44 to S48).
+"""Search cranks of eleven to 48 throws, which have more than a million even stars (S5, S44 to S48).
 
 Without it the stars of shorter cranks are looked at one by one, and longer ones are refused.
 """

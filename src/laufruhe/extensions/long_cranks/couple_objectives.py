@@ -34,7 +34,7 @@ ONE_ORDER = 4.0 / math.pi
 """Largest ratio of the norm of one order of a signal to that of the signal."""
 PHASES, HALVINGS = 16, 24
 SMALL, SHORT = 0.01, 0.1
-"""Share of what no couple changes, and lever [m], that planes touch the objective at."""
+"""Share of the constant part, and lever [m], of the couples at which linear bounds touch the objective."""
 ALIASES = 1.1
 """Safety factor of orders that shifts by firing intervals do not separate from the one of the window."""
 _SAME, _NEGLIGIBLE = 1e-9, 1e-13
@@ -45,7 +45,7 @@ class StarAmplitudes(AmplitudeObjective):
     """Sum of norms of forces and couples of single orders, with the window of better stars (S3)."""
 
     def upper_bound(self, space: StarSpace) -> float:
-        """Return an upper bound of all stars: all throws on the side of their places [SI]."""
+        """Return an upper bound over all stars: all throws act on one side [SI]."""
         levers = float(np.abs(space.places).sum())
         return sum(
             term.weight * float(np.hypot(np.multiply(term.force, space.throws), np.multiply(term.couple, levers)).sum())
@@ -53,11 +53,11 @@ class StarAmplitudes(AmplitudeObjective):
         )
 
     def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound of all stars: forces alone, which the pattern fixes [SI]."""
+        """Return a lower bound over all stars: the forces, which depend on the pattern only [SI]."""
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of the order that weighs most: no norm is less than its share in it (S5)."""
+        """Return the window of the dominant order for stars below a value; None if no star is below it (S5)."""
         shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
         place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
         if room < 0.0:
@@ -74,13 +74,13 @@ class StarAmplitudes(AmplitudeObjective):
 
 @dataclass(frozen=True, eq=False)
 class CoupleTerm:
-    """w N(V0 + sum_h Re C_h A_h + Im C_h B_h).
+    """Weighted norm of a signal that is affine in the couples, w N(V0 + sum_h Re C_h A_h + Im C_h B_h).
 
     Attributes
     ----------
     constant, couples
         V0 and the rows A and B of every order one after the other, shapes (k, d) and (2 orders, k, d).
-    alone
+    unit_norms
         Norm of one unit of couple in every order, shape (orders,).
     """
 
@@ -89,11 +89,11 @@ class CoupleTerm:
     grid: Grid
     constant: Array
     couples: Array
-    alone: Array
+    unit_norms: Array
 
     def values(self, couples: Array) -> Array:
-        """Return values [SI], shape (n,), from real and imaginary parts of every order in turn, shape (n, 2 orders)."""
-        size, out = self.constant.size, np.empty(len(couples))
+        """Return values [SI], shape (n,), from real and imaginary couples by order, shape (n, 2 orders)."""
+        size, values = self.constant.size, np.empty(len(couples))
         flat, step = self.couples.reshape(len(self.couples), -1), max(1, _AT_ONCE // size)
         for start in range(0, len(couples), step):
             part = slice(start, start + step)
@@ -101,55 +101,55 @@ class CoupleTerm:
             rows = rows.reshape(-1, *self.constant.shape)
             if self.norm.is_monotone_in_lengths:
                 row_lengths = np.sqrt(np.einsum("nkd,nkd->nk", rows, rows))
-                out[part] = self.norm.norm_from_lengths(row_lengths, self.grid.weights)
+                values[part] = self.norm.norm_from_lengths(row_lengths, self.grid.weights)
             else:
-                out[part] = self.norm.values(self.grid, rows)
-        return self.weight * out
+                values[part] = self.norm.values(self.grid, rows)
+        return self.weight * values
 
     def plane(self, couples: Array) -> tuple[float, Array]:
-        """Return constant and slope of a linear function under the term, which it meets at these couples (P2)."""
+        """Return constant and slope of a linear lower bound that touches the term at these couples (P2)."""
         rows = self.constant + np.tensordot(couples, self.couples, axes=1)
         z = self.norm.dual_feasible(self.grid, self.norm.subgradient(self.grid, rows))
         return self.weight * float(np.vdot(z, self.constant)), self.weight * np.tensordot(self.couples, z, axes=2)
 
     @property
     def shares(self) -> Array:
-        """Least value of the term for one unit of couple, in every order."""
-        return self.weight * self.alone / (1.0 if self.norm.is_euclidean else ONE_ORDER)
+        """Smallest value of the term for a unit couple, shape (orders,)."""
+        return self.weight * self.unit_norms / (1.0 if self.norm.is_euclidean else ONE_ORDER)
 
 
 @dataclass(frozen=True, eq=False)
 class CoupleNorms:
-    """A sum of norms of the couples of even stars, of means averaged so that it bounds the whole cycle (P7)."""
+    """Sum of norms as a function of the couples of even stars; means are averaged to bound the whole cycle (P7)."""
 
     orders: tuple[int, ...]
     terms: tuple[CoupleTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); over `maximum` any number between it and the value."""
+        """Return values of many stars, shape (n,); above `maximum` a lower bound instead of the value."""
         couples = star_sums(stars, space.phases, space.places, self.orders)[:, :, 1]
         parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
         if maximum == math.inf:
             return np.asarray(sum(term.values(parts) for term in self.terms))
         constants, slopes = self._planes
-        out = (constants + parts @ slopes.T).max(axis=1, initial=0.0)
-        near = out <= maximum
-        out[near] = sum(term.values(parts[near]) for term in self.terms)
-        return np.asarray(out)
+        values = (constants + parts @ slopes.T).max(axis=1, initial=0.0)
+        below_maximum = values <= maximum
+        values[below_maximum] = sum(term.values(parts[below_maximum]) for term in self.terms)
+        return np.asarray(values)
 
     @cached_property
     def _planes(self) -> tuple[Array, Array]:
-        """Constants and slopes of linear functions under the objective (P2): few stars then need all rows."""
+        """Constants and slopes of linear lower bounds of the objective (P2)."""
         shares = np.asarray(sum(term.shares for term in self.terms))
         turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
         heavy = np.argsort(-shares, kind="stable")[:2]
-        at = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
-        for row, chosen in zip(at, itertools.product(turns, repeat=len(heavy)), strict=True):
+        touching_points = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
+        for row, chosen in zip(touching_points, itertools.product(turns, repeat=len(heavy)), strict=True):
             # small beside what no couple changes, where there is any
             row[heavy] = np.array(chosen) / np.maximum(shares[heavy], 1e-300)
-        rest = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
-        unit = SMALL * max(rest, float(shares.max(initial=0.0)) * SHORT)
-        pieces = [term.plane(unit * row.view(float)) for row in at for term in self.terms]
+        constant_part = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
+        unit = SMALL * max(constant_part, float(shares.max(initial=0.0)) * SHORT)
+        pieces = [term.plane(unit * row.view(float)) for row in touching_points for term in self.terms]
         grouped = [pieces[k : k + len(self.terms)] for k in range(0, len(pieces), len(self.terms))]
         constants = np.array([sum(constant for constant, _ in parts) for parts in grouped])
         return constants, np.array([sum(slope for _, slope in parts) for parts in grouped])
@@ -157,7 +157,7 @@ class CoupleNorms:
     def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars [SI]."""
         levers = float(np.abs(space.places).sum())
-        return self.lower_bound(space) + levers * sum(term.weight * float(term.alone.sum()) for term in self.terms)
+        return self.lower_bound(space) + levers * sum(term.weight * float(term.unit_norms.sum()) for term in self.terms)
 
     def lower_bound(self, space: StarSpace) -> float:
         """Return a lower bound of all stars: the value without couples (S40) [SI]."""
@@ -165,7 +165,7 @@ class CoupleNorms:
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of the order that weighs most, by what that order alone leaves (S48)."""
+        """Return the window of the dominant order for stars below a value; None if no star is below it (S48)."""
         del pattern
         minimum = self.lower_bound(space)
         if value < minimum:
@@ -182,13 +182,15 @@ class CoupleNorms:
         return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
 
     def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
-        """Return the largest couple of an order whose half, at any phase, is worth no more than a value (S48)."""
+        """Return the largest couple of an order whose half is below a value at any phase (S48)."""
         order, levers = self.orders[place], float(np.abs(space.places).sum())
-        same = [
-            k for k, other in enumerate(self.orders)
-            if k != place and ((other - order) % space.phases == 0 or (other + order) % space.phases == 0)
+        aliased = [
+            k for k, other_order in enumerate(self.orders)
+            if k != place and ((other_order - order) % space.phases == 0 or (other_order + order) % space.phases == 0)
         ]  # fmt: skip
-        room = value + 0.5 * ALIASES * levers * sum(term.weight * float(term.alone[same].sum()) for term in self.terms)
+        room = value + 0.5 * ALIASES * levers * sum(
+            term.weight * float(term.unit_norms[aliased].sum()) for term in self.terms
+        )
         turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
         parts = np.zeros((PHASES, 2 * len(self.orders)))
         parts[:, 2 * place], parts[:, 2 * place + 1] = turns.real, turns.imag
@@ -201,7 +203,7 @@ class CoupleNorms:
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
-    """Return the objective of even stars as one of their couples; None where it is none.
+    """Return the objective of even stars as a function of their couples; None if it depends on more.
 
     Parameters
     ----------
@@ -222,18 +224,18 @@ def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -
 
 
 def three_stars(space: StarSpace) -> Stars:
-    """Return a star, one with two throws of neighbouring steps exchanged, and one to check that couples say all."""
+    """Return a star, one with two neighbouring steps exchanged, and one that checks the model of couples."""
     first = np.array(space.first, dtype=np.uint8)
     second, third = first.copy(), first.copy()
-    one = int(np.flatnonzero(first == 1)[-1])
-    second[[one, one + 1]] = first[[one + 1, one]]
+    throw = int(np.flatnonzero(first == 1)[-1])
+    second[[throw, throw + 1]] = first[[throw + 1, throw]]
     third[1:] = np.random.default_rng(2).permutation(first[1:])
     return np.array([first, second, third])
 
 
 @dataclass(frozen=True, eq=False)
 class _Spread:
-    """Loads of even stars: the part that all share, and the loads of a unit of couple in every order.
+    """Loads of even stars: the part common to all stars, and the loads of a unit couple in every order.
 
     Attributes
     ----------
@@ -249,7 +251,7 @@ class _Spread:
 
     @classmethod
     def from_stars(cls, problem: Problem, space: StarSpace, designs: Sequence[Evaluation]) -> _Spread | None:
-        """Separate the loads of three stars; None where they differ in more than couples."""
+        """Separate the loads of three stars; None if they differ in more than couples."""
         base = designs[0].engine.cycle.base_order
         channels = {term.measure.load for term in problem.objective}
         signals = {
@@ -290,7 +292,7 @@ class _Spread:
         return cls(problem, designs[0], selected, rest, {c: [u[used] for u in values] for c, values in units.items()})
 
     def term(self, weight: float, measure: Measure) -> CoupleTerm:
-        """Return one term, its rows those of a result, means averaged about them (P7)."""
+        """Return one term with rows sampled as in results; means are averaged (P7)."""
         rest, norm = self.rest[measure.load], measure.norm
         bends = kinks_of(measure, rest, self.design.engine)
         constant, grid = self._rows(measure, rest, bends)
@@ -298,20 +300,20 @@ class _Spread:
         rows = []
         for place, order in enumerate(self.orders):
             for turn in (1.0, 1j):
-                alone = []
+                signals_of_order = []
                 for signal, units in zip(rest, self.units[measure.load], strict=True):
                     coefficients = np.zeros((order * per_turn + 1, *units.shape[1:]), dtype=complex)
                     coefficients[-1] = turn * units[place]
-                    alone.append(Spectrum(signal.base, coefficients))
-                rows.append(self._rows(measure, alone, bends)[0])
+                    signals_of_order.append(Spectrum(signal.base, coefficients))
+                rows.append(self._rows(measure, signals_of_order, bends)[0])
         couples = np.array(rows).reshape(2 * len(self.orders), *constant.shape)
-        sizes = np.array([norm.value(grid, own) for own in couples[::2]])
+        unit_norms = np.array([norm.value(grid, unit_rows) for unit_rows in couples[::2]])
         if norm.is_euclidean:
             root = np.sqrt(grid.weights)[:, None]
             compressed = compress_rows([constant * root, couples * root])
             if compressed is not None:
                 (constant, couples), grid = compressed, Grid(np.ones(compressed[0].shape[0]), compressed[0].shape[0])
-        return CoupleTerm(weight, norm, grid, constant, couples, sizes)
+        return CoupleTerm(weight, norm, grid, constant, couples, unit_norms)
 
     def _rows(self, measure: Measure, signals: Sequence[Spectrum], bends: Sequence[Array]) -> tuple[Array, Grid]:
         samples = self.design.samples * (1 if measure.norm.averages else measure.norm.refinement)

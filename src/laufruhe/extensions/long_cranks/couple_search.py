@@ -26,40 +26,40 @@ from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.solvers.stars.enumeration import SLACK, BestStars, StarSearchResult
 
 WORTH_SHARING = 20_000_000
-"""Arrangements of halves that take two seconds: those of fifteen throws on as many steps."""
-MOST = 400_000_000
-"""Arrangements of halves that are looked at: those of sixteen throws on as many steps, half a minute of one core."""
+"""Number of arrangements of halves from which workers share the search (fifteen throws, two seconds)."""
+LARGEST_WORK = 400_000_000
+"""Largest number of arrangements of halves (sixteen throws, half a minute of one core)."""
 PIECES, MOST_AT_ONCE = 64, 16
-STARTS, IN_BLOCKS = 12, 1500
-"""Stars of each kind that are improved, and stars in blocks that the best ones are taken from."""
-TOGETHER = (8, 8, 10, 10, 12, 12)
-"""Throws of the best star that are arranged anew at once, one choice after the other."""
+STARTS, BLOCK_STARS = 12, 1500
+"""Number of starting stars of each kind, and of stars in groups from which the best are selected."""
+REARRANGED = (8, 8, 10, 10, 12, 12)
+"""Numbers of throws in successive rearrangements of the best star."""
 LONG = 16
-"""Throws from which that is worth it: of fewer all stars are looked at as soon."""
+"""Number of throws from which rearrangement pays; shorter cranks are enumerated as fast."""
 SEED = 1964
 
 
 class CoupleObjective(Protocol):
-    """Objective of stars, as far as they differ in couples."""
+    """Objective of stars that differ in their couples."""
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); over `maximum` any number between it and the value."""
+        """Return values of many stars, shape (n,); above `maximum` a lower bound instead of the value."""
 
     def upper_bound(self, space: StarSpace) -> float:
-        """Return an upper bound of all stars [SI]."""
+        """Return an upper bound over all stars [SI]."""
 
     def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound of all stars, whatever their couples [SI]."""
+        """Return a lower bound over all stars and couples [SI]."""
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of couples of all stars that are worth no more than a value; None where no star is."""
+        """Return the window of couples of all stars below a value; None if there is none."""
 
 
 def search_stars(
     space: StarSpace, objective: CoupleObjective, count: int = 1, time_limit: float = float("inf"),
     known: Stars | None = None,
 ) -> StarSearchResult:  # fmt: skip
-    """Return the best stars, proven where their halves are few enough to be listed (S5).
+    """Return the best stars, proven if their halves are few enough to enumerate (S5).
 
     Parameters
     ----------
@@ -84,19 +84,19 @@ def search_stars(
 
 
 def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known: Stars | None = None) -> BestStars:
-    """Return the best stars to begin from, or of known ones, and of all swaps of two throws in them."""
+    """Return the best starting stars, given or generated, improved by all swaps of two throws."""
     best = BestStars(count, space.throws)
     stars = good_starts(space, objective) if known is None or not len(known) else known
     best.offer(space.canonical(stars), objective.values(space, space.canonical(stars)))
     if count > 1:
-        near = np.unique(space.canonical(np.concatenate([swaps(star) for star in best.stars])), axis=0)
-        best.offer(near, objective.values(space, near))
+        neighbours = np.unique(space.canonical(np.concatenate([swaps(star) for star in best.stars])), axis=0)
+        best.offer(neighbours, objective.values(space, neighbours))
     return best
 
 
 @dataclass(frozen=True, eq=False)
 class _Piece:
-    """Some ways to share a pattern between front and back, and the best stars when they are looked at."""
+    """Some divisions of a pattern between front and back half, with the best stars at the start."""
 
     space: StarSpace
     objective: CoupleObjective
@@ -106,7 +106,7 @@ class _Piece:
 
 
 class _Search:
-    """The best stars of what was looked at so far."""
+    """Search over all stars of a space in pieces."""
 
     def __init__(self, space: StarSpace, objective: CoupleObjective, best: BestStars) -> None:
         self.space, self.objective, self.best = space, objective, best
@@ -114,14 +114,14 @@ class _Search:
         self.looked_at, self.ended = 0, False
 
     def run(self) -> None:
-        """Search all stars in pieces and rounds: each piece knows the best of the rounds before it.
+        """Search all pieces in rounds; each piece starts from the best stars of earlier rounds.
 
         Pieces and rounds do not depend on the workers, so the result does not either.
         """
         if self.best.cut <= self.zero_level:
             return
         work = work_of(self.space)
-        self.ended = work > MOST
+        self.ended = work > LARGEST_WORK
         if self.ended:
             return
         pieces = [
@@ -131,15 +131,17 @@ class _Search:
             if len(part)
         ]
         with ExitStack() as stack:
-            many = work > WORTH_SHARING and worker_count() > 1
-            executor = stack.enter_context(executor_for()) if many else SERIAL
+            is_parallel = work > WORTH_SHARING and worker_count() > 1
+            executor = stack.enter_context(executor_for()) if is_parallel else SERIAL
             start, size = 0, 1
             while start < len(pieces):
                 chosen = pieces[start : start + size]
                 batch = [_Piece(self.space, self.objective, *piece, self.best) for piece in chosen]
                 # the first pieces find values that spare the others most of their work
                 start, size = start + size, min(2 * size, MOST_AT_ONCE)
-                answers = sorted(unordered_map(_explored, batch, executor, patient=True), key=lambda answer: answer[0])
+                answers = sorted(
+                    unordered_map(_search_piece, batch, executor, patient=True), key=lambda answer: answer[0]
+                )
                 for _, (best, looked_at, ended) in answers:
                     self.best.offer(best.stars, best.values)
                     self.looked_at += looked_at
@@ -152,69 +154,73 @@ class _Search:
                     return
 
 
-def _explored(piece: _Piece) -> tuple[BestStars, int, bool]:
-    """The best stars of a piece, how many were looked at, and whether time was over."""
-    space, objective, free, seen = piece.space, piece.objective, Free.from_pattern(piece.pattern), 0
+def _search_piece(piece: _Piece) -> tuple[BestStars, int, bool]:
+    """Return the best stars of a piece, the number of evaluated stars, and True if time ran out."""
+    space, objective, free, looked_at = piece.space, piece.objective, Free.from_pattern(piece.pattern), 0
     best = BestStars(piece.best.count, space.throws)
     best.offer(piece.best.stars, piece.best.values)
     window, cut = None, np.nan
     for share in piece.shares:
         if is_time_over():
-            return best, seen, True
+            return best, looked_at, True
         if best.cut != cut:
             # stars equal to the last of the best are left out: any of them will do
             cut = best.cut
             window = objective.window(space, piece.pattern, cut * (1.0 - SLACK))
         if window is None:
             break
-        seen += free.arrangements
+        looked_at += free.arrangements
         for block in meeting(space, free, share, window):
             stars = np.unique(space.canonical(block), axis=0)
             best.offer(stars, objective.values(space, stars, best.cut))
-            seen += len(stars)
-    return best, seen, False
+            looked_at += len(stars)
+    return best, looked_at, False
 
 
 def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:
-    """Return stars that swapping any two throws does not improve, the best one with many throws arranged at once."""
+    """Return stars that no swap of two throws improves; the best one is also improved by rearrangement."""
     rng = np.random.default_rng(SEED)
-    drawn = [
+    candidates = [
         star
         for pattern in space.patterns
-        for star in (*_mirrored(pattern, rng), *_in_blocks(space, pattern, objective, rng), *_shuffled(pattern, rng))
+        for star in (
+            *_mirror_stars(pattern, rng),
+            *_block_stars(space, pattern, objective, rng),
+            *_shuffled_stars(pattern, rng),
+        )
     ]
-    improved = np.array([_swapped(space, objective, star) for star in drawn])
+    improved = np.array([_improve_by_swaps(space, objective, star) for star in candidates])
     values = objective.values(space, improved)
     best = improved[np.argmin(values)]
     if space.throws < LONG or values.min() <= NEGLIGIBLE * objective.upper_bound(space):
         return improved
-    for count in TOGETHER:
-        best = _arranged(space, objective, best, sorted(map(int, 1 + rng.permutation(space.throws - 1)[:count])))
+    for count in REARRANGED:
+        best = _rearrange(space, objective, best, sorted(map(int, 1 + rng.permutation(space.throws - 1)[:count])))
     return np.concatenate([improved, best[None]])
 
 
-def _swapped(space: StarSpace, objective: CoupleObjective, star: Stars) -> Stars:
+def _improve_by_swaps(space: StarSpace, objective: CoupleObjective, star: Stars) -> Stars:
     # takes the best swap of two throws each time
     value = float(objective.values(space, star[None])[0])
     while True:
-        near = swaps(star)
-        values = objective.values(space, near)
+        neighbours = swaps(star)
+        values = objective.values(space, neighbours)
         first = int(np.argmin(values))
         if values[first] >= value * (1.0 - SLACK):
             return star
-        star, value = near[first], float(values[first])
+        star, value = neighbours[first], float(values[first])
 
 
 def swaps(star: Stars) -> Stars:
-    """Return stars in which two throws, never the first, have each other's steps, shape (n, throws)."""
+    """Return all stars with two steps swapped, never that of the first throw, shape (n, throws)."""
     pairs = np.array(list(itertools.combinations(range(1, len(star)), 2)) or [(0, 0)])
-    near, rows = np.repeat(star[None], len(pairs), axis=0), np.arange(len(pairs))
-    near[rows, pairs[:, 0]], near[rows, pairs[:, 1]] = star[pairs[:, 1]], star[pairs[:, 0]]
-    return near
+    neighbours, rows = np.repeat(star[None], len(pairs), axis=0), np.arange(len(pairs))
+    neighbours[rows, pairs[:, 0]], neighbours[rows, pairs[:, 1]] = star[pairs[:, 1]], star[pairs[:, 0]]
+    return neighbours
 
 
-def _arranged(space: StarSpace, objective: CoupleObjective, star: Stars, throws: Sequence[int]) -> Stars:
-    """Return the best star with these throws in any order on their steps, by halves that meet (S5)."""
+def _rearrange(space: StarSpace, objective: CoupleObjective, star: Stars, throws: Sequence[int]) -> Stars:
+    """Return the best star over all arrangements of these throws, by halves that meet (S5)."""
     free, value = Free.from_throws(star, throws), float(objective.values(space, star[None])[0])
     pattern = tuple(map(int, np.bincount(star, minlength=space.phases)))
     for share in until_time_limit(shares_of(space, free)):
@@ -229,13 +235,13 @@ def _arranged(space: StarSpace, objective: CoupleObjective, star: Stars, throws:
     return star
 
 
-def _shuffled(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
-    rest = np.repeat(np.arange(len(pattern)), [pattern[0] - 1, *pattern[1:]])
+def _shuffled_stars(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
+    steps = np.repeat(np.arange(len(pattern)), [pattern[0] - 1, *pattern[1:]])
     for _ in range(STARTS):
-        yield np.concatenate([[0], rng.permutation(rest)]).astype(np.uint8)
+        yield np.concatenate([[0], rng.permutation(steps)]).astype(np.uint8)
 
 
-def _mirrored(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
+def _mirror_stars(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
     middle = np.flatnonzero(np.mod(pattern, 2))
     if len(middle) > 1 or pattern[0] < 2:
         return
@@ -245,13 +251,13 @@ def _mirrored(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Star
         yield np.concatenate([front, middle, front[::-1]]).astype(np.uint8)
 
 
-def _in_blocks(
+def _block_stars(
     space: StarSpace, pattern: Sequence[int], objective: CoupleObjective, rng: np.random.Generator
 ) -> Iterator[Stars]:
     # S47: best of many stars whose throws stand in even groups, where each step has one throw
     if set(pattern) != {1} or space.phases in (1, *_primes(space.phases)):
         return
-    places = np.array([_blocks(space.phases, rng) for _ in range(IN_BLOCKS)])
+    places = np.array([_blocks(space.phases, rng) for _ in range(BLOCK_STARS)])
     steps = np.argsort(places, axis=1)
     stars = ((steps - steps[:, :1]) % space.phases).astype(np.uint8)
     best = np.argsort(objective.values(space, stars), kind="stable")[:STARTS]
@@ -259,7 +265,7 @@ def _in_blocks(
 
 
 def _blocks(phases: int, rng: np.random.Generator) -> Indices:
-    """Return the throw that stands on each step, from 0 (S47).
+    """Return the throw on each step for a star of even groups (S47).
 
     Blocks of q neighbours stand evenly; which of them is on step p depends on p modulo P / q' alone, so that only
     orders that q or q' divides have a couple, and those of q only as the star of the blocks has it.
@@ -268,8 +274,8 @@ def _blocks(phases: int, rng: np.random.Generator) -> Indices:
     if not primes:
         return np.zeros(1, dtype=np.intp)
     size = primes[int(rng.integers(len(primes)))]
-    others = [prime for prime in primes if prime != size]
-    period = phases // others[int(rng.integers(len(others)))] if others else phases
+    other_primes = [prime for prime in primes if prime != size]
+    period = phases // other_primes[int(rng.integers(len(other_primes)))] if other_primes else phases
     count = period // size
     inner = rng.permuted(np.tile(np.arange(size), (count, 1)), axis=1).T.reshape(-1)
     steps = np.arange(phases)

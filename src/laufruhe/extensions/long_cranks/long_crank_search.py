@@ -1,4 +1,4 @@
-"""Search over even stars that are too many to be listed: by couples (S5, S46, S48), or exchanges of throws (S44)."""
+"""Search for even stars too many to enumerate: by couples (S5, S46, S48), or by exchanges of throws (S44)."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ from laufruhe.solvers.stars.families import Family
 from laufruhe.solvers.stars.phasing_solver import solve_phasing
 from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
 
-WORTH = 1e-6
-"""Share by which a star has to be better: few angles blur less."""
+LEAST_GAIN = 1e-6
+"""Smallest relative gain of an exchange; coarse sampling blurs less."""
 _BY_HALVES = "stars by halves that meet in a window of couples"
 
 
 def solve_long_cranks(problem: Problem) -> Result:
-    """Decide open throws, firing orders, shafts and unbalances together, as `solve_phasing` does."""
+    """Decide open throws, firing orders, shafts and unbalances of a long crank."""
     return solve_phasing(problem, search_long)
 
 
 def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even stars, by what suits objective and size (S18)."""
+    """Return the best designs of all even stars, by the method for this objective and crank length (S18)."""
     if can_list(problem, families):
         return search_even(problem, phasing, families)
     simple = [(family, objective) for family in families if (objective := _amplitudes(phasing, family)) is not None]
@@ -72,7 +72,7 @@ def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
 
 
 def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult | None:
-    """Evaluate stars with little couple, then all that may be better (S46, S48).
+    """Evaluate stars with small couples, then search all that may be better (S46, S48).
 
     None where stars differ by more than their couples, or anything else is open.
     """
@@ -84,21 +84,25 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
     answer = _evaluate_stars(problem, phasing, family, stars, 0.0)
     if answer.complete:
         return merge_results([answer], phasing.best)
-    three = [phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)]
-    objective = couple_norms(problem, family.space, three)
+    check_stars = [
+        phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)
+    ]
+    objective = couple_norms(problem, family.space, check_stars)
     if objective is None:
         return None
-    every = search_stars(family.space, objective, phasing.best, phasing.time_limit, known)
-    stars += [tuple(map(int, star)) for star in every.stars]
-    answer = _evaluate_stars(problem, phasing, family, stars, every.lower_bound)
+    search_result = search_stars(family.space, objective, phasing.best, phasing.time_limit, known)
+    stars += [tuple(map(int, star)) for star in search_result.stars]
+    answer = _evaluate_stars(problem, phasing, family, stars, search_result.lower_bound)
     answer = merge_results([answer], phasing.best)
-    return replace(answer, complete=every.complete, looked_at=looked_at + every.nodes, method=_BY_HALVES)
+    return replace(
+        answer, complete=search_result.complete, looked_at=looked_at + search_result.nodes, method=_BY_HALVES
+    )
 
 
 def _evaluate_stars(
     problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
 ) -> EvenStarResult:  # fmt: skip
-    """Return stars with their values; complete if the best of them meets the bound of every even star (S40)."""
+    """Return stars with their values; complete if the best one meets the bound over all even stars (S40)."""
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
         realised = phasing.realise(family.candidate(phasing, steps))
@@ -112,7 +116,7 @@ def _evaluate_stars(
         complete = complete or is_proven
         designs.append(EvenDesign.from_steps(phasing, family, steps, (), value, bound, is_proven))
     designs.sort(key=lambda design: design.value)
-    method = "star without couples, which leaves what every even one has"
+    method = "star without couples; its objective is common to all even stars"
     return EvenStarResult(tuple(designs), bound, complete, len(designs), method)
 
 
@@ -126,7 +130,7 @@ def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
 
 
 def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best star that exchanges of throws lead to, bounded by its own dual rows over all stars (S44, S14)."""
+    """Return the best star reached by exchanges of throws, with a bound from its dual rows (S44, S14)."""
     zero_level = numerical_zero(problem)
     answers = []
     for family in families:
@@ -138,7 +142,7 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         engines = {star: phasing.realise(family.candidate(phasing, star)) for star in starts}
         values = {star: objective_value(star_problem, evaluate(star_problem)) for star, star_problem in engines.items()}
         first = min(starts, key=values.__getitem__, default=family.first)
-        built = min(phasing.shafts.allowed, key=lambda some: coarse_value(model, first, some, owners))
+        built = min(phasing.shafts.allowed, key=lambda shafts: coarse_value(model, first, shafts, owners))
         star = improved(model, first, built, owners)
         design, cut = solve_design(model, star, built, owners, problem.tolerance, zero_level)
         if design is None or cut is None:
@@ -153,28 +157,31 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
 
 
 def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:
-    """Return the best star that exchanges lead to, everything else at its optimum at few angles (S44)."""
+    """Return the best star reached by exchanges, with all other decisions optimal at few samples (S44)."""
     value = coarse_value(model, star, built, owners)
     while not is_time_over():
         minimum, best = min(
-            ((coarse_value(model, other, built, owners), other) for other in until_time_limit(exchanges(star))),
+            (
+                (coarse_value(model, neighbour, built, owners), neighbour)
+                for neighbour in until_time_limit(exchanges(star))
+            ),
             default=(math.inf, star),
         )
-        if not minimum < value * (1.0 - WORTH):
+        if not minimum < value * (1.0 - LEAST_GAIN):
             break
         value, star = minimum, best
     return star
 
 
 def exchanges(star: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """Yield stars in which two or three throws, never the first, take each other's steps."""
-    seen = {star}
+    """Yield stars in which two or three throws exchange their steps; the first throw keeps its own."""
+    yielded = {star}
     for i in range(1, len(star)):
         for j in range(1, i):
             for places in ((i, j), *((i, j, k) for k in range(1, j)), *((j, i, k) for k in range(1, j))):
-                other = list(star)
+                exchanged_steps = list(star)
                 for place, source in zip(places, (*places[1:], places[0]), strict=True):
-                    other[place] = star[source]
-                if (exchanged := tuple(other)) not in seen:
-                    seen.add(exchanged)
+                    exchanged_steps[place] = star[source]
+                if (exchanged := tuple(exchanged_steps)) not in yielded:
+                    yielded.add(exchanged)
                     yield exchanged

@@ -1,4 +1,4 @@
-"""Stars whose couple of one order lies in a window, by halves of their throws that meet (S5).
+"""Stars whose couple of one order lies in a window, by halves of their throws that meet in the middle (S5).
 
 The couple of a star is a sum over throws: that of its front half and that of the back. For every way to share the
 steps between the halves, the arrangements of the front are sorted by their couple. Each arrangement of the back finds
@@ -27,7 +27,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Window:
-    """Rectangle in which the couple of an order may lie [unit of the places].
+    """Rectangle of allowed couples of one order [unit of the places].
 
     Attributes
     ----------
@@ -44,12 +44,12 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Free:
-    """Throws of a star that may take each other's steps, in two halves.
+    """Throws of a star whose steps may be rearranged, in two halves.
 
     Attributes
     ----------
     star
-        Steps of all throws, of these as they are.
+        Steps of all throws, with the present order of the free ones.
     front, back
         Throws of the halves.
     """
@@ -60,40 +60,40 @@ class Free:
 
     @classmethod
     def from_throws(cls, star: Stars, throws: Sequence[int]) -> Free:
-        """Return these throws of a star, the first half of them in front."""
+        """Return the given throws of a star as free; the first half of them is the front."""
         middle = len(throws) // 2
         return cls(star, tuple(map(int, throws[:middle])), tuple(map(int, throws[middle:])))
 
     @classmethod
     def from_pattern(cls, pattern: Sequence[int]) -> Free:
-        """Return all throws of a pattern but the first."""
+        """Return all throws of a pattern as free, except the first."""
         star = np.repeat(np.arange(len(pattern)), pattern).astype(np.uint8)
         return cls.from_throws(star, range(1, len(star)))
 
     def counts(self, phases: int) -> Counts:
-        """Return how many of them stand on every step, shape (phases,)."""
+        """Return the number of free throws on each step, shape (phases,)."""
         steps = self.star[[*self.front, *self.back]]
         return np.bincount(steps, minlength=phases).astype(np.uint8)
 
     @property
     def arrangements(self) -> int:
-        """Number of arrangements of the halves, with the steps shared."""
+        """Number of arrangements of both halves, for one division of the steps."""
         return math.factorial(len(self.front)) + math.factorial(len(self.back))
 
 
 def shares_of(space: StarSpace, free: Free) -> Counts:
-    """Return how many throws of the front may stand on every step, shape (n, phases); images are left out (S2)."""
-    rest, front = free.counts(space.phases), len(free.front)
+    """Return all divisions of the steps: throws of the front half by step, shape (n, phases), without images (S2)."""
+    counts, front = free.counts(space.phases), len(free.front)
     shares = np.zeros((1, 0), dtype=np.uint8)
-    for step, maximum in enumerate(rest):
-        after = int(rest[step + 1 :].sum())
-        taken = shares.sum(axis=1, dtype=np.int64)
+    for step, maximum in enumerate(counts):
+        after = int(counts[step + 1 :].sum())
+        placed = shares.sum(axis=1, dtype=np.int64)
         grown = [np.column_stack([shares, np.full(len(shares), k, dtype=np.uint8)]) for k in range(maximum + 1)]
-        left = np.concatenate([front - taken - k for k in range(maximum + 1)])
-        shares = np.concatenate(grown)[(left >= 0) & (left <= after)]
+        remaining = np.concatenate([front - placed - k for k in range(maximum + 1)])
+        shares = np.concatenate(grown)[(remaining >= 0) & (remaining <= after)]
     is_whole = len(free.star) == len(free.front) + len(free.back) + 1
     # throws on every step of the star that turns the other way
-    if space.reflect and is_whole and np.array_equal(rest, np.roll(rest[::-1], 1)):
+    if space.reflect and is_whole and np.array_equal(counts, np.roll(counts[::-1], 1)):
         mirrored = np.roll(shares[:, ::-1], 1, axis=-1)
         differs = shares != mirrored
         first, rows = np.argmax(differs, axis=1), np.arange(len(shares))
@@ -102,20 +102,20 @@ def shares_of(space: StarSpace, free: Free) -> Counts:
 
 
 def work_of(space: StarSpace) -> int:
-    """Return the number of arrangements of halves that all stars are made of."""
+    """Return the number of arrangements of halves over all stars."""
     total = 0
     for pattern in space.patterns:
         free = Free.from_pattern(pattern)
         # coefficients of the product of (1 + z + ... + z^count): in how many ways the front has so many throws
-        ways = [1]
+        coefficients = [1]
         for count in free.counts(space.phases):
-            ways = [sum(ways[max(0, k - int(count)) : k + 1]) for k in range(len(free.front) + 1)]
-        total += free.arrangements * (ways[-1] // 2 + 1 if space.reflect else ways[-1])
+            coefficients = [sum(coefficients[max(0, k - int(count)) : k + 1]) for k in range(len(free.front) + 1)]
+        total += free.arrangements * (coefficients[-1] // 2 + 1 if space.reflect else coefficients[-1])
     return total
 
 
 def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iterator[Stars]:
-    """Yield blocks of stars of a share whose couple lies in the window, shape (n, throws); some stars repeat.
+    """Yield blocks of stars for one division whose couple lies in the window, shape (n, throws); some repeat.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def _chosen(count: int) -> tuple[NDArray[np.int8], ...]:
 
 @lru_cache(maxsize=16)
 def _permutations(count: int) -> NDArray[np.int8]:
-    out = np.zeros((1, 0), dtype=np.int8)
+    permutations = np.zeros((1, 0), dtype=np.int8)
     for throw, chosen in enumerate(_chosen(count)):
-        out = np.column_stack([np.repeat(out, count - throw, axis=0), chosen])
-    return out
+        permutations = np.column_stack([np.repeat(permutations, count - throw, axis=0), chosen])
+    return permutations

@@ -27,13 +27,13 @@ Names = Mapping[str, Any]
 
 def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
     """Return the picture of a table, evaluated in each reading of the source."""
-    wide = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
+    width = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
     count = sum(1 if panel.once else len(readings) for panel in table.panels)
     panels = [
         row
         for number, panel in enumerate(table.panels, 1)
         for reading, names in list(readings.items())[: 1 if panel.once else None]
-        for row in _rows(_panel(panel, names, "" if panel.once else reading, number), wide)
+        for row in _rows(_panel(panel, names, "" if panel.once else reading, number), width)
     ]
     return Picture(
         table.title or data.attrs["title"],
@@ -47,14 +47,14 @@ def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Da
     )
 
 
-def _rows(panel: Panel, wide: float) -> list[Panel]:
+def _rows(panel: Panel, width: float) -> list[Panel]:
     """Split a panel without room for the numbers on its bars into rows of one scale."""
     solid = [mark for mark in panel.marks if isinstance(mark, Bars) and not mark.hollow]
-    others = [mark for mark in panel.marks if not isinstance(mark, Bars | Words)]
-    if not solid or panel.x.ticks is None or others:
+    other_marks = [mark for mark in panel.marks if not isinstance(mark, Bars | Words)]
+    if not solid or panel.x.ticks is None or other_marks:
         return [panel]
     groups = len(solid[0].places)
-    rows, side = rows_of(groups, int(wide * GROUP / (BAR * len(solid))))
+    rows, side = rows_of(groups, int(width * GROUP / (BAR * len(solid))))
     if len(rows) == 1:
         return [panel]
     top = max(float(np.max(mark.values)) for mark in panel.marks if isinstance(mark, Bars))
@@ -97,7 +97,7 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
         ends = _axis(panel.y, names).ends
         marks += _bars(panel.bars, names, 0.0 if ends is None else max(ends))
     for words in panel.words:
-        across, up = (number_of(at, names) for at in (words.x, words.y))
+        across, up = (number_of(coordinate, names) for coordinate in (words.x, words.y))
         marks.append(Words(across, up, fill_in(words.text, names), words.colour, words.across, words.along))
     title = ", ".join(words for words in (fill_in(panel.title, names), reading) if words)
     return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
@@ -107,7 +107,7 @@ def _axis(axis: AxisTable, names: Names) -> Axis:
     labels = fill_in(axis.names, names)
     ticks = [(float(k), str(text)) for k, text in enumerate(labels)] if labels else None
     if axis.ticks is not None:
-        ticks = [(float(at), f"{at:g}") for at in axis.ticks]
+        ticks = [(float(value), f"{value:g}") for value in axis.ticks]
     ends = None if axis.ends is None else tuple(number_of(end, names) for end in axis.ends)
     return Axis(axis.label, ends, ticks, tuple(axis.log), grid=labels is None)  # type: ignore[arg-type]
 

@@ -61,8 +61,8 @@ def checks_in(
             where = (*at, field.alias or name)
             yield from checks_in(getattr(entry, name), {**at_places, **known_here}, cases, places, where)
     elif isinstance(entry, list):
-        for k, one in enumerate(entry):
-            yield from checks_in(one, known, cases, places, (*at, k))
+        for k, element in enumerate(entry):
+            yield from checks_in(element, known, cases, places, (*at, k))
     elif isinstance(entry, str):
         key = next(key for key in reversed(at) if isinstance(key, str))
         checked = partial(check, known=known, cases=cases)
@@ -120,7 +120,7 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
     code = _read(text)[1]
     try:
         # `_read` admitted only allowed nodes
-        return eval(code, {"__builtins__": {}, **_CALLED, **CONSTANTS, **names})
+        return eval(code, {"__builtins__": {}, **_CALL_TABLE, **CONSTANTS, **names})
     except ExpressionError:
         raise
     except NameError as error:
@@ -147,7 +147,7 @@ def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
                 if not _is_allowed(node):
                     rule = f"'{ast.unparse(node)}' is not allowed here"
                     raise ExpressionError(f"{rule}; use numbers, names and functions alone")
-            return nodes, compile(ast.fix_missing_locations(_Called().visit(copy)), "", "eval")
+            return nodes, compile(ast.fix_missing_locations(_RenameCalls().visit(copy)), "", "eval")
     except ExpressionError:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -163,7 +163,7 @@ def _is_allowed(node: ast.AST) -> bool:
     return isinstance(node, _PARTS) or not isinstance(node, ast.expr)
 
 
-class _Called(ast.NodeTransformer):
+class _RenameCalls(ast.NodeTransformer):
     """Renames functions, which quantities may share a name with, and turns arithmetic into calls."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
@@ -176,7 +176,7 @@ class _Called(ast.NodeTransformer):
         return ast.Call(ast.Name(type(node.op).__name__ + "()", ast.Load()), [node.left, node.right], [])
 
 
-def _of_numbers(function: Any) -> Any:
+def _numbers_only(function: Any) -> Any:
 
     def found(a: Any, b: Any) -> Any:
         if isinstance(a, str | list) or isinstance(b, str | list):
@@ -186,8 +186,8 @@ def _of_numbers(function: Any) -> Any:
     return found
 
 
-_CALLED = {f"{name}()": function for name, function in FUNCTIONS.items()}
-_CALLED |= {f"{name}()": _of_numbers(function) for name, function in _ARITHMETIC.items()}
+_CALL_TABLE = {f"{name}()": function for name, function in FUNCTIONS.items()}
+_CALL_TABLE |= {f"{name}()": _numbers_only(function) for name, function in _ARITHMETIC.items()}
 
 
 def fill_in(text: Any, names: Mapping[str, Any]) -> Any:

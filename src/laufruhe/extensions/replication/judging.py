@@ -27,12 +27,18 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
     """
     if not statements:
         return {}
-    verdicts = [[_judged(one, names) for names in readings.values()] for one in statements]
+    verdicts = [[_judged(statement, names) for names in readings.values()] for statement in statements]
     return {
         "by_reading": list(readings),
-        "statement": ("statement", [one.text + (f" ({one.where})" if one.where else "") for one in statements]),
-        "printed": ("statement", [UNSTATED if one.printed is None else one.printed for one in statements]),
-        "unit": ("statement", [one.unit for one in statements]),
+        "statement": (
+            "statement",
+            [statement.text + (f" ({statement.where})" if statement.where else "") for statement in statements],
+        ),
+        "printed": (
+            "statement",
+            [UNSTATED if statement.printed is None else statement.printed for statement in statements],
+        ),
+        "unit": ("statement", [statement.unit for statement in statements]),
         **{
             name: (("statement", "by_reading"), [[cell[k] for cell in row] for row in verdicts])
             for k, name in enumerate(("ours", "verdict", "why"))
@@ -40,10 +46,10 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
     }
 
 
-def _judged(one: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
-    value = number_of(one.value, names)
-    known = {**names, "value": value}
-    return value, verdict(one, known), fill_in(one.why, known)
+def _judged(statement: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
+    value = number_of(statement.value, names)
+    names_and_value = {**names, "value": value}
+    return value, verdict(statement, names_and_value), fill_in(statement.why, names_and_value)
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
@@ -70,12 +76,12 @@ def rows(data: xr.Dataset) -> list[Text]:
     return [marked_table(head, [_row(data.isel(statement=k), readings) for k in range(data.sizes["statement"])])]
 
 
-def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:
-    unit = one["unit"].item()
-    cells = [str(one[name].item()) for name in ("statement", "printed")]
-    for ours, outcome in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
-        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[outcome]]
-    whys = one["why"].values.tolist()
+def _row(statement: xr.Dataset, readings: Sequence[str]) -> list[str]:
+    unit = statement["unit"].item()
+    cells = [str(statement[name].item()) for name in ("statement", "printed")]
+    for value, outcome in zip(statement["ours"].values.tolist(), statement["verdict"].values.tolist(), strict=True):
+        cells += [f"{_shown(value)} {unit}".strip(), _CELLS[outcome]]
+    whys = statement["why"].values.tolist()
     if len(set(whys)) > 1:
         return [*cells, "<br>".join(f"{name}: {why}" for name, why in zip(readings, whys, strict=True))]
     return [*cells, whys[0]]

@@ -57,14 +57,14 @@ class Replication(Part):
     picture_: PictureTable | None = Field(default=None, alias="picture")
 
     @model_validator(mode="after")
-    def _means_something(self) -> Replication:
+    def _validate_names(self) -> Replication:
         # checks names, cases, functions and quantities before anything is computed
         wrong = list[InitErrorDetails]()
-        for at, entry, check_it in self._checks():
+        for place, entry, check_it in self._checks():
             try:
                 check_it(entry)
             except ModelError as error:
-                wrong.append(InitErrorDetails(type=f.refusal(str(error)), loc=at, input=entry))
+                wrong.append(InitErrorDetails(type=f.refusal(str(error)), loc=place, input=entry))
         if wrong:
             raise ValidationError.from_exception_data("replication", wrong)
         return self
@@ -95,8 +95,8 @@ class Replication(Part):
 
     def size(self) -> int:
         """Return the number of cases times swept numbers times readings."""
-        one = sum(math.prod(numbers.count for numbers in case.sweep.values()) for case in self.cases)
-        return one * len(self._all_readings())
+        points_per_reading = sum(math.prod(numbers.count for numbers in case.sweep.values()) for case in self.cases)
+        return points_per_reading * len(self._all_readings())
 
     @property
     def ends(self) -> tuple[str, ...]:
@@ -105,8 +105,8 @@ class Replication(Part):
 
     def points(self, scenes: Scenes) -> list[Point]:
         """Return every case at every combination of swept numbers, reading by reading."""
-        each = itertools.product(self._all_readings().values(), self.cases)
-        return [point for reading, case in each for point in self._points(case, reading, scenes)]
+        pairs = itertools.product(self._all_readings().values(), self.cases)
+        return [point for reading, case in pairs for point in self._points(case, reading, scenes)]
 
     def _all_readings(self) -> Mapping[str, Mapping[str, Any]]:
         return self.readings or {"": {}}
@@ -124,14 +124,14 @@ class Replication(Part):
                 changed = case.model_copy(update={"set": fill_in(case.set, names), "numbers": swept})
             yield Point(changed, base=filled_tables)
 
-    def _tables(self, name: Any, scenes: Scenes, *seen: Any) -> dict[str, Any]:
-        if name in seen or not isinstance(name, str):
+    def _tables(self, name: Any, scenes: Scenes, *parents: Any) -> dict[str, Any]:
+        if name in parents or not isinstance(name, str):
             raise ExpressionError(f"problem '{name}' is like itself, or is no name; correct a like")
         if name not in self.problems:
             return scenes.file(name)
         tables = {key: value for key, value in self.problems[name].items() if key != "like"}
         like = self.problems[name].get("like")
-        return tables if like is None else joined(self._tables(like, scenes, name, *seen), tables)
+        return tables if like is None else joined(self._tables(like, scenes, name, *parents), tables)
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return every quantity of one scene, at its optimum if something is open."""
@@ -216,15 +216,19 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
     cases = _Cases()
     swept = [str(c) for c, labels in data.coords.items() if labels.dims == ("point",) and c not in ("case", "reading")]
     for case in dict.fromkeys(data["case"].values.tolist()):
-        here = data.isel(point=np.flatnonzero(data["case"].values == case))
-        coords = {c: np.array(list(dict.fromkeys(here[c].values.tolist()))) for c in swept if here[c].notnull().all()}
-        labels_of = {str(dim): here[dim].values for dim in here[name].dims[1:]}
+        selected = data.isel(point=np.flatnonzero(data["case"].values == case))
+        coords = {
+            c: np.array(list(dict.fromkeys(selected[c].values.tolist()))) for c in swept if selected[c].notnull().all()
+        }
+        labels_of = {str(dim): selected[dim].values for dim in selected[name].dims[1:]}
         padded = np.full([len(labels) for labels in (*coords.values(), *labels_of.values())], np.nan)
         # by label: cases may nest their sweeps in any order
-        places = [[labels.tolist().index(label) for label in here[c].values.tolist()] for c, labels in coords.items()]
-        padded[tuple(places)] = here[name].values if places else here[name].values[0]
+        places = [
+            [labels.tolist().index(label) for label in selected[c].values.tolist()] for c, labels in coords.items()
+        ]
+        padded[tuple(places)] = selected[name].values if places else selected[name].values[0]
         values = xr.DataArray(padded, coords={**coords, **labels_of}, dims=[*coords, *labels_of])
-        for dim in labels_of if here[name].attrs.get("padded") else ():
+        for dim in labels_of if selected[name].attrs.get("padded") else ():
             values = values.dropna(dim, how="all")
         cases[str(case)] = values if values.dims else values.item()
     return cases
@@ -235,10 +239,10 @@ def _along_points(records: Sequence[Mapping[str, Any]], name: str) -> xr.DataArr
     import xarray as xr
 
     dims = list(records[0]["coords"])
-    coords = {dim: list(dict.fromkeys(label for one in records for label in one["coords"][dim])) for dim in dims}
+    coords = {dim: list(dict.fromkeys(label for record in records for label in record["coords"][dim])) for dim in dims}
     values = np.full((len(records), *(len(labels) for labels in coords.values())), np.nan)
-    for k, one in enumerate(records):
-        places = [[coords[dim].index(label) for label in labels] for dim, labels in one["coords"].items()]
-        values[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
-    padded = int(any(len(one["coords"][dim]) < len(labels) for one in records for dim, labels in coords.items()))
+    for k, record in enumerate(records):
+        places = [[coords[dim].index(label) for label in labels] for dim, labels in record["coords"].items()]
+        values[np.ix_([k], *places)] = np.array(record["values"], dtype=float)
+    padded = int(any(len(record["coords"][dim]) < len(labels) for record in records for dim, labels in coords.items()))
     return xr.DataArray(values, coords, ("point", *coords), name, {"padded": padded})

@@ -82,8 +82,9 @@ def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
         values = {decision.name: decision.value for decision in result.decisions}
         return Labelled(values.get(name.removeprefix(DECISION), math.nan), {})
     scene = MeasureContext(result.final.engine, result.problem.points)
-    found = list(result.final.values(scene.measure(name, table, "quantities.quantity")))
-    return Labelled(found, {"number": list(range(1, len(found) + 1))}) if len(found) > 1 else Labelled(found[0], {})
+    numbers = list(result.final.values(scene.measure(name, table, "quantities.quantity")))
+    labels = {"number": list(range(1, len(numbers) + 1))}
+    return Labelled(numbers, labels) if len(numbers) > 1 else Labelled(numbers[0], {})
 
 
 def _signal(result: Result, _: QuantityQuery) -> Labelled:
@@ -106,11 +107,11 @@ def _over_cycle(measure: Measure, result: Result, _: QuantityQuery) -> Labelled:
     dimension, names = DIRECTIONS[values.shape[-1]]
     if dimension:
         labels[dimension] = list(names)
-    return Labelled(values.reshape([len(each) for each in labels.values()]).tolist(), labels)
+    return Labelled(values.reshape([len(labels_of_dim) for labels_of_dim in labels.values()]).tolist(), labels)
 
 
 def _by_mount(measure: str, result: Result, _: QuantityQuery) -> Labelled:
-    values = [getattr(one, measure) for one in place_measures(result.final, 0)]
+    values = [getattr(measures, measure) for measures in place_measures(result.final, 0)]
     return Labelled(values, {"mount": result.final.mount_names})
 
 

@@ -1,4 +1,4 @@
-"""How fast the apexes of rotors run along their housings: of shape and speed, and of nothing that is decided (Y5)."""
+"""Apex speed and acceleration of rotors, from shape and crank speed (Y5)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROTORS = Need(
 
 @dataclass(frozen=True, eq=False)
 class ApexChannel(NumberChannel):
-    """The most of any apex at the operating points that count."""
+    """Largest value of all apexes at the selected operating points."""
 
     keys: tuple[str, ...] = ("operating_points",)
     needs: Need = ROTORS

@@ -1,4 +1,4 @@
-"""Chambers of a rotor, as pictures and tables show them."""
+"""Working chambers of a rotor, for pictures and tables."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def rotors_of(engine: Engine) -> Sequence[SliderCrank]:
 
 @dataclass(frozen=True)
 class RotorChambers:
-    """The chambers of a rotor, a row each, at angles of the shaft over the turns in which each works once.
+    """Chambers of one rotor, a row each, over the shaft angles in which each completes its cycle.
 
     Attributes
     ----------

@@ -18,13 +18,13 @@ WIDE, HIGH = 6.8, 1.65
 
 
 def applies(result: Result) -> bool:
-    """Return whether an engine has rotors that run."""
+    """Return True for an engine with rotors and operating points."""
     return bool(rotors_of(result.final.engine)) and bool(result.problem.points)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw each chamber of rotor 1, and the torque that they make together."""
+    """Draw volume, pressure and torque of each chamber of rotor 1, and their total torque."""
     part, point = rotors_of(result.final.engine)[0], result.problem.points[hardest_point(result)]
     chambers = rotor_chambers(result.problem, part, point, STEPS)
     degrees = np.degrees(chambers.angles)

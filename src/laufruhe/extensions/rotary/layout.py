@@ -19,7 +19,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class RotorMechanism(Mechanism):
-    """Numbers that the rotors of an engine share; `rod_rotating_mass` is the rotor's.
+    """Sizes shared by all rotors of an engine; `rod_rotating_mass` is the mass of the rotor.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class RotorMechanism(Mechanism):
 
 
 class Rotary(Inline):
-    """Rotors one behind another, each firing once a turn of the shaft."""
+    """Rotors in a row on one shaft, each firing once a turn."""
 
     name = "rotary"
     has_pistons = False
@@ -50,14 +50,14 @@ class Rotary(Inline):
         LayoutKey("rotor_inertia", "inertia", "Moment of inertia of a rotor about its centre.", 0.0),
     )
 
-    def cycle(self, said: Cycle) -> Cycle:
-        """Return the cycle of a rotor, which fires every turn: each chamber makes its four strokes in three turns."""
-        if said is not Cycle.FOUR_STROKE:
-            raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(said))
+    def cycle(self, cycle: Cycle) -> Cycle:
+        """Return the cycle of a rotor, one turn of the shaft; each chamber takes three turns for four strokes."""
+        if cycle is not Cycle.FOUR_STROKE:
+            raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(cycle))
         return Cycle.TWO_STROKE
 
     def mechanism(self, options: Mapping[str, Any], **shared: Any) -> RotorMechanism:
-        """Return rotor and eccentric.
+        """Return the mechanism of rotor and eccentric.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""A rotor with three flanks on an eccentric, in a housing of two lobes: another unit of the same engine (Y1-Y6)."""
+"""Rotor with three flanks on an eccentric, in a two-lobed housing (Y1-Y8)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _PACE = 2.0 / 3.0
 
 @dataclass(frozen=True, kw_only=True)
 class RotaryUnit(SliderCrank):
-    """A rotor; its crank is the eccentric, its reciprocating mass nothing and its bank where it fires.
+    """Rotor; the crank is the eccentric, the reciprocating mass is zero, and the bank is its firing direction.
 
     Attributes
     ----------
@@ -54,29 +54,29 @@ class RotaryUnit(SliderCrank):
 
     @property
     def path(self) -> Hashable:
-        """Key of what its chambers depend on, besides the angle of the eccentric."""
+        """Key of the sizes that its chambers depend on."""
         return self.crank_radius, self.rotor_radius, self.rotor_width
 
     @cached_property
     def swept(self) -> Swept:
-        """Three, each swept as by a piston of a Scotch yoke at two thirds of the speed (Y3; textbook eqs. 102, 103)."""
+        """Three chambers, each swept as by a Scotch yoke at two thirds of the speed (Y3; textbook eqs. 102, 103)."""
         bore = math.sqrt(4.0 * self.piston_area / math.pi)
         yoke = SliderCrank("chamber", 0.0, 0.5 * self.stroke, math.inf, 0.0, bore=bore)
         return Swept(yoke, _PACE, tuple(math.tau * k for k in range(FLANKS)), four_strokes=True)
 
     @property
     def piston_area(self) -> float:
-        """Chord of a flank times the width, which the gas of a chamber presses on [m2] (Y4)."""
+        """Area of a flank that the chamber gas acts on: chord times width [m2] (Y4)."""
         return math.sqrt(3.0) * self.rotor_radius * self.rotor_width
 
     @property
     def stroke(self) -> float:
-        """Stroke of a piston of that area that sweeps as much as a chamber [m] (Y3)."""
+        """Stroke of a piston with that area and the displacement of a chamber [m] (Y3)."""
         return 3.0 * self.crank_radius
 
     @property
     def displacement(self) -> float:
-        """Largest less smallest volume of a chamber [m3] (Y2; textbook eqs. 102, 103)."""
+        """Largest minus smallest volume of a chamber [m3] (Y2; textbook eqs. 102, 103)."""
         return self.piston_area * self.stroke
 
     @property
@@ -90,7 +90,7 @@ class RotaryUnit(SliderCrank):
 
     @property
     def largest_ratio(self) -> float:
-        """Compression ratio of a flank without a recess, which no other exceeds (Y2)."""
+        """Compression ratio of a flank without a recess, the largest possible (Y2)."""
         return 1.0 + self.displacement / self.smallest_volume
 
     @property
@@ -104,7 +104,7 @@ class RotaryUnit(SliderCrank):
         return self.crank_radius + self.rotor_radius / 9.0
 
     def lean(self, lib: Any, angles: Any) -> Any:
-        """Return the direction of the gas on a flank, its normal through the rotor (Y4; textbook eqs. 21, 22)."""
+        """Return the direction of the gas force on a flank (Y4; textbook eqs. 21, 22)."""
         third = angles / 3.0
         return lib.cos(third) + 1j * lib.sin(third)
 
@@ -117,13 +117,13 @@ class RotaryUnit(SliderCrank):
         return Motion(points, ((self.rotor_inertia, (0.0 * alpha + 1.0 / 3.0, 0.0 * alpha)),))
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Return housing and rotor (Y1)."""
+        """Return the outlines of housing and rotor (Y1)."""
         rotor = self.crank_radius * cmath.exp(1j * alpha) + self._flanks() * cmath.exp(1j * alpha / 3.0)
         housing = self.housing(np.linspace(0.0, math.tau, 181))
         return Outline(housing, self.rotor_width, False), Outline(rotor, self.rotor_width, True)
 
     def housing(self, turn: Any) -> Any:
-        """Return the peritrochoid of the apexes, at angles of one about its rotor's centre (Y1; textbook eq. 7)."""
+        """Return the peritrochoid of the apexes, at angles of an apex about the rotor's centre (Y1; textbook eq. 7)."""
         # at alpha = 0 the flank, and no apex, looks to where it fires
         return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)
 
@@ -139,7 +139,7 @@ class RotaryUnit(SliderCrank):
         return 0.5 * self.rotor_radius + rise - arc + np.sqrt(arc**2 - height**2) + 1j * height
 
     def scaled(self, length: float, mass: float) -> Self:
-        """The same in another size."""
+        """Return the rotor in another size."""
         return replace(
             super().scaled(length, mass),
             rotor_radius=self.rotor_radius * length,

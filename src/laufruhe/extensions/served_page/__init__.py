@@ -1,7 +1,7 @@
-"""The live page with what is not affine, served on this machine alone (docs/how-to/live-page.md).
+"""Live page with a local server: sliders for all open numbers, limits and loads (docs/how-to/live-page.md).
 
-`asked` is what a page may ask for, `answers` work it out in processes of their own, `desk` hands the newest request
-on, `guard` and `transport` let in whoever has the address that the command printed, and nobody else.
+`page_state` parses requests, `answers` computes them in worker processes, `latest_worker` runs only the newest
+request, `guard` and `transport` admit only clients with the printed address.
 """
 
 from laufruhe.extension import Extension

@@ -19,16 +19,16 @@ _FEW = 2
 
 
 class ClaimKind(StrEnum):
-    """Strength of a claim."""
+    """Kind and strength of a claim."""
 
     PROVEN = "proven"
     """The whole problem was solved, and no design is better within the tolerance."""
     FOUND = "found"
     """The whole problem was solved, and the design is the best that was found."""
     ESTIMATE = "estimate"
-    """The whole problem, decided at few crank angles."""
+    """The whole problem, solved at few samples."""
     HELD = "held"
-    """A simpler problem, decided at few crank angles."""
+    """A simpler problem, solved at few samples."""
     GIVEN = "given"
     """The initial design; nothing was decided."""
     NO_DESIGN = "no design"
@@ -36,14 +36,14 @@ class ClaimKind(StrEnum):
 
 @dataclass(frozen=True)
 class Simplification:
-    """Simplifications behind a moving slider; false without any.
+    """Simplifications while a slider moves; false without any.
 
     Attributes
     ----------
     held
-        Phrases for what stands still: "these mounts".
+        Phrases for fixed numbers: "these mounts".
     left_out
-        Phrases for what is not asked: "tolerances".
+        Phrases for neglected requirements: "tolerances".
     """
 
     held: tuple[str, ...] = ()
@@ -71,15 +71,15 @@ class Claim:
     kind
         Strength of the claim.
     position
-        Number of the page's settings that it is about: a claim about other settings is never shown as one about these.
+        Number of the page settings that the claim is about; the page shows it for no other settings.
     lead, words
-        The number, and what is claimed of it.
+        Number, and the claim about it.
     value
         Objective of the design [SI]; None where there is no design.
     reference
         Name of the design for comparisons, "the proven optimum"; empty where the page draws another one.
     breaks
-        Limits that the design breaks, in words; empty where it keeps all that are known.
+        Limits that the design breaks, in words; empty if it meets all known ones.
     is_last
         True if the solution for these settings is complete.
     """
@@ -100,20 +100,20 @@ class Claim:
 
 
 def is_broken(limit: LimitValue) -> bool:
-    """Return True for a limit that a design breaks by more than the tolerance of limits."""
+    """Return True if a design breaks a limit by more than its tolerance."""
     over = limit.value - limit.limit if limit.side == "at most" else limit.limit - limit.value
     return over > FEASIBILITY_TOL * (abs(limit.limit) or 1.0)
 
 
 def breaks_words(limits: Iterable[LimitValue]) -> str:
-    """Return which limits a design breaks, each with its value and its edge; empty where it breaks none."""
+    """Return the broken limits with value and edge, in words; empty if all are met."""
     broken = [limit for limit in limits if is_broken(limit)]
     words = [
         f"{limit.name} ({figure(limit.value, limit.unit)}, {limit.side} {figure(limit.limit, limit.unit)})"
         for limit in broken[:_FEW]
     ]
-    more = len(broken) - _FEW
-    return f"breaks {', '.join(words)}{f' and {more} more' if more > 0 else ''}" if broken else ""
+    unnamed = len(broken) - _FEW
+    return f"breaks {', '.join(words)}{f' and {unnamed} more' if unnamed > 0 else ''}" if broken else ""
 
 
 def preview_claim(
@@ -149,7 +149,7 @@ def initial_claim(position: int, problem: Problem, value: float | None, limits: 
 def conflict_claim(
     position: int, names: Sequence[str], simpler: Simplification = WHOLE, is_last: bool = False
 ) -> Claim:
-    """Return the claim that no design keeps these limits together: found for a simpler problem, or the last word."""
+    """Return the claim that no design meets these limits together; final if `is_last`."""
     names_text = join_phrases([f"'{name}'" for name in names])
     why = f"{names_text} contradict each other" if len(names) > 1 else f"{names_text} cannot be met within the bounds"
     lead = "No design exists:" if is_last else "No design found:"

@@ -156,9 +156,11 @@ def as_typed(value: float, unit: str) -> str | float:
 
 def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
     mounts = tables.get("mounts", {})
-    of = [("mounts", "All mounts", mounts)]
-    of += [(f"mounts.places.{k + 1}", m.get("name", str(k + 1)), m) for k, m in enumerate(mounts.get("places", []))]
-    for path, name, table in of:
+    tables_by_path = [("mounts", "All mounts", mounts)]
+    tables_by_path += [
+        (f"mounts.places.{k + 1}", m.get("name", str(k + 1)), m) for k, m in enumerate(mounts.get("places", []))
+    ]
+    for path, name, table in tables_by_path:
         for axis, entry in zip(_AXES, table.get("stiffness") or [], strict=False):
             place = _AXES.index(axis) + 1
             yield from _around(f"{path}.stiffness.{place}", "Mounts", f"{name}, stiffness {axis}", entry)
@@ -169,9 +171,9 @@ def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
         name = limit_name(entry) or ""
         for key, words in SIDES.items():
             controls = _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05)
-            yield from (replace(one, limit=name) for one in controls)
-        for end, given in enumerate(entry.get("outside") or []):
+            yield from (replace(control, limit=name) for control in controls)
+        for end, edge in enumerate(entry.get("outside") or []):
             words = "band ends" if end else "band begins"
             path = f"constraints.{k + 1}.outside.{end + 1}"
-            controls = _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5)
-            yield from (replace(one, limit=name) for one in controls)
+            controls = _around(path, "Limits", f"{name}, {words} at", edge, 0.5, 1.5)
+            yield from (replace(control, limit=name) for control in controls)

@@ -1,4 +1,4 @@
-"""The engine as numbers that a page draws and turns: where its parts are over a cycle, and what its weights follow."""
+"""Front view of the engine for the page: positions of its parts over a cycle, and unbalances of its weights."""
 
 from __future__ import annotations
 
@@ -66,21 +66,21 @@ def _part(poses: list[Pose]) -> dict[str, Any]:
 
 def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
     """Return a weight: its unbalance without decisions [kg m], and the gain of each decision (C4)."""
-    constant, by = complex(rotor.unbalance), list[dict[str, Any]]()
+    constant, drives = complex(rotor.unbalance), list[dict[str, Any]]()
     for decision in problem.decisions:
         for drive in decision.rotor_drives:
             if drive.rotor == rotor.name:
                 constant -= complex(drive.of(decision.start))
                 gains = [complex(drive.of(direction)) for direction in decision.set.directions]
                 angle = angle_name(decision) if decision.set.width > 1 else None
-                by.append({"name": decision.name, "angle": angle, "gains": [[g.real, g.imag] for g in gains]})
+                drives.append({"name": decision.name, "angle": angle, "gains": [[g.real, g.imag] for g in gains]})
     return {
         "name": rotor.name,
         "x": _mm(rotor.x),
         "at": [_mm(rotor.shaft.y), _mm(rotor.shaft.z)],
         "ratio": float(rotor.shaft.ratio),
         "unbalance": [constant.real, constant.imag],
-        "by": by,
+        "by": drives,
     }
 
 

@@ -1,4 +1,4 @@
-"""A problem's file and the files that it names, as they are on the disk: the last state that could be read."""
+"""Watch a problem file and the files that it names; keep the last valid state."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from laufruhe.files.nested import texts_in
 from laufruhe.files.reader import load_tables, tables_of
 
 EVERY = 0.4
-"""Seconds between two looks."""
+"""Seconds between two checks."""
 
 
 class FileWatcher:

@@ -1,7 +1,7 @@
-"""The optimum of unbalances while a limit is moved: one cone program at few angles, in milliseconds (P1, P4).
+"""Optimum of unbalances while a slider moves: one cone program at few samples, in milliseconds (P1, P4).
 
-Rows hang on the engine alone, so they are made once. A limit that is moved changes one number of the program. What is
-found is a design, its value at twice as many angles, and a bound that holds for the whole cycle.
+Rows depend on the engine only and are computed once; a moved limit changes one number of the program. The result
+is a design, its value at twice as many samples, and a bound for the whole cycle.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class SliderOptimum:
     values
         Values of the decisions; empty without a design.
     value, bound
-        Objective at the angles looked at, and what no design allowed goes under [SI].
+        Objective at the samples, and its lower bound over all feasible designs [SI].
     gap
-        Share of the value that is not proven.
+        Relative gap between value and bound.
     standing, prices
         Value of every limit's measure, and its shadow price.
     conflict
@@ -62,12 +62,12 @@ def can_follow(problem: Problem) -> bool:
     """Return True if all open numbers are affine and a norm of the loads is minimised."""
     kinds = {decision.kind for decision in problem.decisions}
     has_norm = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
-    alone = not problem.extras and problem.phasing is None
+    has_no_extras = not problem.extras and problem.phasing is None
     # limits on run-ups are left out and named; all other measures must be affine
     measures = [measure for measure in problem.measures if not measure.channel.simulation]
     affine = all(is_affine(measure.channel, kinds, problem) for measure in measures)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
-    return bool(kinds) and kinds <= _FOLLOWED and has_norm and alone and affine and convex
+    return bool(kinds) and kinds <= _FOLLOWED and has_norm and has_no_extras and affine and convex
 
 
 class Follower:
@@ -95,8 +95,10 @@ class Follower:
 
     def at(self, limits: Sequence[Limit]) -> SliderOptimum:
         """Return the optimum under the given limits."""
-        moved = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
-        coarse, fine, averaged = (self._under(rows, moved) for rows in (self._coarse, self._fine, self._whole))
+        limit_of_measure = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
+        coarse, fine, averaged = (
+            self._under(rows, limit_of_measure) for rows in (self._coarse, self._fine, self._whole)
+        )
         names = [limit.name for limit in self._problem.load_limits]
         solution = solve_cones(coarse)
         if solution.x is None:
@@ -112,7 +114,7 @@ class Follower:
         assert solution.x is not None
         x, value = solution.x, fine.objective(solution.x)
         price = dict(zip(names, bound.multipliers.shadow_prices(averaged), strict=True))
-        stands = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
+        limit_values = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
         broken = tuple(
             n for n, (maximum, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), maximum)
         )
@@ -124,15 +126,18 @@ class Follower:
             value=value,
             bound=bound.value,
             gap=gap_of(value, bound.value, self._nothing),
-            standing=tuple(stands.get(limit.name, np.nan) for limit in limits),
+            standing=tuple(limit_values.get(limit.name, np.nan) for limit in limits),
             prices=tuple(price.get(limit.name, 0.0) for limit in limits),
         )
 
-    def _under(self, rows: AffineProblem, moved: Mapping[Measure, Limit]) -> AffineProblem:
+    def _under(self, rows: AffineProblem, limit_of_measure: Mapping[Measure, Limit]) -> AffineProblem:
         pairs = zip(self._problem.load_limits, rows.limits, strict=True)
         return replace(
             rows,
-            limits=tuple((moved[x.measure].maximum if x.measure in moved else maximum, n) for x, (maximum, n) in pairs),
+            limits=tuple(
+                (limit_of_measure[x.measure].maximum if x.measure in limit_of_measure else maximum, n)
+                for x, (maximum, n) in pairs
+            ),
         )
 
 

@@ -52,8 +52,8 @@ class Guard:
         if headers.get("Host", "") not in self.hosts:
             return "Host is not this server"
         origin = headers.get("Origin")
-        wanted = [f"http://{host}" for host in self.hosts]
-        if (origin is not None or method == "POST") and origin not in wanted:
+        allowed_origins = [f"http://{host}" for host in self.hosts]
+        if (origin is not None or method == "POST") and origin not in allowed_origins:
             return "Origin is not this page"
         if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
             return "asked for by another site"

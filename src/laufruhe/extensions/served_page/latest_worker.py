@@ -1,4 +1,4 @@
-"""Requests for one kind of work, of which only the newest matters: a process at work, and who waits for it."""
+"""Worker process that runs only the newest request of one kind."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Late(SolverError):
 
 
 class LatestWorker:
-    """Runs the newest request in a process of its own; older waiting requests are dropped.
+    """Runs the newest request in its own process; older waiting requests are dropped.
 
     Parameters
     ----------
@@ -55,14 +55,14 @@ class LatestWorker:
         Late
             If the work exceeds `seconds`.
         """
-        mine, workers = self._turn()
+        request_number, workers = self._turn()
         try:
             return self._submitted(workers, work, *args, **kwargs).result(seconds)
         except TimeoutError:
             self._end(workers)
             raise Late(f"it took longer than {seconds:.0f} s and was ended") from None
         except (BrokenExecutor, CancelledError):
-            if mine != self._newest or self._closed:
+            if request_number != self._newest or self._closed:
                 raise Superseded from None
             self._end(workers)
             raise
@@ -83,18 +83,18 @@ class LatestWorker:
         """Wait until the process is free; end overdue work."""
         with self._changed:
             self._newest += 1
-            mine = self._newest
+            request_number = self._newest
             self._changed.notify_all()
-            until = time.monotonic() + self._patience
-            while self._busy and mine == self._newest and not self._closed:
-                if not self._changed.wait(max(until - time.monotonic(), 0.0)) and time.monotonic() >= until:
+            deadline = time.monotonic() + self._patience
+            while self._busy and request_number == self._newest and not self._closed:
+                if not self._changed.wait(max(deadline - time.monotonic(), 0.0)) and time.monotonic() >= deadline:
                     self._end(self._workers)
-            if mine != self._newest or self._closed:
+            if request_number != self._newest or self._closed:
                 raise Superseded
             self._busy = True
             if self._workers is None:
                 self._workers = Processes(1)
-            return mine, self._workers
+            return request_number, self._workers
 
     def _end(self, workers: Processes | None) -> None:
         with self._changed:

@@ -1,4 +1,4 @@
-"""The front between what is minimised and another measure: one bounded point after the other, the whole seen early."""
+"""Pareto front between the objective and another measure, computed point by point from coarse to fine."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _NARROW = 1e-3
 
 
 def partners(problem: Problem) -> dict[str, Measure]:
-    """Return measures that the objective may be traded against, by name: requested ones, then usual ones."""
+    """Return measures for the second axis of a front, by name: measures of the problem, then usual ones."""
     if not can_follow(problem):
         return {}
     minimised = {term.measure for term in problem.objective}
@@ -45,10 +45,10 @@ class ParetoFront:
         top = 1e300
         self._limit = Limit(across.name, across, top)
         self.others = others
-        alone = problem.changed(limits=(*others, self._limit), ranks=())
-        self.problem, self.across = alone, across
-        self._follower = Follower(alone)
-        self._minimum = Follower(alone.changed(objective=(Term(across),), limits=others))
+        bounded_problem = problem.changed(limits=(*others, self._limit), ranks=())
+        self.problem, self.across = bounded_problem, across
+        self._follower = Follower(bounded_problem)
+        self._minimum = Follower(bounded_problem.changed(objective=(Term(across),), limits=others))
 
     def ends(self) -> tuple[float, float]:
         """Return the minimum of the other measure, and its value at the least objective."""

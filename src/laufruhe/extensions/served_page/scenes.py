@@ -1,4 +1,4 @@
-"""A problem as a page has it: what follows sliders at once, what stands still meanwhile, and what is drawn."""
+"""Problem of a page: its follower, its drawing, and the simplifications while sliders move."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
 
 ROUNDING = 1e-5
-"""Share of the objective that a program at few angles does not tell from nothing."""
+"""Share of the objective below which a price counts as zero."""
 STILL: Mapping[Kind, str] = {
     Kind.PLACE: "these shaft positions",
     Kind.STIFFNESS: "these mounts",
@@ -37,14 +37,14 @@ STILL: Mapping[Kind, str] = {
     Kind.SIZE: "these sizes",
     Kind.LEAD: "these phases of geared shafts",
 }
-"""Words for numbers that stand still while sliders move."""
+"""Words for numbers that are fixed while sliders move."""
 _KEPT = 6
 
 
 class PageScene:
-    """A problem without the values of its limits: its drawing and its follower.
+    """Problem without the values of its limits, with its drawing and its follower.
 
-    Where something is open that loads are not affine in, it stays as given.
+    Open numbers that loads are not affine in keep their initial values.
     """
 
     def __init__(self, problem: Problem, key: str) -> None:
@@ -70,13 +70,13 @@ class PageScene:
     def standing(
         self, limits: Sequence[Limit], design: Evaluation, followed: SliderOptimum | None
     ) -> tuple[LimitValue, ...]:
-        """Return how a design stands to limits, with prices [SI]."""
+        """Return the values of all limits with prices [SI]."""
         if design.resonance:
             return ()
-        stands = limit_values(replace(self.problem, limits=tuple(limits)), design)
+        limit_values_of_design = limit_values(replace(self.problem, limits=tuple(limits)), design)
         if followed is None or followed.conflict:
-            return stands
-        pairs = zip(limits, stands, followed.prices, strict=True)
+            return limit_values_of_design
+        pairs = zip(limits, limit_values_of_design, followed.prices, strict=True)
         return tuple(self._priced(limit, stand, price, followed.value) for limit, stand, price in pairs)
 
     def _priced(self, limit: Limit, stand: LimitValue, price: float, value: float) -> LimitValue:
@@ -99,18 +99,18 @@ class PageScene:
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
     def simpler(self, fixed_kinds: Collection[Kind]) -> Simplification:
-        """Return what is fixed or left out while sliders move.
+        """Return what is fixed or neglected while sliders move.
 
         Parameters
         ----------
-        held
-            Kinds of open numbers that the page holds as they were decided.
+        fixed_kinds
+            Kinds of open numbers that the page fixes at their last solution.
         """
         problem = self.whole
         kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
         if problem.phasing is not None:
             kinds.add(Kind.STAR)
-        unread = [limit.name for limit in self.problem.limits if not self._reads(limit)]
+        unread = [limit.name for limit in self.problem.limits if not self._is_followed(limit)]
         left_out = [
             *(extra.words for extra in problem.extras),
             *(["later objectives"] if problem.ranks else []),
@@ -119,9 +119,9 @@ class PageScene:
         phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(kinds))
         return Simplification(tuple(phrases), tuple(left_out))
 
-    def _reads(self, limit: Limit) -> bool:
-        moved = depends(limit.measure.channel, open_kinds(self.problem), self.problem)
-        return limit in self.problem.load_limits or not moved
+    def _is_followed(self, limit: Limit) -> bool:
+        depends_on_sliders = depends(limit.measure.channel, open_kinds(self.problem), self.problem)
+        return limit in self.problem.load_limits or not depends_on_sliders
 
 
 _scenes: dict[str, PageScene] = {}

@@ -1,4 +1,4 @@
-"""Designs, limits and figures as a page is told of them: JSON that every browser reads."""
+"""Designs, limits and claims as JSON for the page."""
 
 from __future__ import annotations
 
@@ -22,14 +22,16 @@ def as_text(answer: dict[str, Any]) -> str:
     """Return JSON; a model is JSON already, numbers that are not finite become null."""
     plain = {key: entry for key, entry in answer.items() if key not in ("model", "engine")}
     text = json.dumps(finite(plain), allow_nan=False)
-    drawn = {"model": answer.get("model"), "engine": json.dumps(answer["engine"]) if "engine" in answer else None}
-    return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in drawn.items() if entry is not None), "}"])
+    texts = {"model": answer.get("model"), "engine": json.dumps(answer["engine"]) if "engine" in answer else None}
+    return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in texts.items() if entry is not None), "}"])
 
 
-def answer(claim: Claim, found: Iterable[LimitValue], problem: Problem, conflict: Sequence[str]) -> dict[str, Any]:
-    """Return a claim, how its design stands to limits, and the names of limits that contradict each other."""
+def answer(
+    claim: Claim, limit_values: Iterable[LimitValue], problem: Problem, conflict: Sequence[str]
+) -> dict[str, Any]:
+    """Return a claim, the limit values of its design, and the names of conflicting limits."""
     is_estimate = claim.kind in (ClaimKind.ESTIMATE, ClaimKind.HELD)
-    return {"claim": asdict(claim), "limits": limits(found, problem, is_estimate), "conflict": list(conflict)}
+    return {"claim": asdict(claim), "limits": limits(limit_values, problem, is_estimate), "conflict": list(conflict)}
 
 
 def design(problem: Problem, values: Sequence[Value]) -> dict[str, float]:
@@ -38,7 +40,7 @@ def design(problem: Problem, values: Sequence[Value]) -> dict[str, float]:
 
 
 def limits(values: Iterable[LimitValue], problem: Problem, is_estimate: bool = False) -> list[dict[str, Any]]:
-    """Return how a design stands to its limits, and what they cost."""
+    """Return values, sides, state and prices of limits, in words and numbers."""
     edges = {limit.name: limit for limit in problem.limits}
     return [
         {

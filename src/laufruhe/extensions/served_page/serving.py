@@ -1,4 +1,4 @@
-"""A problem's page, served until somebody ends it: which request is worked out where."""
+"""Server of a problem's page, and the worker process of each kind of request."""
 
 from __future__ import annotations
 
@@ -50,16 +50,16 @@ class Page:
 
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:
         self.watched = FileWatcher(path)
-        self.server = _listening(port, _files())
+        self.server = _start_server(port, _files())
         self._follow, self._measure = LatestWorker(_HASTE), LatestWorker(_HASTE)
         self._settle, self._front = LatestWorker(_PATIENCE), LatestWorker(_PATIENCE)
         self.server.handles = {
-            "/begin": self._begun,
-            "/follow": self._asked(self._follow, FOLLOWED, answers.follow),
-            "/measure": self._asked(self._measure, FOLLOWED, answers.measure),
-            "/settle": self._asked(self._settle, seconds + GRACE, answers.settle, seconds),
-            "/save": self._asked(self._follow, FOLLOWED, answers.save),
-            "/front": self._fronted,
+            "/begin": self._begin,
+            "/follow": self._handler(self._follow, FOLLOWED, answers.follow),
+            "/measure": self._handler(self._measure, FOLLOWED, answers.measure),
+            "/settle": self._handler(self._settle, seconds + GRACE, answers.settle, seconds),
+            "/save": self._handler(self._follow, FOLLOWED, answers.save),
+            "/front": self._front_lines,
             "/pictures": _read(partial(self._lines, self._settle, len(PICTURES), answers.picture)),
             "/events": lambda _: HttpAnswer(lines=self._events()),
         }
@@ -78,7 +78,7 @@ class Page:
             timer.daemon = True
             timer.start()
         # let the follower's process import in advance
-        threading.Thread(target=self._warmed, daemon=True).start()
+        threading.Thread(target=self._warm_up, daemon=True).start()
         try:
             when_ready()
             self.server.serve_forever(poll_interval=0.1)
@@ -90,36 +90,40 @@ class Page:
     def close(self) -> None:
         """End the worker processes and the server."""
         self.watched.close()
-        for desk in (self._follow, self._measure, self._settle, self._front):
-            desk.close()
+        for worker in (self._follow, self._measure, self._settle, self._front):
+            worker.close()
         self.server.server_close()
 
-    def _warmed(self) -> None:
+    def _warm_up(self) -> None:
         with suppress(Exception):
             self._follow.ask(FOLLOWED, answers.follow, self.watched.source, PageState())
 
-    def _begun(self, _: Any) -> HttpAnswer:
+    def _begin(self, _: Any) -> HttpAnswer:
         answer = json.loads(answers.begin(self.watched.source))
         return HttpAnswer(json.dumps({**answer, **self._state()}))
 
     def _state(self) -> dict[str, Any]:
         return {"version": self.watched.version, "complaint": self.watched.complaint}
 
-    def _asked(
-        self, desk: LatestWorker, seconds: float, work: Callable[..., str], *more: Any
+    def _handler(
+        self, worker: LatestWorker, seconds: float, work: Callable[..., str], *arguments: Any
     ) -> Callable[[Any], HttpAnswer]:
-        return _read(lambda state: _worked(partial(desk.ask, seconds, work, self.watched.source, state, *more)))
+        return _read(
+            lambda state: _to_answer(partial(worker.ask, seconds, work, self.watched.source, state, *arguments))
+        )
 
     def _lines(
-        self, desk: LatestWorker, maximum: int, work: Callable[..., str], state: PageState, *more: Any
+        self, worker: LatestWorker, maximum: int, work: Callable[..., str], state: PageState, *arguments: Any
     ) -> HttpAnswer:
         source = self.watched.source
-        return HttpAnswer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), maximum))
+        return HttpAnswer(
+            lines=_each(lambda k: partial(worker.ask, FOLLOWED, work, source, state, *arguments, k), maximum)
+        )
 
-    def _fronted(self, body: Any) -> HttpAnswer:
+    def _front_lines(self, body: Any) -> HttpAnswer:
         across = body.pop("across", None) if isinstance(body, dict) else None
         if not isinstance(across, str) or len(across) > 200:
-            return _wrong(Complaint("across", "", "is no measure", "load the page again"))
+            return _bad_request(Complaint("across", "", "is no measure", "load the page again"))
         return _read(lambda state: self._lines(self._front, POINTS, answers.front, state, across))(body)
 
     def _events(self) -> Iterator[str]:
@@ -135,21 +139,21 @@ def _read(answer: Callable[[PageState], HttpAnswer]) -> Callable[[Any], HttpAnsw
         try:
             return answer(PageState.from_json(body))
         except Refused as refused:
-            return _wrong(refused.complaint)
+            return _bad_request(refused.complaint)
 
     return answered
 
 
 def _each(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[str]:
     for k in range(maximum):
-        text = _worked(work(k)).text
+        text = _to_answer(work(k)).text
         yield text
         if text.startswith(('{"error"', '{"done"', '{"dropped"')):
             return
     yield '{"done": true}'
 
 
-def _worked(work: Callable[[], str]) -> HttpAnswer:
+def _to_answer(work: Callable[[], str]) -> HttpAnswer:
     try:
         return HttpAnswer(work())
     except Superseded:
@@ -166,7 +170,7 @@ def _worked(work: Callable[[], str]) -> HttpAnswer:
         )
 
 
-def _wrong(complaint: Complaint) -> HttpAnswer:
+def _bad_request(complaint: Complaint) -> HttpAnswer:
     return HttpAnswer(json.dumps({"error": str(complaint)}), status=HTTPStatus.BAD_REQUEST)
 
 
@@ -178,7 +182,7 @@ def _files() -> dict[str, str]:
     return {**texts, **page_assets()}
 
 
-def _listening(port: int | None, texts: dict[str, str]) -> Server:
+def _start_server(port: int | None, texts: dict[str, str]) -> Server:
     # without a port at the usual one, or at a free one
     try:
         return Server(USUAL_PORT if port is None else port, texts)

@@ -1,4 +1,4 @@
-"""HTTP on the loopback: what is let in, how much of it, and how answers go out."""
+"""HTTP on the loopback interface, with limits on size, number and duration of requests."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import Any
 from laufruhe.extensions.served_page.guard import HEADERS, HOST, TOKEN, Guard
 
 MOST_BYTES, MOST_HEAD, MOST_AT_ONCE = 64_000, 32_000, 32
-"""Bytes of a request's body and of what stands before it; connections at once."""
+"""Largest number of bytes of a request's body, of its head, and of simultaneous connections."""
 READ, WRITE, EVICTION = 5.0, 20.0, 2.0
 """Seconds for a request to arrive, for a client to take an answer, and for an evicted connection to end."""
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
@@ -62,7 +62,7 @@ class Server(ThreadingHTTPServer):
         self._lock = threading.Lock()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection. Without room the slowest sender is evicted; if all are answered, refuse."""
+        """Start a thread for a connection; evict the slowest sender if all are in use, or refuse."""
         has_room = self._room.acquire(blocking=False)
         if not has_room and self._evict():
             has_room = self._room.acquire(timeout=EVICTION)
@@ -121,10 +121,10 @@ class _Incoming(io.RawIOBase):
 
     def readinto(self, buffer: Any) -> int:
         """Return the number of bytes received; `TimeoutError` beyond the limits."""
-        left = self._until - time.monotonic()
-        if left <= 0.0 or self._room <= 0:
+        remaining = self._until - time.monotonic()
+        if remaining <= 0.0 or self._room <= 0:
             raise TimeoutError
-        self._connection.settimeout(left)
+        self._connection.settimeout(remaining)
         count = self._connection.recv_into(memoryview(buffer)[: self._room])
         self._room -= count
         return count

@@ -1,4 +1,4 @@
-"""Slotted lever that a crank swings, for a slow stroke and a quick return (Roetscher, Figs. 1071 to 1073)."""
+"""Drive by a slotted lever with a slow stroke and a quick return (Roetscher, Figs. 1071 to 1073)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class Yoke(Mechanism):
-    """Numbers that all yokes of an engine share; `options` are fields of `SwingingYoke` that a slider-crank has not."""
+    """Sizes shared by all yokes of an engine; `options` holds the fields that only `SwingingYoke` has."""
 
     options: Mapping[str, float]
 
@@ -26,7 +26,7 @@ class Yoke(Mechanism):
 
 
 class SwingingYokeDrive(DriveKind):
-    """Stroke and return ratio fix crank radius and length of the lever over the distance of its pivot (K15)."""
+    """Drive whose stroke and return ratio determine crank radius and lever length over pivot distance (K15)."""
 
     name = "swinging-yoke"
     has_rod = False
@@ -42,7 +42,7 @@ class SwingingYokeDrive(DriveKind):
     )
 
     def radius(self, sizes: Sizes) -> float:
-        """Return the crank radius, e sin of half the angle that the slow stroke is over half a turn [m]."""
+        """Return the crank radius [m]: pivot distance times the sine of half the excess angle of the slow stroke."""
         numbers = sizes.options
         pivot, ratio, length = numbers["pivot_distance"], numbers["return_ratio"], numbers["lever_length"]
         if pivot is None:
@@ -62,7 +62,7 @@ class SwingingYokeDrive(DriveKind):
         return float(pivot * share)
 
     def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
-        """Return the mechanism with the lever, its weight, and the ram's path."""
+        """Return the mechanism with lever, lever weight and ram path."""
         numbers, pivot = sizes.options, sizes.options["pivot_distance"]
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
         if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:

@@ -16,12 +16,12 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 _THICKNESS = 0.15
 _WEIGHT = 7850.0 * _THICKNESS
-"""Of steel, over its area [kg/m2]."""
+"""Mass of the drawn steel block per area [kg/m2]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SwingingYoke(SliderCrank):
-    """A crank inside the swing of its lever; the piston of other mechanisms is a ram here.
+    """Crank with a swinging lever; the ram takes the place of the piston.
 
     The pivot is at -i e beside the crank axis, in the plane turned to the ram's axis (C5). alpha = 0 where the
     crank pin lies along that axis; the slow stroke, towards the crank, has the pin on the far side of the pivot.
@@ -37,7 +37,7 @@ class SwingingYoke(SliderCrank):
     lever_mass, lever_centre, lever_inertia
         [kg], centre of gravity from the pivot towards the end [m], inertia about it [kg m2].
     lever_weight, lever_weight_radius
-        Behind the pivot [kg], [m].
+        Weight behind the pivot [kg] and its distance from the pivot [m].
     """
 
     pivot: float
@@ -68,18 +68,18 @@ class SwingingYoke(SliderCrank):
 
     @property
     def path(self) -> Hashable:
-        """Key of what the ram's path depends on, besides the angle of the crank."""
+        """Key of the sizes that the path of the ram depends on."""
         return "swinging yoke", self.crank_radius, self.pivot, self.lever_length
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
-        """Angles at which crank and lever are square (K15)."""
+        """Crank angles at which crank and lever are at right angles [rad] (K15)."""
         lean = math.asin(self.crank_radius / self.pivot)
         return -lean, math.pi + lean
 
     @property
     def stroke(self) -> float:
-        """2 R r / e [m]."""
+        """Stroke of the ram, 2 R r / e [m]."""
         return 2.0 * self.lever_length * self.crank_radius / self.pivot
 
     @property
@@ -90,11 +90,11 @@ class SwingingYoke(SliderCrank):
 
     @property
     def counterweight_mass(self) -> float | None:
-        """Mass behind the pivot."""
+        """Mass of the weight behind the pivot [kg]; None without one."""
         return self.lever_weight if self.lever_weight_radius > 0.0 else None
 
     def lever(self, lib: Any, alpha: Any) -> tuple[Any, tuple[Any, Any]]:
-        """Return the lever's direction as a unit number, and first and second derivative of its angle (K14)."""
+        """Return the lever's direction as a complex unit number, and first and second derivative of its angle (K14)."""
         r, e = 0.0 * alpha + self.crank_radius, 0.0 * alpha + self.pivot
         cosine, sine = lib.cos(alpha), lib.sin(alpha)
         # (r^2 + e^2 + 2 e r sin alpha), which is small where the pin comes near the pivot
@@ -104,17 +104,17 @@ class SwingingYoke(SliderCrank):
         return direction, (rate, r * e * cosine * (e - r) * (e + r) / (square * square))
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Return the way of the ram towards the crank from alpha = 0 [m]."""
+        """Return the travel of the ram towards the crank from alpha = 0 [m]."""
         start, _ = self.lever(lib, 0.0 * alpha)
         return self.lever_length * (start.real - self.lever(lib, alpha)[0].real)
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Return the velocity of the ram away from the crank, by the angle of its crank [m] (K16)."""
+        """Return the velocity of the ram away from the crank, per crank angle [m/rad] (K16)."""
         direction, (rate, _) = self.lever(lib, alpha)
         return -self.lever_length * rate * direction.imag
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """Return the motion of ram, lever and its weight."""
+        """Return the motion of ram, lever and lever weight."""
         direction, (rate, swing) = self.lever(lib, alpha)
         turned, bent = 1j * rate * direction, (1j * swing - rate * rate) * direction
 
@@ -135,7 +135,7 @@ class SwingingYoke(SliderCrank):
         )
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Return ram, lever, and its weight as a block of steel 150 mm thick."""
+        """Return the outlines of ram, lever, and a steel block of 150 mm for the lever weight."""
         direction, pivot = complex(self.lever(np, np.float64(alpha))[0]), -1j * self.pivot
         ram = complex(self.motion(np, np.float64(alpha)).points[0][1][0])
         wide, side = 0.06 * self.stroke, math.sqrt(self.lever_weight / _WEIGHT)

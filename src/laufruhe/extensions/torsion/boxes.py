@@ -1,4 +1,4 @@
-"""A lower bound of root mean squares of the crankshaft's twist over boxes of its discs, shafts and absorbers (V13).
+"""Lower bounds of RMS twist, torque and stress over boxes of discs, shafts and absorbers (V13).
 
 The inertia of all that turns, and how evenly it does, go one way with every disc (V14): a corner bounds them.
 
@@ -42,7 +42,7 @@ _SAME = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class _Lines:
-    """Orders of one operating point, and what excites the discs in them.
+    """Orders of one operating point, with the torques that excite the discs.
 
     Attributes
     ----------
@@ -70,8 +70,8 @@ class _Lines:
     inside: ComplexArray
 
 
-class _OfInertia:
-    """The inertia of all that turns, or a degree of irregularity that falls with it (T9, V14)."""
+class _InertiaBound:
+    """Bound of the rotating inertia, or of a degree of irregularity that falls with it (T9, V14)."""
 
     def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
         if measure.channel.flywheel_value is None:
@@ -81,7 +81,7 @@ class _OfInertia:
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
     def minimum(self, chains: Sequence[Torsion]) -> float:
-        """Return the least value on a box, from the chains of its lower corner, centre and upper corner."""
+        """Return the minimum over a box, from the chains at its lower corner, centre and upper corner."""
         inertia = turning_inertia(self._engine.with_extra(chains[0 if self._rises else -1]), self._fidelity)
         return 0.0 if inertia is None else self._number(Flywheel(inertia))
 
@@ -103,8 +103,8 @@ class TwistBoxes:
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.coordinates = problem, TwistCoordinates(problem)
         kinds = {decision.kind for decision in problem.decisions}
-        rest = [t for t in problem.objective if not depends(t.measure.channel, kinds, problem)]
-        self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
+        fixed_terms = [t for t in problem.objective if not depends(t.measure.channel, kinds, problem)]
+        self._constant = sum(term.weight * evaluation.value(term.measure) for term in fixed_terms)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
         self._heat = [limit for limit in problem.limits if limit.measure.channel is ABSORBER_HEAT]
@@ -113,64 +113,66 @@ class TwistBoxes:
             for limit in problem.limits if limit.measure.channel in RESONANCES
             for resonance in RESONANCES[limit.measure.channel](limit.measure, evaluation)
         ]  # fmt: skip
-        self._turning = [(t.weight, _OfInertia(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)]
-        self._uneven = [(x.maximum, _OfInertia(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
+        self._turning = [
+            (t.weight, _InertiaBound(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)
+        ]
+        self._uneven = [(x.maximum, _InertiaBound(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
         self._samples = evaluation.samples
         self._lines = [self._lines_at(loads) for loads in evaluation.loads]
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Return whether sums of squares over orders are those over samples, as the bounds suppose."""
+        """True if sums over orders equal sums over samples, as the bounds assume."""
         highest = max((lines.highest for lines in self._lines), default=0)
         return highest <= self._samples // 2
 
     @property
     def has_terms(self) -> bool:
-        """Return whether any minimised measure has a bound."""
+        """True if any term of the objective has a bound."""
         return bool(self._terms or self._turning)
 
     @property
     def knows_all(self) -> bool:
-        """Return whether every minimised measure has a bound that closes with small boxes."""
+        """True if every term of the objective has a bound that converges in small boxes."""
         return all(_is_square(term.measure) or _turns(term.measure) for term in self.problem.objective)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return the least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        """Return the lower bound on every box, infinite for boxes without a feasible design, and the side to bisect."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             bounds = [self._bound(low, high) for low, high in zip(lower, upper, strict=True)]
         return np.array([value for value, _ in bounds]), np.array([side for _, side in bounds], dtype=np.intp)
 
     def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
-        all_of = np.maximum(self.coordinates.upper - self.coordinates.lower, 1e-300)
-        wide = (upper - lower) / all_of
+        full_widths = np.maximum(self.coordinates.upper - self.coordinates.lower, 1e-300)
+        widths = (upper - lower) / full_widths
         if any(self._breaks(limit, resonance, lower, upper) for limit, resonance in self._numbers):
-            return math.inf, int(np.argmax(wide))
+            return math.inf, int(np.argmax(widths))
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
-        if any(of.minimum(chains) > maximum * (1.0 + SLACK) for maximum, of in self._uneven):
-            return math.inf, int(np.argmax(wide))
+        if any(inertia_bound.minimum(chains) > maximum * (1.0 + SLACK) for maximum, inertia_bound in self._uneven):
+            return math.inf, int(np.argmax(widths))
         twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
         if any(
             _root_bound([(1.0, self._under(q, chains, twists))]) > maximum * (1.0 + SLACK)
             for maximum, q in self._limits
         ):
-            return math.inf, int(np.argmax(wide))
+            return math.inf, int(np.argmax(widths))
         if any(self._overheats(limit, chains, twists) for limit in self._heat):
-            return math.inf, int(np.argmax(wide))
+            return math.inf, int(np.argmax(widths))
         terms = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
         bound, pull = (
             _root_bound(terms),
-            np.nan_to_num(sum((w * under.scores[0] for w, under in terms), np.zeros(len(wide)))),
+            np.nan_to_num(sum((w * under.scores[0] for w, under in terms), np.zeros(len(widths)))),
         )
         pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
-        turning = sum(weight * of.minimum(chains) for weight, of in self._turning)
+        turning = sum(weight * inertia_bound.minimum(chains) for weight, inertia_bound in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
-            pull = wide
-        return self._constant + turning + bound, int(np.argmax(pull + _SAME * wide))
+            pull = widths
+        return self._constant + turning + bound, int(np.argmax(pull + _SAME * widths))
 
     def _lines_at(self, loads: PointLoads) -> _Lines:
-        """Return the orders that count anywhere in the bounds, judged at their middle and corners."""
+        """Return the orders that contribute anywhere in the bounds, judged at their middle and corners."""
         coordinates, speed = self.coordinates, loads.point.speed
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
         middle = 0.5 * (coordinates.lower + coordinates.upper)
@@ -194,7 +196,7 @@ class TwistBoxes:
         chain = coordinates.chain(middle)
         drives = np.zeros((len(orders), len(chain.discs) + len(chain.absorbers)), dtype=complex)
         drives[:, : len(chain.discs)] = torques.coefficients[counted]
-        at = dynamic_stiffness(chain, orders, speed)
+        middle_stiffness = dynamic_stiffness(chain, orders, speed)
         sides = []
         for k in range(len(middle)):
             # affine, so that the whole width tells the slope without a rounding
@@ -204,12 +206,23 @@ class TwistBoxes:
             low, high = (dynamic_stiffness(coordinates.chain(x), orders, speed) for x in ends)
             sides.append((high - low) / (coordinates.upper[k] - coordinates.lower[k]))
         highest = len(torques.coefficients) - 1
-        twisted = _twist_of(len(chain.sections), at.shape[-1])
+        twisted = _twist_of(len(chain.sections), middle_stiffness.shape[-1])
         along = directions_of([
-            [*side.real, *side.imag, of[:, None] * twisted] for side, of in zip(sides, coordinates.owners, strict=True)
+            [*side.real, *side.imag, row[:, None] * twisted]
+            for side, row in zip(sides, coordinates.owners, strict=True)
         ])  # fmt: skip
         inside = along.inside(np.moveaxis(np.array(sides), 0, 1))
-        return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides), along, inside)
+        return _Lines(
+            loads,
+            highest,
+            orders,
+            drives,
+            torques.coefficients[0].real,
+            middle_stiffness,
+            np.array(sides),
+            along,
+            inside,
+        )
 
     def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
         root = np.sqrt(inertias(chain))
@@ -222,7 +235,7 @@ class TwistBoxes:
         return series(centre[None], half[None], inverse[None], along, lines.inside, angles[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> LinearBound:
-        """Return a linear function under a root mean square over orders, sections and operating points."""
+        """Return a linear lower bound of an RMS over orders, sections and operating points."""
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
         chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)
@@ -243,38 +256,45 @@ class TwistBoxes:
     def _alternating(
         self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
     ) -> LinearResponse:
-        """Return the signal of the chosen sections in every order but zero, over a box."""
+        """Return the response of the chosen sections over a box, in every order but zero."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
         twisted = _twist_of(len(chains[1].sections), len(root))
         scaled = twisted / root
-        low, here, high = (factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains)
+        low, centre, high = (factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains)
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
-        turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))[..., 0]
+        turn, bend = 0.5 * (high - low), np.abs(centre - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
         # in coordinates of the discs: a section turns along what its stiffness moves
         slopes = owners * turn[:, None] * twisted[chosen]
-        answer = mapped(twist, (here * scaled[chosen])[None], lines.along.along(slopes)[None])
+        answer = mapped(twist, (centre * scaled[chosen])[None], lines.along.along(slopes)[None])
         if not bend.any():
             return answer
         moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
-        alone = mapped(twist, moved)
-        maximum = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.remainder[..., None]
+        twist_response = mapped(twist, moved)
+        maximum = (
+            np.abs(twist_response.value)
+            + np.abs(twist_response.slopes).sum(axis=2)
+            + twist_response.remainder[..., None]
+        )
         return replace(
             answer, remainder=answer.remainder + np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1)
         )
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
-        low, here, high = (
+        low, centre, high = (
             ((receptances(chain, zero, speed)[0] @ lines.mean) * factors(chain, zero, speed)[0])[chosen]
             for chain in chains
         )
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
-        rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
-        return LinearResponse(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
+        rest = np.array([[float(np.linalg.norm(centre - 0.5 * (high + low)))]])
+        return LinearResponse(centre[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
 
     def _overheats(self, limit: Limit, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> bool:
-        """Return whether an absorber gives off too much all over a box: its loss for a swing is least at low ends."""
+        """Return True if an absorber exceeds its heat limit all over a box.
+
+        The loss per swing is smallest at the lower ends.
+        """
         root = np.sqrt(inertias(chains[1]))
         for lines, twist in zip(self._lines, twists, strict=True):
             point = lines.loads.point

@@ -1,4 +1,4 @@
-"""Channels of the crankshaft's twist (V4-V12)."""
+"""Channels of torsional vibration: twist, torque and stress of shafts, frequencies, heat of absorbers (V4-V12)."""
 
 from __future__ import annotations
 

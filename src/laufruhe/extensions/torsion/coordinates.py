@@ -1,4 +1,4 @@
-"""What is open of the crankshaft, in coordinates that its dynamic stiffness is affine in (V13)."""
+"""Coordinates of the open numbers of the crankshaft, in which its dynamic stiffness is affine (V13)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class TwistCoordinates:
 
     @cached_property
     def is_exact(self) -> bool:
-        """Return whether stress bends one way with every stiffness; viscous damping of an open diameter spoils it."""
+        """True if stress is monotone in every stiffness: no open diameter has viscous damping."""
         return all(section.damping == 0.0 for _, section in self._round)
 
     @property
@@ -44,14 +44,14 @@ class TwistCoordinates:
         return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 
     def from_decisions(self, values: Array) -> Array:
-        """Return the coordinates of decisions, shape (n,)."""
+        """Return the coordinates for given decisions, shape (n,)."""
         coordinates = np.array(values, dtype=float)
         for k, section in self._round:
             coordinates[k] = section.moved(section.stiffness, float(values[k])).stiffness
         return coordinates
 
     def decisions(self, coordinates: Array) -> Array:
-        """Return the decisions at coordinates, shape (n,)."""
+        """Return the decisions for given coordinates, shape (n,)."""
         values = np.array(coordinates, dtype=float)
         for k, section in self._round:
             diameter = section.diameter or 0.0
@@ -61,11 +61,11 @@ class TwistCoordinates:
         return np.asarray(np.clip(values, low, high))
 
     def chain(self, coordinates: Array) -> Torsion:
-        """Return the chain at coordinates."""
+        """Return the chain for given coordinates."""
         return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
 
     def ends(self, lower: Array, upper: Array, resonance: Resonance) -> tuple[Torsion, Torsion] | None:
-        """Return the chains of the lowest and the highest modes in a box, None where no corner is known (V15)."""
+        """Return the chains with the lowest and the highest modes in a box; None if no corner has them (V15)."""
         absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
         falls = np.zeros(len(lower), dtype=bool)
         for k, keys in enumerate(self._keys):

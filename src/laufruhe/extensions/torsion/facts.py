@@ -1,4 +1,4 @@
-"""What tables, files and pictures show of the twist of the crankshaft: modes, critical speeds, response over speed."""
+"""Torsional data for tables, files and pictures: modes, critical speeds, and torque over speed."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ _HALVINGS = 10
 
 @dataclass(frozen=True)
 class Critical:
-    """A speed at which an order meets a natural frequency.
+    """Crank speed at which an order meets a natural frequency.
 
     Attributes
     ----------
     speed
         Crank speed [rad/s].
     mode
-        Among those that the order meets, 1 is the lowest.
+        Number of the mode among those that the order meets; 1 is the lowest.
     vector_sum
         Vector sum of this order and mode (V6).
     is_main
-        True if no firing order changes that.
+        True if the vector sum is the same for every firing order.
     torque
-        Largest amplitude of this order in any section at that speed [N m]; None where nothing damps it.
+        Largest amplitude of this order in any section at that speed [N m]; None without damping.
     """
 
     speed: float
@@ -65,7 +65,7 @@ class Critical:
 
 @dataclass(frozen=True)
 class Barred:
-    """Speeds at which a limit of the twist is exceeded [rad/s]."""
+    """Range of crank speeds in which a limit is exceeded [rad/s]."""
 
     limit: str
     lowest: float
@@ -79,13 +79,13 @@ class TorsionFacts:
     Attributes
     ----------
     modes
-        Modes at the highest operating point, which the springs of pendulums need.
+        Modes at the highest operating speed, which sets the stiffness of pendulums.
     orders, met, sums
         Orders up to the highest that counts, the modes that each meets, and their vector sums.
     main
         Main orders among them.
     criticals
-        Between the speeds looked at, the largest torque first.
+        Critical speeds in the speed range, the largest torque first.
     """
 
     modes: TorsionalModes
@@ -97,12 +97,12 @@ class TorsionFacts:
 
 
 def is_twisted(result: Result) -> bool:
-    """Return whether the crankshaft of this result has discs and shafts."""
+    """Return True if the crankshaft of this result has discs and shafts."""
     return has_torsion(result.problem.engine, result.problem.fidelity)
 
 
 def speed_range(result: Result) -> tuple[float, float]:
-    """Return the speeds looked at [rad/s]: those of the file, or from under to over the operating points."""
+    """Return the shown speed range [rad/s]: that of the file, or one around the operating points."""
     limits = chain_of(result.final.engine).speeds
     speeds = [point.speed for point in result.problem.points]
     return limits or (_SLOWEST * min(speeds), _FASTEST * max(speeds))
@@ -110,7 +110,7 @@ def speed_range(result: Result) -> tuple[float, float]:
 
 @lru_cache(maxsize=8)
 def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
-    """Return modes, vector sums and the critical speeds between two [rad/s]."""
+    """Return modes, vector sums, and the critical speeds between two crank speeds [rad/s]."""
     engine, chain = design.engine, chain_of(design.engine)
     fastest = max((loads.point for loads in design.loads), key=lambda point: point.speed)
     modes, turns = natural_modes(chain, fastest.speed), engine.cycle.turns
@@ -122,13 +122,13 @@ def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
         for m, (frequency, weight) in enumerate(zip(modes_at.frequencies, weights, strict=True)):
             speed = critical_speed(float(frequency), order)
             if low <= speed <= high:
-                torque = _torque_there(design, replace(fastest, speed=speed), order)
+                torque = _torque_at_critical_speed(design, replace(fastest, speed=speed), order)
                 criticals.append(Critical(speed, order, m + 1, float(weight), order in main, torque))
-    criticals.sort(key=lambda each: -np.inf if each.torque is None else -each.torque)
+    criticals.sort(key=lambda entry: -np.inf if entry.torque is None else -entry.torque)
     return TorsionFacts(modes, orders, met, sums, main, tuple(criticals))
 
 
-def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> float | None:
+def _torque_at_critical_speed(design: Evaluation, point: OperatingPoint, order: float) -> float | None:
     chain, torques = chain_of(design.engine), throw_torques(design.engine, point, design.fidelity)
     try:
         flexible = receptances(chain, np.array([order]), point.speed)[0]
@@ -139,13 +139,16 @@ def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> fl
 
 
 def speeds_between(design: Evaluation, low: float, high: float) -> Array:
-    """Return even steps of speed, with the critical speeds, where peaks stand."""
-    critical = [one.speed for one in facts_of(design, low, high).criticals]
+    """Return equally spaced crank speeds [rad/s] and the critical speeds between two speeds."""
+    critical = [entry.speed for entry in facts_of(design, low, high).criticals]
     return np.unique([*np.linspace(low, high, SPEEDS), *critical])
 
 
 def torque_over_speed(design: Evaluation, speeds: Array) -> Array:
-    """Return half the peak to peak torque in every section at the point with most load, shape (speeds, sections)."""
+    """Return half the peak to peak torque [N m] by section, shape (speeds, sections).
+
+    The load is that of the operating point with the largest mean torque.
+    """
     points = [loads.point for loads in design.loads]
     means = [throw_torques(design.engine, point, design.fidelity).coefficients[0].real.sum() for point in points]
     point = points[int(np.argmax(means))]
@@ -160,7 +163,7 @@ def torque_over_speed(design: Evaluation, speeds: Array) -> Array:
 
 
 def barred_ranges(result: Result, design: Evaluation) -> tuple[Barred, ...]:
-    """Return the speeds at which the design breaks a limit of its twist, each end found by halving."""
+    """Return the speed ranges in which the design breaks a limit on twist, torque or stress; ends by bisection."""
     return _barred(design, result.problem.limits, *speed_range(result))
 
 
@@ -175,7 +178,7 @@ def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: flo
 
 
 def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
-    """Return a function that says if the limit is broken at a speed, under the load of any point that counts."""
+    """Return a function that tests at a speed [rad/s] if the limit is broken, for the load of any of its points."""
     counted = [load for load in design.loads if limit.measure.includes_point(load.point)]
     # points that differ in their speed alone are one
     loads = {load.point.gas: load for load in counted}.values()

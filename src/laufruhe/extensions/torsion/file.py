@@ -211,7 +211,7 @@ def _section(
     shaft: SectionTable, table: TorsionTable, where: str, stiffness_given: float | Open | None, name: str,
     links: Sequence[str], open_numbers: _OpenNumbers,
 ) -> list[ShaftSection]:  # fmt: skip
-    """Shafts that are alike, by the names of what they join."""
+    """Return equal sections of shaft, named after the discs that they join."""
     require_one_of(shaft, where, "stiffness", "pieces")
     diameter, bore, length = shaft.diameter, shaft.bore, None
     if stiffness_given is not None:
@@ -276,7 +276,7 @@ def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]
 
 
 def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Problem, where: str) -> None:
-    """Refuse an inertia of all that turns that the discs contradict (V14)."""
+    """Refuse a rotating inertia that contradicts the discs (V14)."""
     wheel = problem.engine.flywheel
     if wheel is None:
         return

@@ -1,4 +1,4 @@
-"""The crankshaft as discs on shafts without mass, and the absorbers that hang on it."""
+"""Crankshaft as discs on massless shafts, with absorbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Kind
 
 TORSION = Kind(8, "torsion", "discs and shafts of the crankshaft", is_alone=True)
-"""Numbers that nothing but the twist of the crankshaft and the inertia of all that turns depends on."""
+"""Decisions that change only the twist of the crankshaft and the rotating inertia."""
 
 STEEL = 80e9
 """Shear modulus of a shaft [Pa] where none is given."""
@@ -25,16 +25,16 @@ STEEL = 80e9
 
 @dataclass(frozen=True)
 class Disc:
-    """A disc that turns with the crankshaft.
+    """Disc that turns with the crankshaft.
 
     Attributes
     ----------
     inertia
-        Of all that turns with it, the mean of its pistons and rods included [kg m2] (V1).
+        Inertia of all parts that turn with it, with the mean inertia of its pistons and rods [kg m2] (V1).
     damping
-        Viscous, against the block [N m s/rad].
+        Viscous damping against the block [N m s/rad].
     cylinders
-        Names of the slider-cranks that drive it; none of a pulley or flywheel.
+        Names of the slider-cranks that drive it; empty for a pulley or a flywheel.
     """
 
     name: str
@@ -51,22 +51,22 @@ class Disc:
 
 @dataclass(frozen=True)
 class ShaftSection:
-    """A shaft without mass from each disc to the next.
+    """Massless shaft between two discs.
 
     Attributes
     ----------
     stiffness
-        [N m/rad].
+        Torsional stiffness [N m/rad].
     damping
-        Viscous, of its twist [N m s/rad].
+        Viscous damping of its twist [N m s/rad].
     loss_factor
-        Hysteretic: its stiffness is k (1 + i eta).
+        Hysteretic loss factor eta: the stiffness is k (1 + i eta).
     diameter, bore
-        Size of its weakest place [m]; needed for a stress only.
+        Outer and inner diameter of the weakest cross-section [m]; needed for stresses only.
     length
         Length of one round piece, whose stiffness follows from its diameter [m]; else None.
     shear_modulus
-        [Pa].
+        Shear modulus [Pa].
     """
 
     name: str
@@ -103,7 +103,7 @@ class ShaftSection:
 
 @dataclass(frozen=True)
 class Absorber:
-    """Ring that hangs on a disc, and takes up swings that the shaft is spared.
+    """Ring or pendulum on a disc, which absorbs its vibration.
 
     Attributes
     ----------
@@ -225,8 +225,13 @@ class Torsion(Extra):
                 absorbers=tuple(replace(a, **{key: numbers[a.name, key] for key in absorbed}) for a in self.absorbers),
             )
         if after != before:
-            more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
-            discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in chain.discs)
+            changes_of_inertia = {
+                a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)
+            }
+            discs = (
+                replace(d, inertia=d.inertia + sum(changes_of_inertia[name] for name in d.cylinders))
+                for d in chain.discs
+            )
             chain = replace(chain, discs=tuple(discs))
         return chain
 
@@ -241,7 +246,7 @@ class Torsion(Extra):
         return [*(disc.name for disc in self.discs), *(section.name for section in self.sections)]
 
     def scaled(self, length: float, mass: float) -> Self:
-        """The same in another size and of the same material: stiffness grows as the cube of length."""
+        """Return the chain in another size, of the same material: stiffness grows as the cube of length."""
         inertia, stiffness = mass * length**2, length**3
         damping = math.sqrt(inertia * stiffness)
         discs = (replace(d, inertia=d.inertia * inertia, damping=d.damping * damping) for d in self.discs)
@@ -259,7 +264,7 @@ class Torsion(Extra):
 
 
 def stiffness_of(pieces: Sequence[tuple[float, float, float]], shear_modulus: float = STEEL) -> float:
-    """Torsional stiffness of round pieces of shaft one behind another [N m/rad] (V2).
+    """Return the torsional stiffness of round pieces of shaft in series [N m/rad] (V2).
 
     Parameters
     ----------

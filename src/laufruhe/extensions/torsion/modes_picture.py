@@ -53,8 +53,8 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
     for m in range(min(MOST_MODES, facts.modes.shapes.shape[1])):
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
     axes.set(ylim=(-1.1, 1.1), ylabel="angle, scaled to 1")
-    every = -(-len(names) // MOST_NAMES)
-    labels = [fit_line(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
+    step = -(-len(names) // MOST_NAMES)
+    labels = [fit_line(name, 1.1) if k % step == 0 else "" for k, name in enumerate(names)]
     axes.set_xticks(list(places), labels, rotation=60, ha="right", rotation_mode="anchor")
 
 
@@ -90,9 +90,9 @@ def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:
     # names of orders where they leave the panel, above it or to its right, apart from each other
     above = [order for order in orders if order * high / math.tau > reach]
     right = [order for order in orders if order not in above]
-    wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
-    across = spread(np.array([math.tau * reach / (order * high) for order in above]), 0.3 / wide)
-    up = spread(np.array([order * high / (math.tau * reach) for order in right]), 0.15 / tall)
+    width, height = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
+    across = spread(np.array([math.tau * reach / (order * high) for order in above]), 0.3 / width)
+    up = spread(np.array([order * high / (math.tau * reach) for order in right]), 0.15 / height)
     look: Any = {"textcoords": "axes fraction", "xycoords": "axes fraction", "size": SMALL, "annotation_clip": False}
     for order, place in zip(above, across, strict=True):
         axes.annotate(f"{order:g}", (place, 1.0), (place, 1.01), ha="center", va="bottom", color=INK, **look)

@@ -28,7 +28,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.torque import cylinder_torque
 
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
-"""Of a chain, by order [1] and speed [rad/s] what each section makes of its twist, shape (orders, sections)."""
+"""Function of chain, orders and crank speed [rad/s]; returns load over twist, shape (orders, sections)."""
 
 _SINGULAR = 1e-13
 _FREE = 1e-9
@@ -36,26 +36,26 @@ _NONE = 1e-13
 
 
 class Resonance(Protocol):
-    """A speed or an order that natural modes are of."""
+    """Crank speed or order for which natural modes are computed."""
 
     def numbers(self, chain: Torsion) -> Array:
-        """Return a number of every mode, rising, shape (modes,)."""
+        """Return the resonance number of every mode in ascending order, shape (modes,)."""
 
     def inertia(self, chain: Torsion) -> Array:
-        """Return the inertia of discs and rings [kg m2], shape (discs and rings, discs and rings)."""
+        """Return the inertia matrix of discs and rings [kg m2], shape (discs and rings, discs and rings)."""
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return the inertia that a disc feels of one of its ring, None where it is no constant."""
+        """Return the effective inertia of a ring at its disc over its own inertia; None if it is not constant."""
 
 
 @dataclass(frozen=True)
 class AtSpeed:
-    """Natural frequencies [Hz] about a speed [rad/s], which is the spring of a pendulum (V4, V11)."""
+    """Natural frequencies [Hz] at a crank speed [rad/s], which sets the stiffness of pendulums (V4, V11)."""
 
     speed: float
 
     def modes(self, chain: Torsion) -> TorsionalModes:
-        """Return them."""
+        """Return the modes at this crank speed."""
         return _modes(chain, self.inertia(chain), [absorber.stiffness_at(self.speed) for absorber in chain.absorbers])
 
     def numbers(self, chain: Torsion) -> Array:
@@ -63,22 +63,22 @@ class AtSpeed:
         return self.modes(chain).frequencies
 
     def inertia(self, chain: Torsion) -> Array:
-        """Return each its own [kg m2]."""
+        """Return the diagonal inertia matrix [kg m2]."""
         return np.diag(inertias(chain))
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return one; a pendulum has a spring that grows with its inertia."""
+        """Return 1; None for a pendulum, whose stiffness grows with its inertia."""
         return None if absorber.order else 1.0
 
 
 @dataclass(frozen=True)
 class InOrder:
-    """Speeds [rad/s] at which an order meets a natural mode: a pendulum is an inertia J / (1 - h^2/n^2) (V15)."""
+    """Crank speeds [rad/s] at which an order meets a mode; a pendulum is an inertia J / (1 - h^2/n^2) (V15)."""
 
     order: float
 
     def modes(self, chain: Torsion) -> TorsionalModes:
-        """Return the modes met."""
+        """Return the modes that the order meets."""
         return _modes(chain, self.inertia(chain), [absorber.stiffness for absorber in chain.absorbers])
 
     def numbers(self, chain: Torsion) -> Array:
@@ -86,23 +86,23 @@ class InOrder:
         return np.asarray(math.tau * self.modes(chain).frequencies / self.order)
 
     def inertia(self, chain: Torsion) -> Array:
-        """Return J - (n/h)^2 J of a pendulum between its ring and its disc [kg m2] (V15)."""
+        """Return the inertia matrix [kg m2], with J - (n/h)^2 J for each pendulum between ring and disc (V15)."""
         pulls = [(chain.index(a.on), k, complex(a.inertia * (a.order / self.order) ** 2)) for k, a in _rings(chain)]
         return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return 1 / (1 - h^2/n^2) of a pendulum, nothing where its disc stands still."""
+        """Return 1 / (1 - h^2/n^2) for a pendulum; 0 if the order equals its tuning, at which the disc stands still."""
         if not absorber.order:
             return 1.0
         if absorber.stiffness:
             return None
-        rest = 1.0 - (self.order / absorber.order) ** 2
-        return 1.0 / rest if rest else 0.0
+        denominator = 1.0 - (self.order / absorber.order) ** 2
+        return 1.0 / denominator if denominator else 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class TorsionalModes:
-    """Undamped natural modes, the lowest first, rigid turning left out (V4).
+    """Undamped natural modes, the lowest first, without rigid rotation (V4).
 
     Attributes
     ----------
@@ -120,17 +120,17 @@ class TorsionalModes:
 
 
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
-    """Return the undamped modes about a speed [rad/s], which is the spring of a pendulum (V4)."""
+    """Return the undamped modes at a crank speed [rad/s], which sets the stiffness of pendulums (V4)."""
     return AtSpeed(speed).modes(chain)
 
 
 def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
-    """Return the undamped modes that an order meets, each at its own speed (V15)."""
+    """Return the undamped modes that an order meets, each at its critical speed (V15)."""
     return InOrder(order).modes(chain)
 
 
 def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
-    """Solve K q = (2 pi f)^2 J q for the twists of all links, of which some have no stiffness (V4)."""
+    """Solve K q = (2 pi f)^2 J q in the twists of all links, some of which may have no stiffness (V4)."""
     ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
     stiff = np.array([*(section.stiffness for section in chain.sections), *fixed])
     twists = np.zeros((len(ends) + 1, len(inertia)))
@@ -139,16 +139,16 @@ def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalM
     # nothing outside turns it: links pull nothing on the whole
     twists[-1] = inertia.sum(axis=0)
     angles = np.linalg.inv(twists)[:, :-1]
-    mass, stands = angles.T @ inertia @ angles, stiff > 0.0
+    mass, has_stiffness = angles.T @ inertia @ angles, stiff > 0.0
     # a link without stiffness twists until it carries no torque
-    loose = np.linalg.solve(mass[np.ix_(~stands, ~stands)], mass[np.ix_(~stands, stands)])
-    root = np.sqrt(stiff[stands])
-    reduced = mass[np.ix_(stands, stands)] - mass[np.ix_(stands, ~stands)] @ loose
+    loose = np.linalg.solve(mass[np.ix_(~has_stiffness, ~has_stiffness)], mass[np.ix_(~has_stiffness, has_stiffness)])
+    root = np.sqrt(stiff[has_stiffness])
+    reduced = mass[np.ix_(has_stiffness, has_stiffness)] - mass[np.ix_(has_stiffness, ~has_stiffness)] @ loose
     inverse, shapes = np.linalg.eigh(reduced / np.outer(root, root))
     # an inertia that is negative in its order has no frequency
     real = inverse > _NONE * np.abs(inverse).max()
     shapes = shapes[:, real][:, ::-1] / root[:, None]
-    shapes = angles[:, stands] @ shapes - angles[:, ~stands] @ (loose @ shapes)
+    shapes = angles[:, has_stiffness] @ shapes - angles[:, ~has_stiffness] @ (loose @ shapes)
     count = len(chain.discs)
     shapes = shapes / shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
     # upright at the front
@@ -157,10 +157,10 @@ def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalM
 
 
 def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) -> Array:
-    """|sum_k a_k e^{-i h phi_k}| over the cylinders, shape (orders, modes) (V6; textbook 2.9).
+    """Return |sum_k a_k e^{-i h phi_k}| over the cylinders, shape (orders, modes) (V6; textbook 2.9).
 
-    phi_k is when cylinder k fires, a_k how far its throw swings in the mode: work that equal
-    cylinders put into it in that order, over that of one where the mode is largest.
+    phi_k is the firing angle of cylinder k, a_k the amplitude of its throw in the mode. The sum is the
+    work of all cylinders over that of one cylinder at the largest amplitude.
     """
     swings, fires = [], []
     for disc, shape in zip(chain_of(engine).discs, modes.shapes, strict=True):
@@ -174,13 +174,13 @@ def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) 
 
 
 def main_orders(engine: Engine, highest: float) -> tuple[float, ...]:
-    """Orders in which all cylinders work together, multiples of z/2 or z: the same for every firing order (V7)."""
+    """Return the orders in which all cylinders act in phase: multiples of z/2 or z, for any firing order (V7)."""
     first = len(engine.cylinders) / engine.cycle.turns
     return tuple(k * first for k in range(1, int(highest / first + 1e-9) + 1))
 
 
 def critical_speed(frequency: float, order: float) -> float:
-    """Crank speed [rad/s] at which an order meets a natural frequency [Hz], 60 f / h in rpm (V6)."""
+    """Return the crank speed [rad/s] at which an order meets a natural frequency [Hz] (V6)."""
     return math.tau * frequency / order
 
 
@@ -199,7 +199,7 @@ def chain_of(engine: Engine) -> Torsion:
 
 
 def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
-    """Return whether the twist of the crankshaft is modelled: it has a chain, and an even speed."""
+    """Return True if twist is modelled: the crankshaft has a chain of discs, and its mean speed is constant."""
     return engine.extra(Torsion) is not None and not fidelity.is_uneven
 
 
@@ -228,7 +228,7 @@ def _throw_torques(
     point: OperatingPoint,
     fidelity: Fidelity,
 ) -> Spectrum:
-    """Return the torque on discs that these cylinders drive, whatever else of a chain is open."""
+    """Return the torque on each disc from its cylinders, shape (n, discs) [N m]."""
     series = [
         (k, part, cylinder_torque(cycle, part, point, fidelity))
         for k, names in enumerate(driven) for part in parts if part.name in names
@@ -253,20 +253,20 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
         If an order stands on a natural frequency that nothing damps.
     """
     count, sections = len(chain.discs), np.arange(len(chain.sections))
-    out = np.zeros((len(orders), len(sections), count), dtype=complex)
+    flexibility = np.zeros((len(orders), len(sections), count), dtype=complex)
     is_mean = orders == 0.0
     # what drives in front of a section goes through it unless the load takes it there
     through = np.arange(count)[None, :] <= sections[:, None]
-    taken = (chain.driven <= sections)[:, None]
+    leaves_shaft = (chain.driven <= sections)[:, None]
     stiff = np.array([section.stiffness for section in chain.sections])
-    out[is_mean] = (through * 1.0 - taken) / stiff[:, None]
+    flexibility[is_mean] = (through * 1.0 - leaves_shaft) / stiff[:, None]
     if np.all(is_mean):
-        return out
+        return flexibility
     size = count + len(chain.absorbers)
     drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~is_mean)), 1, 1))
     angles = _solved(chain, orders[~is_mean], speed, drives)[:, :count, :count]
-    out[~is_mean] = angles[:, :-1] - angles[:, 1:]
-    return out
+    flexibility[~is_mean] = angles[:, :-1] - angles[:, 1:]
+    return flexibility
 
 
 def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
@@ -278,7 +278,7 @@ def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArr
 
 
 def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Angle of each section's front end before its rear end, shape (n, sections) [rad] (V5); its mean under way."""
+    """Return the twist of each section, front end minus rear end, shape (n, sections) [rad] (V5)."""
     torques, chain = throw_torques(engine, point, fidelity), chain_of(engine)
     angles = _angles(chain, torques, point.speed)[:, : len(chain.discs)]
     mean = receptances(chain, torques.orders[:1], point.speed)[0] @ torques.coefficients[0]
@@ -286,12 +286,12 @@ def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> 
 
 
 def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Torque in each section, shape (n, sections) [N m], towards the rear (V8)."""
+    """Return the torque in each section towards the rear, shape (n, sections) [N m] (V8)."""
     return times(twist(engine, point, fidelity), section_stiffness, chain_of(engine), point.speed)
 
 
 def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Shear stress of every section that has a diameter, shape (n, those sections) [Pa] (V8; textbook 2.9)."""
+    """Return the shear stress of every section with a diameter, shape (n, sections with diameter) [Pa] (V8)."""
     chain = chain_of(engine)
     sized = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
     stress = times(twist(engine, point, fidelity), stress_factors, chain, point.speed)
@@ -299,7 +299,7 @@ def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def times(twisted: Spectrum, factors: Factors, chain: Torsion, speed: float) -> Spectrum:
-    """Return a twist times the factor of each section in each order."""
+    """Return the spectrum of a twist times the factor of each section in each order."""
     return Spectrum(twisted.base, twisted.coefficients * factors(chain, twisted.orders, speed))
 
 
@@ -315,7 +315,7 @@ def stress_factors(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
 
 
 def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
-    """Return the power that each absorber turns to heat, shape (absorbers,) [W] (V12)."""
+    """Return the mean power dissipated in each absorber, shape (absorbers,) [W] (V12)."""
     chain, torques = chain_of(engine), throw_torques(engine, point, fidelity)
     orders, count = torques.orders[1:], len(chain.discs)
     angles = _angles(chain, torques, point.speed)
@@ -327,7 +327,7 @@ def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
 
 
 def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """Return K + i H + i h w C - (h w)^2 J in every order, affine in inertia, stiffness and damping (V5)."""
+    """Return K + i H + i h w C - (h w)^2 J by order [N m/rad], affine in inertia, stiffness and damping (V5)."""
     rate = (orders * speed)[:, None, None]
     dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(inertias(chain))
     return np.asarray(dynamic)
@@ -340,7 +340,7 @@ def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
 
 
 def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -> ComplexArray:
-    """Return angles under torques of every order but zero, shapes (orders, discs and rings, columns)."""
+    """Return the angles [rad] under torques [N m], orders above zero, shapes (orders, discs and rings, columns)."""
     dynamic = dynamic_stiffness(chain, orders, speed)
     try:
         angles = np.linalg.solve(dynamic, drives)
@@ -358,7 +358,7 @@ def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -
 
 
 def inertias(chain: Torsion) -> Array:
-    """Return the inertias of discs and rings [kg m2]."""
+    """Return the inertias of discs and rings, shape (discs and rings,) [kg m2]."""
     return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
 
 
@@ -382,13 +382,13 @@ def _rings(chain: Torsion) -> list[tuple[int, Absorber]]:
 
 def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> ComplexArray:
     count = len(chain.discs) + len(chain.absorbers)
-    out = np.zeros((count, count), dtype=complex)
+    matrix = np.zeros((count, count), dtype=complex)
     for a, b, value in links:
-        out[a, a] += value
-        out[b, b] += value
-        out[a, b] -= value
-        out[b, a] -= value
-    return out
+        matrix[a, a] += value
+        matrix[b, b] += value
+        matrix[a, b] -= value
+        matrix[b, a] -= value
+    return matrix
 
 
 def _driving(engine: Engine, names: Sequence[str]) -> list[SliderCrank]:

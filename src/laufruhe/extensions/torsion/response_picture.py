@@ -28,17 +28,17 @@ def figure(result: Result) -> Figure:
     drawn = page(1, 1, (7.6, 3.6))
     (axes,) = drawn.panels
     series = series_of(result)
-    torques = [torque_over_speed(one.design, speeds) for one in series]
+    torques = [torque_over_speed(item.design, speeds) for item in series]
     for curve in torques[-1].T:
         axes.plot(speeds * RPM, curve, color=FAINT, linewidth=0.6, alpha=0.7, zorder=1.5)
     legend: list[Artist] = []
     names = [section.name for section in chain_of(result.final.engine).sections]
-    for one, torque in zip(series, torques, strict=True):
+    for item, torque in zip(series, torques, strict=True):
         largest = torque.max(axis=1)
-        axes.plot(speeds * RPM, largest, color=one.colour, linewidth=1.8)
+        axes.plot(speeds * RPM, largest, color=item.colour, linewidth=1.8)
         k = int(np.argmax(np.where(np.isfinite(largest), largest, 0.0)))
         worst = f": at most {number(float(largest[k]), 3)} N m at {number(speeds[k] * RPM, 3)} rpm"
-        legend.append(one.entry(f"{worst}, {names[int(np.argmax(torque[k]))]}"))
+        legend.append(item.entry(f"{worst}, {names[int(np.argmax(torque[k]))]}"))
     legend.append(entry("each section, last design" if len(series) > 1 else "each section", color=FAINT, linewidth=0.6))
     bars = barred_ranges(result, result.final)
     for curve in bars:

@@ -1,4 +1,4 @@
-"""Natural modes of the crankshaft's twist, the speeds at which orders meet them, and speeds that are barred."""
+"""Report section on torsional vibration: natural modes, critical speeds and barred speed ranges of the crankshaft."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ def _modes(result: Result, facts: TorsionFacts) -> Table:
     modes = range(min(MOST_MODES, len(facts.modes.frequencies)))
     swings = [[fixed(swing, 3, "+") for swing in shape] for shape in facts.modes.shapes.T]
     rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in modes)
-    rest = len(facts.modes.frequencies) - len(modes)
-    more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
-    note = f"Undamped modes. Angle of every disc, scaled to 1 at the largest of each mode.{more}"
+    omitted = len(facts.modes.frequencies) - len(modes)
+    remark = f" {counted(omitted, 'higher mode')} in result.json." if omitted else ""
+    note = f"Undamped modes. Angle of every disc, scaled to 1 at the largest of each mode.{remark}"
     return Table(
         ("mode", "Hz", *names), rows, title="Natural modes of the crankshaft", note=note, file="crankshaft-modes"
     )
@@ -51,9 +51,9 @@ def _modes(result: Result, facts: TorsionFacts) -> Table:
 
 def _criticals(facts: TorsionFacts, design: str) -> Table:
     rows = tuple(
-        (number(one.speed * RPM), f"{one.order:g}" + (" main" if one.is_main else ""), f"{one.mode}",
-         number(one.vector_sum, 3, 1.0), DASH if one.torque is None else number(one.torque))
-        for one in facts.criticals[:MOST_CRITICALS]
+        (number(entry.speed * RPM), f"{entry.order:g}" + (" main" if entry.is_main else ""), f"{entry.mode}",
+         number(entry.vector_sum, 3, 1.0), DASH if entry.torque is None else number(entry.torque))
+        for entry in facts.criticals[:MOST_CRITICALS]
     )  # fmt: skip
     main = ", ".join(f"{order:g}" for order in facts.main)
     note = (
@@ -97,9 +97,10 @@ def _record(result: Result) -> Mapping[str, Any]:
              "main": critical.is_main, "torque": critical.torque}
             for critical in facts.criticals
         ],
-        "barred": [asdict(critical) for critical in barred_ranges(result, design)],
+        "barred": [asdict(barred) for barred in barred_ranges(result, design)],
         "absorbers": [
-            {"name": critical.name, "heat": [float(at[k]) for at in heat]} for k, critical in enumerate(chain.absorbers)
+            {"name": absorber.name, "heat": [float(power[k]) for power in heat]}
+            for k, absorber in enumerate(chain.absorbers)
         ],
     }  # fmt: skip
 

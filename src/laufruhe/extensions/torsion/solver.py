@@ -1,4 +1,4 @@
-"""Deciding discs, shafts and absorbers of the crankshaft: local programs from many starts, and boxes (V13)."""
+"""Method for discs, shafts and absorbers of the crankshaft: multistart search and branch and bound (V13)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MOST_OPEN, MOST_BOXES = 3, 3000
 
 
 def solve_torsion(problem: Problem) -> Result:
-    """The best discs, shafts and absorbers found, with what boxes prove; or the limits that none keeps.
+    """Return the best discs, shafts and absorbers found, with the bound of the boxes, or a proven conflict of limits.
 
     Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. What else
     is asked has a bound by these in it alone.

@@ -63,16 +63,16 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
     places = np.array([k - part[0] + (0.3 if k == all_mounts and len(part) > 1 else 0.0) for k in part])
     # least height of a bar with a number inside
     room = 0.18 * axes.figure.dpi / axes.bbox.height * factor * top
-    for k, (table, one) in enumerate(zip(values, series, strict=True)):
+    for k, (table, item) in enumerate(zip(values, series, strict=True)):
         mean, maximum = factor * table[:, part]
         at = places + (k - 0.5 * (len(values) - 1)) * (WIDTH + 0.04)
-        axes.bar(at, mean, WIDTH, color=one.colour, linewidth=0, label="mean")
-        axes.bar(at, maximum, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
+        axes.bar(at, mean, WIDTH, color=item.colour, linewidth=0, label="mean")
+        axes.bar(at, maximum, WIDTH, facecolor="none", edgecolor=item.colour, linewidth=1.4, label="maximum")
         for x, low, high in zip(at, mean, maximum, strict=True):
             words = number(high, 3, factor * top)
             axes.annotate(words, (x, high), (0, 2), textcoords="offset points", ha="center", size=SMALL, color=INK)
             if low > room:
-                inside: Any = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(one.colour)}
+                inside: Any = {"ha": "center", "va": "top", "size": SMALL, "color": ink_on(item.colour)}
                 axes.annotate(number(low, 3, factor * top), (x, low), (0, -2), textcoords="offset points", **inside)
     axes.set_xticks(places)
     if all_mounts in part and len(part) > 1:

@@ -43,7 +43,7 @@ def figure(result: Result) -> Figure:
     # the operating point with the largest force on a bearing
     k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))
     series = series_of(result, loads=True)
-    planes = [bearing_paths(one.design, k) for one in series]
+    planes = [bearing_paths(item.design, k) for item in series]
     names = BEARINGS.channel.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
     chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
@@ -58,20 +58,20 @@ def figure(result: Result) -> Figure:
             if column >= len(chunk):
                 axes.remove()
                 continue
-            m, seen = chunk[column], turned if on_crank else 1.0
-            _draw(axes, [factor * plane[:, m] * seen for plane in planes], series, factor * largest / FILLED)
+            m, turn = chunk[column], turned if on_crank else 1.0
+            _draw(axes, [factor * plane[:, m] * turn for plane in planes], series, factor * largest / FILLED)
             # under the panel of its bearing
             name = "on the crankshaft" if on_crank else f"bearing {names[m]}"
             axes.set_title(fit_line(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
             across, up = ("across", "along") if on_crank else ("lateral", "vertical")
             axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{up} [{unit}]")
             axes.tick_params(labelleft=column == 0, length=2)
-    some = f"The {len(chosen)} most loaded of {len(names)} bearings. " if len(chosen) < len(names) else ""
+    selection = f"The {len(chosen)} most loaded of {len(names)} bearings. " if len(chosen) < len(names) else ""
     lines = f"Force of the crankshaft at {point_name(result, k)}, seen from the front; its axes stand upright at 0°."
     dot = entry_of_dots("at 0°", color=INK, markersize=4.0)
     wear: Artist = Patch(color=ORANGE, alpha=0.6, label="wear" + (", final design" if len(series) > 1 else ""))
-    legend = [*(one.entry() for one in series), dot, wear]
-    return finish_page(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
+    legend = [*(item.entry() for item in series), dot, wear]
+    return finish_page(drawn, result, "Main-bearing loads over one working cycle", lines, legend, selection)
 
 
 def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: float) -> None:
@@ -80,10 +80,10 @@ def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: fl
     axes.axvline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     for direction in (axes.xaxis, axes.yaxis):
         round_ticks(direction, 4, symmetric=True)
-    for path, one in zip(paths, series, strict=True):
+    for path, item in zip(paths, series, strict=True):
         closed = np.append(path, path[0])
-        axes.plot(closed.imag, closed.real, color=one.colour, linewidth=1.5, solid_joinstyle="round")
-        axes.plot(path[:1].imag, path[:1].real, "o", color=one.colour, markersize=4.0)
+        axes.plot(closed.imag, closed.real, color=item.colour, linewidth=1.5, solid_joinstyle="round")
+        axes.plot(path[:1].imag, path[:1].real, "o", color=item.colour, markersize=4.0)
     _wear(axes, paths[-1], size)
 
 

@@ -32,9 +32,15 @@ def figure(result: Result) -> Figure:
     limits = limits_on(result, channels.FREQUENCIES)
     bands = [limit.outside for limit in limits if limit.outside is not None]
     edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if math.isfinite(edge)]
-    known = [*facts.modes.frequencies, *facts.with_fluid, *edges, *(edge for band in bands for edge in band), 1e-9]
-    reach = 1.1 * float(max(known))
-    legend = _marked(axes, edges, bands)
+    frequencies = [
+        *facts.modes.frequencies,
+        *facts.with_fluid,
+        *edges,
+        *(edge for band in bands for edge in band),
+        1e-9,
+    ]
+    reach = 1.1 * float(max(frequencies))
+    legend = _draw_limits(axes, edges, bands)
     for k, order in enumerate(facts.orders):
         axes.plot([0.0, top * RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=STYLES[k], linewidth=1.4)
     axes.set(xlim=(0.0, top * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
@@ -66,7 +72,7 @@ def _modes(axes: Axes, facts: MountingFacts) -> None:
     label_lines(axes, facts.modes.frequencies.tolist(), names)
 
 
-def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
+def _draw_limits(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
     for band in bands:
         axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
     for edge in edges:

@@ -72,52 +72,52 @@ class Row:
 def figure(result: Result) -> Figure:
     """Draw a column per operating point; rows for shaking force, roll moment, rocking couple and every mount."""
     points, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
-    wide = {1: ALONE, 2: BESIDE}.get(len(points), NARROW)
+    width = {1: ALONE, 2: BESIDE}.get(len(points), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
     columns = [list(_rows(series, k, mounts)) for k in points]
-    every = list(zip(*columns, strict=True))
-    rows = [row for row in every if any(each.curves for each in row)]
-    balanced = [row for row in every if not any(each.curves for each in row)]
-    drawn = page(len(rows), len(points), (wide, HIGH), gap=GAP, lead=0.1, across=ACROSS)
+    all_rows = list(zip(*columns, strict=True))
+    rows = [row for row in all_rows if any(panel.curves for panel in row)]
+    balanced = [row for row in all_rows if not any(panel.curves for panel in row)]
+    drawn = page(len(rows), len(points), (width, HIGH), gap=GAP, lead=0.1, across=ACROSS)
     for j, row in enumerate(rows):
         panels = drawn.panels[j * len(points) : (j + 1) * len(points)]
-        _beside(panels, row, degrees, [one.colour for one in series])
+        _draw_row(panels, row, degrees, [item.colour for item in series])
         for axes in panels:
             axes.tick_params(labelbottom=j == len(rows) - 1, length=2)
     for column, k in enumerate(points):
         panels = drawn.panels[column :: len(points)]
-        _mark_firings(panels, result.final.engine, wide)
+        _mark_firings(panels, result.final.engine, width)
         panels[-1].set_xlabel("crank angle [°]")
         if len(points) > 1:
-            name = fit_line(result.problem.points[k].name, wide, 10)
+            name = fit_line(result.problem.points[k].name, width, 10)
             panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10)
     align_labels(drawn.panels[:: len(points)])
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
-    largest = [max(row, key=lambda each: each.ends[1]) for row in balanced]
+    largest = [max(row, key=lambda panel: panel.ends[1]) for row in balanced]
     none = "".join(f" {row.label.capitalize()}: {row.left_out}." for row in largest)
     firings, mark = firing_words(result)
     lines = f"{what}{at}; above, the {firings} by cylinder.{none}"
     firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
-    legend = [*(one.entry() for one in series), firing]
+    legend = [*(item.entry() for item in series), firing]
     return finish_page(
         drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, points, mounts)
     )
 
 
-def _beside(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours: Sequence[str]) -> None:
+def _draw_row(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours: Sequence[str]) -> None:
     """Draw one quantity at every operating point, to one scale."""
-    ends = (min(each.ends[0] for each in row), max(each.ends[1] for each in row))
+    ends = (min(panel.ends[0] for panel in row), max(panel.ends[1] for panel in row))
     factor, unit = in_thousands(max(map(abs, ends)), row[0].unit)
-    richest = max(row, key=lambda each: len(each.curves))
-    for axes, each in zip(panels, row, strict=True):
-        _draw(axes, replace(each, ends=ends), degrees, colours, factor)
+    richest = max(row, key=lambda panel: len(panel.curves))
+    for axes, panel in zip(panels, row, strict=True):
+        _draw(axes, replace(panel, ends=ends), degrees, colours, factor)
         axes.tick_params(labelleft=axes is panels[0])
-        if each is richest and len(richest.curves) > 1:
+        if panel is richest and len(richest.curves) > 1:
             axes.legend(loc="upper right", ncols=3, borderaxespad=0.0, borderpad=0.1, **_LEGEND)
             axes.set_ylim(top=axes.get_ylim()[1] + 0.3 * (axes.get_ylim()[1] - axes.get_ylim()[0]))
     for axes in panels:
-        axes.set_ylim(top=max(other.get_ylim()[1] for other in panels))
+        axes.set_ylim(top=max(other_axes.get_ylim()[1] for other_axes in panels))
     first = panels[0]
     first.set_ylabel(f"{fit_line(richest.words, HIGH + 0.1)}\n[{unit}]", va="center")
 
@@ -126,9 +126,9 @@ def _points(result: Result) -> list[int]:
     points = result.problem.points
     if len(points) <= MOST_POINTS:
         return list(range(len(points)))
-    first, *between, last = sorted(range(len(points)), key=lambda k: points[k].speed)
+    first, *others, last = sorted(range(len(points)), key=lambda k: points[k].speed)
     hardest = hardest_point(result)
-    return sorted({first, hardest if hardest in between else between[len(between) // 2], last})
+    return sorted({first, hardest if hardest in others else others[len(others) // 2], last})
 
 
 def _mounts(result: Result) -> list[int]:
@@ -139,10 +139,10 @@ def _mounts(result: Result) -> list[int]:
     return sorted(np.argsort(-size, kind="stable")[:MOST_MOUNTS].tolist())
 
 
-def _left_out(result: Result, shown: Sequence[int], mounts: Sequence[int]) -> str:
+def _left_out(result: Result, indices: Sequence[int], mounts: Sequence[int]) -> str:
     points, names = len(result.problem.points), len(result.final.mount_names)
-    some = f"{len(shown)} of {points} operating points. " if len(shown) < points else ""
-    return some + (f"The {len(mounts)} most loaded of {names} mounts. " if len(mounts) < names else "")
+    selection = f"{len(indices)} of {points} operating points. " if len(indices) < points else ""
+    return selection + (f"The {len(mounts)} most loaded of {names} mounts. " if len(mounts) < names else "")
 
 
 def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[Row]:
@@ -193,7 +193,7 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
         empty(axes, row.left_out)
 
 
-def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
+def _mark_firings(panels: Sequence[Axes], engine: Engine, width: float) -> None:
     """Draw a line per firing, and cylinder numbers above the first panel if there is room."""
     cycle, firings = math.degrees(engine.cycle.angle), dict[float, list[int]]()
     for number, part in enumerate(engine.cylinders, 1):
@@ -202,7 +202,7 @@ def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
         for angle in firings:
             axes.axvline(angle, color=FAINT, linewidth=0.8, linestyle=STYLES[2], zorder=0.6)
     texts = {angle: ",".join(map(str, numbers)) for angle, numbers in firings.items()}
-    if sum(width_of(text) + DIGIT for text in texts.values()) <= wide:
+    if sum(width_of(text) + DIGIT for text in texts.values()) <= width:
         for angle, text in texts.items():
             place: Any = {"textcoords": "offset points", "xycoords": panels[0].get_xaxis_transform()}
             panels[0].annotate(text, (angle, 1.0), (0, 3), ha="center", size=9, color=FAINT, **place)

@@ -29,8 +29,8 @@ def figure(result: Result) -> Figure:
     count = len(orders[0][1].order)
     cycle = math.degrees(sum(orders[0][1].intervals))
     uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in orders)
-    wide = min(max(6.0, count * (0.5 if uneven else 0.4)), WIDEST - 1.4)
-    drawn = page(1, 1, (wide, 0.1 + (0.52 if uneven else 0.42) * len(orders)))
+    width = min(max(6.0, count * (0.5 if uneven else 0.4)), WIDEST - 1.4)
+    drawn = page(1, 1, (width, 0.1 + (0.52 if uneven else 0.42) * len(orders)))
     axes = drawn.panels[0]
     for row, (k, order) in enumerate(orders):
         _bar(axes, row, order, uneven, BEST if k == 0 else NEXT)
@@ -40,19 +40,19 @@ def figure(result: Result) -> Figure:
     axes.grid(axis="y", visible=False)
     legend = [Patch(color=BEST[0], label="best star"), Patch(color=NEXT[0], label="next in the ranking")]
     intervals = ", in degrees." if uneven else f", {cycle / count:g}° for all."
-    fires, stands = ("Firing orders", "Cylinder that fires"), ("Orders of dead centres", "Piston at the head end")
-    title, who = fires if has_firing(result) else stands
+    fires, dead_centres = ("Firing orders", "Cylinder that fires"), ("Orders of dead centres", "Piston at the head end")
+    title, who = fires if has_firing(result) else dead_centres
     lines = f"{who}, and the crank angle to the next{intervals}"
     return finish_page(drawn, result, title, lines, legend[: 1 + any(k for k, _ in orders)])
 
 
 def _selected(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
     best = [(0, order) for order in phasing.ranking[0].firing_orders][: SHOWN // 2 + 1]
-    others = [
+    next_best = [
         (k, order) for k, star in enumerate(phasing.ranking) for order in star.firing_orders
         if k and order == star.firing_orders[0]
     ]  # fmt: skip
-    return (best + others)[:SHOWN]
+    return (best + next_best)[:SHOWN]
 
 
 def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[str, str]) -> None:

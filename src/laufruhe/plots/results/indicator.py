@@ -1,4 +1,4 @@
-"""Indicator diagrams of steam cylinders and pumps, and what drives each rod (Roetscher, Figs. 1051 to 1065)."""
+"""Indicator diagrams of steam cylinders and pumps, and the force on each rod (Roetscher, Figs. 1051 to 1065)."""
 
 from __future__ import annotations
 

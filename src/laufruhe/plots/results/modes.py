@@ -23,9 +23,9 @@ def figure(result: Result) -> Figure:
     """Draw the kinetic-energy share of every motion in every mode."""
     series = series_of(result)
     drawn = page(1, len(series), (3.5, 3.0), gap=1.0)
-    for axes, one in zip(drawn.panels, series, strict=True):
-        _shares(axes, facts_of(one.design))
-        axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
+    for axes, item in zip(drawn.panels, series, strict=True):
+        _shares(axes, facts_of(item.design))
+        axes.set_title(item.name, loc="left", size=10, pad=8, parse_math=False)
     lines = "Share of each motion in the kinetic energy of a mode [%]; a decoupled motion has 100. Bold: excited modes."
     lines += stiffness_sentence(facts_of(result.final))
     return finish_page(drawn, result, "Natural modes", lines, [])

@@ -74,22 +74,22 @@ class Frame:
 def figure(result: Result) -> Figure:
     """Draw one panel per mount, to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
-    paths, steady = _moving([_closed(channel_samples(one.design, k)) for one in series])
+    paths, steady = _moving([_closed(channel_samples(item.design, k)) for item in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     frame, columns = Frame.from_paths(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
     first = result.final.engine.cylinders[0]
-    fired = round((first.firing_angle % cycle.angle) / cycle.angle * (len(paths[0]) - 1))
+    firing_step = round((first.firing_angle % cycle.angle) / cycle.angle * (len(paths[0]) - 1))
     factor, unit = in_thousands(frame.size, "N")
     for m, (axes, mount) in enumerate(zip(drawn.panels, mounts, strict=True)):
-        for path, one, width in zip(paths, series, (2.4, 1.5)[-len(series) :], strict=True):
+        for path, item, width in zip(paths, series, (2.4, 1.5)[-len(series) :], strict=True):
             if frame.along is None:
-                _path(axes, factor * path[:, m], one, quarters, fired, width)
+                _path(axes, factor * path[:, m], item, quarters, firing_step, width)
             else:
                 angles = np.linspace(0.0, math.degrees(cycle.angle), len(path))
-                axes.plot(angles, factor * path[:, m, frame.along], color=one.colour, linewidth=width, label=one.name)
+                axes.plot(angles, factor * path[:, m, frame.along], color=item.colour, linewidth=width, label=item.name)
         _frame(axes, frame, factor, cycle.turns)
         _name(axes, mount, result.final.engine.mounts[m])
     _label(drawn, columns, frame, unit)
@@ -106,17 +106,19 @@ def _closed(samples: Array) -> Array:
 
 def _moving(paths: list[Array]) -> tuple[list[Array], str]:
     moving = [path - path[:-1].mean(axis=0) for path in paths]
-    largest, varying = (max(float(np.abs(path[..., 1:]).max(initial=0.0)) for path in each) for each in (paths, moving))
+    largest, varying = (
+        max(float(np.abs(path[..., 1:]).max(initial=0.0)) for path in group) for group in (paths, moving)
+    )
     return (paths, "") if varying > STEADY * largest else (moving, " The steady part is left out.")
 
 
-def _path(axes: Axes, path: Array, one: Series, quarters: int, fired: int, width: float) -> None:
-    axes.plot(path[:, 1], path[:, 2], color=one.colour, linewidth=width, label=one.name, solid_joinstyle="round")
+def _path(axes: Axes, path: Array, item: Series, quarters: int, firing_step: int, width: float) -> None:
+    axes.plot(path[:, 1], path[:, 2], color=item.colour, linewidth=width, label=item.name, solid_joinstyle="round")
     if quarters:
         dots = path[:-1:quarters]
-        axes.plot(dots[:, 1], dots[:, 2], "o", color=one.colour, markersize=3.6, markeredgewidth=0)
-        ring: Any = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": one.colour, "markeredgewidth": 1.3}
-        axes.plot(*path[fired, 1:], "o", **ring)
+        axes.plot(dots[:, 1], dots[:, 2], "o", color=item.colour, markersize=3.6, markeredgewidth=0)
+        ring: Any = {"markersize": 7, "markerfacecolor": "none", "markeredgecolor": item.colour, "markeredgewidth": 1.3}
+        axes.plot(*path[firing_step, 1:], "o", **ring)
 
 
 def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
@@ -133,9 +135,9 @@ def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
     round_ticks(axes.xaxis, 4, symmetric=True)
 
 
-def _name(axes: Axes, mount: Mount, moved: Mount) -> None:
-    is_moved = mount.position != moved.position
-    place = ", ".join(trimmed(1e3 * value).replace("-", "−") for value in moved.position)
+def _name(axes: Axes, mount: Mount, final_mount: Mount) -> None:
+    is_moved = mount.position != final_mount.position
+    place = ", ".join(trimmed(1e3 * value).replace("-", "−") for value in final_mount.position)
     over: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
     axes.annotate(fit_line(mount.name, PANEL + 0.2, 10), (0, 1), (0, 18), size=10, color=INK, **over)
     words = fit_line(f"{'moved to' if is_moved else 'at'} {place} mm", PANEL + 0.3)
@@ -172,7 +174,7 @@ def _left_out(paths: list[Array], frame: Frame) -> str:
 
 
 def _legend(series: list[Series], frame: Frame, first: str) -> list[Artist]:
-    lines = [one.entry(linewidth=width) for one, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)]
+    lines = [item.entry(linewidth=width) for item, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)]
     if frame.along is not None:
         return lines
     dot = entry_of_dots("every 90° of the crank", color=INK, markersize=3.6)

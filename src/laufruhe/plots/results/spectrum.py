@@ -34,9 +34,9 @@ def figure(result: Result) -> Figure:
     with_mounts = bool(result.problem.engine.mounts)
     panels = _panels(len(result.problem.engine.mounts))
     base = float(main_load(series[0].design.loads[k]).base)
-    amplitudes = [_visible([measure(one.design.loads[k]) for one in series], base) for _, _, measure in panels]
+    amplitudes = [_visible([measure(item.design.loads[k]) for item in series], base) for _, _, measure in panels]
     last = base * max(len(values[0]) - 1 for values in amplitudes)
-    tops = [max(float(each.max(initial=0.0)) for each in values) for values in amplitudes]
+    tops = [max(float(values_of_design.max(initial=0.0)) for values_of_design in values) for values in amplitudes]
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
     for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
         words, (factor, symbol) = omitted_words(top, max(tops), unit), in_thousands(top, unit)
@@ -44,13 +44,15 @@ def figure(result: Result) -> Figure:
         if words:
             empty(axes, words)
         else:
-            _bars(axes, [factor * each for each in values], base, [one.colour for one in series])
+            _bars(
+                axes, [factor * values_of_design for values_of_design in values], base, [item.colour for item in series]
+            )
         axes.tick_params(labelbottom=axes is drawn.panels[-1])
     drawn.panels[-1].set_xlabel("order, multiples of crank speed")
     title = "Mount forces by order" if with_mounts else "Shaking force and couples by order"
     what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
     lines = f"{what} at {point_name(result, k)}; order 0 is the steady part."
-    legend = [Patch(facecolor=one.colour, label=one.name) for one in series]
+    legend = [Patch(facecolor=item.colour, label=item.name) for item in series]
     return finish_page(drawn, result, title, lines, legend)
 
 
@@ -72,8 +74,8 @@ def _panels(mounts: int) -> list[Panel]:
 def _visible(series: list[Array], base: float) -> list[Array]:
     length = max(len(values) for values in series)
     table = np.stack([pad_orders(values, length) for values in series])
-    seen = np.flatnonzero(table.max(axis=0) > SHARE * float(table.max(initial=0.0)))
-    last = min(int(seen[-1]) if len(seen) else 0, int(LAST_ORDER / base))
+    visible = np.flatnonzero(table.max(axis=0) > SHARE * float(table.max(initial=0.0)))
+    last = min(int(visible[-1]) if len(visible) else 0, int(LAST_ORDER / base))
     return list(table[:, : last + 1])
 
 

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 from laufruhe.plots.style import AFTER, BEFORE, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
-from laufruhe.present.numbers import figure as told
+from laufruhe.present.numbers import figure as format_value
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
@@ -48,7 +48,7 @@ def figure(result: Result) -> Figure:
 def _title(result: Result, star: RankedStar, k: int) -> str:
     unit, scale = (result.objective.unit, result.objective.initial) if result.objective else ("", 0.0)
     built = f", with {', '.join(star.shafts)}" if star.shafts else ""
-    return f"{k + 1}. {told(star.value, unit, scale=scale)}{built}"
+    return f"{k + 1}. {format_value(star.value, unit, scale=scale)}{built}"
 
 
 def _balance(star: RankedStar) -> str:
@@ -65,7 +65,7 @@ def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
     axes.set(xlim=(-1.75, 1.75), ylim=(-1.4, 1.4))
     axes.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor=FAINT, linewidth=0.7, linestyle=(0, (2, 3))))
     axes.add_patch(Circle((0, 0), 0.1, facecolor=INK, edgecolor="none", zorder=4))
-    for angle, throws in _together(star.throws):
+    for angle, throws in _group_by_angle(star.throws):
         y, z = math.sin(angle), math.cos(angle)
         axes.plot([0, y], [0, z], color=colour, linewidth=2.4, solid_capstyle="round", zorder=2)
         axes.add_patch(Circle((y, z), 0.1, facecolor="white", edgecolor=colour, linewidth=1.8, zorder=3))
@@ -74,17 +74,19 @@ def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
         axes.text(reach * y, 1.24 * z, text, ha="center", va="center", size=SMALL, color=INK)
 
 
-def _together(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
+def _group_by_angle(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
     # throws at equal angles, to a degree
-    out: list[tuple[float, list[int]]] = []
+    groups: list[tuple[float, list[int]]] = []
     for k, angle in enumerate(throws):
-        same = (members for other, members in out if abs(math.remainder(angle - other, math.tau)) < SAME)
-        members = next(same, None)
+        matching = (
+            members for group_angle, members in groups if abs(math.remainder(angle - group_angle, math.tau)) < SAME
+        )
+        members = next(matching, None)
         if members is None:
-            out.append((angle, [k]))
+            groups.append((angle, [k]))
         else:
             members.append(k)
-    return out
+    return groups
 
 
 def _side_view(axes: Axes, star: RankedStar, places: Sequence[float], colour: str) -> None:

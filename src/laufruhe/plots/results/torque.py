@@ -1,4 +1,4 @@
-"""The tangential-force diagram: torque of gas, pistons and rods, the work that it stores, and the crank speed."""
+"""Tangential-force diagram: torque of gas, pistons and rods, stored work, and crank speed."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ STEPS, MOST_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
 COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
 # smallest drawn part, and smallest drawn order, relative to the largest
-FELT, SEEN = 1e-3, 1e-2
+LEAST_PART, LEAST_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
 
 
@@ -44,11 +44,11 @@ def figure(result: Result) -> Figure:
     k = max(fired or range(len(facts)), key=lambda j: facts[j].excursion)
     parts = torque_parts(engine, points[k], fidelity)
     largest = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
-    visible = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > FELT * largest}
+    visible = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > LEAST_PART * largest}
     degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
-    _lower(drawn.panels[-1], 0.5)
+    _move_down(drawn.panels[-1], 0.5)
     unit = in_thousands(largest, "N m")
     _torque(drawn.panels[0], visible, degrees, facts[k].mean, unit)
     _work(drawn.panels[1], parts["all"], degrees, facts[k])
@@ -66,11 +66,11 @@ def figure(result: Result) -> Figure:
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
     legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in visible]
     legend.append(entry(f"mean, {number(facts[k].mean, scale=largest)} N m", **_MEAN))
-    legend += [entry(f"speed {one.name}", color=one.colour, linewidth=1.8) for one in turning]
+    legend += [entry(f"speed {item.name}", color=item.colour, linewidth=1.8) for item in turning]
     return finish_page(drawn, result, "Torque over one working cycle", lines, legend)
 
 
-def _lower(axes: Axes, inches: float) -> None:
+def _move_down(axes: Axes, inches: float) -> None:
     box, high = axes.get_position(), axes.figure.bbox.height / axes.figure.dpi
     axes.set_position((box.x0, box.y0 - inches / high, box.width, box.height))
 
@@ -78,8 +78,8 @@ def _lower(axes: Axes, inches: float) -> None:
 def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, unit: Unit) -> None:
     factor = unit[0]
     for name, part in parts.items():
-        wide = 1.4 if name == "all" else 2.6
-        axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=wide)
+        width = 1.4 if name == "all" else 2.6
+        axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=width)
     axes.axhline(factor * mean, **_MEAN)
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.set_ylabel(f"torque [{unit[1]}]")
@@ -102,16 +102,16 @@ def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
     """Draw the speed of every design that keeps turning, and return the drawn series."""
     point, fidelity = result.problem.points[k], result.problem.fidelity
     text, drawn = "", []
-    for one in series_of(result):
-        inertia = turning_inertia(one.design.engine, fidelity)
-        swing = swing_of(one.design.engine, point, fidelity)
+    for item in series_of(result):
+        inertia = turning_inertia(item.design.engine, fidelity)
+        swing = swing_of(item.design.engine, point, fidelity)
         degree = swing.irregularity(inertia or 0.0)
-        if inertia is None or (degree > 1.0 and one.design is not result.final):
+        if inertia is None or (degree > 1.0 and item.design is not result.final):
             continue
         speeds = swing.speeds(inertia)[: len(swing.work)]
         angles = degrees[-1] * np.arange(len(speeds)) / len(speeds)
-        axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.8)
-        drawn.append(one)
+        axes.plot(angles, RPM * speeds, color=item.colour, linewidth=1.8)
+        drawn.append(item)
         text = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
     axes.axhline(RPM * point.speed, **_MEAN)
     axes.set_ylabel("speed [rpm]")
@@ -125,14 +125,17 @@ def _orders(axes: Axes, parts: Mapping[str, Spectrum], unit: Unit) -> None:
     factor, total = unit[0], parts.get("all", next(iter(parts.values())))
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))
-    chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > SEEN * top)
+    chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > LEAST_ORDER * top)
     # drop parts without a visible bar
-    parts = {name: part for name, part in parts.items()
-             if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > SEEN * top}  # fmt: skip
-    wide = 0.8 / max(len(parts), 1)
+    parts = {
+        name: part
+        for name, part in parts.items()
+        if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > LEAST_ORDER * top
+    }
+    width = 0.8 / max(len(parts), 1)
     for j, (name, part) in enumerate(parts.items()):
         heights = [factor * abs(complex(part.at(float(orders[k])))) for k in chosen]
-        axes.bar(np.arange(len(chosen)) + (j + 0.5) * wide - 0.4, heights, wide, color=COLOURS[name])
+        axes.bar(np.arange(len(chosen)) + (j + 0.5) * width - 0.4, heights, width, color=COLOURS[name])
     axes.set_xticks(range(len(chosen)), [f"{orders[k]:g}" for k in chosen])
     axes.set(xlabel="order of crank speed", ylabel=f"amplitude [{unit[1]}]")
     axes.grid(axis="x", visible=False)

@@ -20,7 +20,7 @@ from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
 applies = is_elastic
-LEAST = 1e-4
+SMALLEST = 1e-4
 """Smaller ones are not shown."""
 
 
@@ -33,12 +33,12 @@ def figure(result: Result) -> Figure:
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
     highest, lowest = 1.0, 1e-2
-    for one in series:
-        for k, curve in transmissibility_of(one.design, point, speeds, facts.orders):
+    for item in series:
+        for k, curve in transmissibility_of(item.design, point, speeds, facts.orders):
             highest = max(highest, float(curve.max(initial=0.0)))
             lowest = min(lowest, float(curve.min(initial=lowest)))
-            axes.plot(speeds * RPM, curve, color=one.colour, linestyle=STYLES[k], linewidth=1.6)
-    legend = [*(one.entry() for one in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
+            axes.plot(speeds * RPM, curve, color=item.colour, linestyle=STYLES[k], linewidth=1.6)
+    legend = [*(item.entry() for item in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
     axes.axhline(1.0, color=FAINT, linewidth=0.8)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(10.0, (1.0,) if lowest < 1e-2 else (1.0, 2.0, 5.0), numticks=12))
@@ -46,7 +46,7 @@ def figure(result: Result) -> Figure:
     axes.minorticks_off()
     axes.set(
         xlim=(0.0, top * RPM),
-        ylim=(max(LEAST, 10.0 ** math.floor(math.log10(max(lowest, LEAST)))), 1.6 * highest),
+        ylim=(max(SMALLEST, 10.0 ** math.floor(math.log10(max(lowest, SMALLEST)))), 1.6 * highest),
         xlabel="crank speed [rpm]",
         ylabel="transmissibility",
     )
@@ -59,8 +59,10 @@ def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
     # over the speeds that the limits hold at [rpm]
     limits = limits_on(result, channels.TRANSMISSIBILITY)
     lines = [(limit.maximum, limit.measure.points) for limit in limits]
-    for maximum, named in lines:
-        speeds = [point.speed * RPM for point in result.problem.points if named is None or point.name in named]
+    for maximum, point_names in lines:
+        speeds = [
+            point.speed * RPM for point in result.problem.points if point_names is None or point.name in point_names
+        ]
         low, high = min(speeds), max(speeds)
         if high - low < 0.02 * top:
             low, high = low - 0.02 * top, high + 0.02 * top

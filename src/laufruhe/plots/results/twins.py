@@ -1,4 +1,4 @@
-"""A twin as its rider knows it: when it fires, and what turns forward and backward of its first and second order."""
+"""Firings of a twin, and the parts of its first and second order that turn forward and backward."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def figure(result: Result) -> Figure:
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
     parts, initial = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
-    maximum = max(_sizes(each, kind) for each in (parts, initial) for kind in KINDS)
+    maximum = max(_sizes(parts_of_design, kind) for parts_of_design in (parts, initial) for kind in KINDS)
     parts, initial = _visible(parts, maximum), _visible(initial, maximum)
     largest = {kind: max(_sizes(parts, kind), _sizes(initial, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
@@ -75,8 +75,8 @@ def _firings(axes: Axes, result: Result) -> None:
     """Draw the firings of a cycle, and the angles between them."""
     engine = result.final.engine
     cycle = math.degrees(engine.cycle.angle)
-    fired = sorted((math.degrees(part.firing_angle) % cycle, part.name.split()[-1]) for part in engine.cylinders)
-    for (angle, name), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + cycle, "")], strict=True):
+    firings = sorted((math.degrees(part.firing_angle) % cycle, part.name.split()[-1]) for part in engine.cylinders)
+    for (angle, name), (following, _) in zip(firings, [*firings[1:], (firings[0][0] + cycle, "")], strict=True):
         axes.plot([angle, angle], [0.0, 1.0], color=INK, linewidth=5.0, solid_capstyle="butt")
         axes.text(angle, 1.1, name, ha="center", size=SMALL)
         middle = 0.5 * (angle + following)
@@ -89,13 +89,13 @@ def _firings(axes: Axes, result: Result) -> None:
 def _circles(axes: Axes, forward: complex, backward: complex, largest: float, unit: str) -> None:
     factor, name = in_thousands(largest, unit)
     ahead, against = forward * np.exp(1j * TURN), backward * np.exp(-1j * TURN)
-    looks: list[tuple[Any, dict[str, Any]]] = [
+    styles: list[tuple[Any, dict[str, Any]]] = [
         (ahead, {"color": FORWARD, "linewidth": 1.2}),
         (against, {"color": BACKWARD, "linewidth": 1.2, "linestyle": (0, (4, 1.6))}),
         (ahead + against, {"color": INK, "linewidth": 2.0}),
     ]
-    for path, look in looks:
-        axes.plot(factor * path.imag, factor * path.real, **look)
+    for path, style in styles:
+        axes.plot(factor * path.imag, factor * path.real, **style)
     axes.plot(factor * (forward + backward).imag, factor * (forward + backward).real, "o", color=INK, markersize=5)
     reach = 1.1 * factor * (largest or 1.0)
     across, up = ("about y", "about z") if unit == "N m" else ("lateral", "vertical")
@@ -111,10 +111,10 @@ def _bars(axes: Axes, parts: Parts, largest: Mapping[str, float]) -> None:
     for row, ((kind, order), pair) in enumerate(parts.items()):
         maximum, (factor, unit) = largest[kind] or 1.0, in_thousands(largest[kind], KINDS[kind][1])
         for j, (part, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
-            at = -row - 0.36 * j
-            axes.barh(at, abs(part) / maximum, 0.32, color=colour)
+            height = -row - 0.36 * j
+            axes.barh(height, abs(part) / maximum, 0.32, color=colour)
             size = number(factor * abs(part), 3, scale=factor * maximum)
-            axes.text(abs(part) / maximum + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
+            axes.text(abs(part) / maximum + 0.03, height, f"{size} {unit}", va="center", size=SMALL)
         names.append(f"{ORDERS[order]}\n{kind}")
     axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
     axes.set(xlim=(0.0, 1.75), xticks=[])

@@ -1,4 +1,4 @@
-"""Tables of a result: a file each, with `tables`; `SECTIONS` is all that knows of them."""
+"""Sections of a result's report, a module each with a function `tables`."""
 
 from __future__ import annotations
 

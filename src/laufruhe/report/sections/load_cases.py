@@ -22,8 +22,8 @@ def tables(result: Result) -> list[Table]:
     for case in result.final.engine.load_cases:
         state = settled(mounting, case)
         for mount, travel, force in zip(mounting.mounts, state.travel, state.force, strict=True):
-            moved = (number(1e3 * along) for along in travel)
-            met = "yes" if mount.name in state.on_stops else DASH
-            rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
+            travels = (number(1e3 * along) for along in travel)
+            on_stop = "yes" if mount.name in state.on_stops else DASH
+            rows.append((case.name, mount.name, *travels, number(float(np.linalg.norm(force))), on_stop))
     note = "Travel is measured from the position without these loads."
     return [Table(HEAD, tuple(rows), title="Load cases", left=2, note=note, file="load-cases")]

@@ -1,4 +1,4 @@
-"""Natural modes, and the mounts themselves."""
+"""Tables of natural modes and of the mounts."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from laufruhe.solvers.result import Result
 
 
 def tables(result: Result) -> list[Table]:
-    """Return the modes before and after, and the final mounts; nothing for rigid mounts."""
+    """Return the modes of the initial and the final design, and the final mounts; empty for rigid mounts."""
     if not is_elastic(result):
         return []
-    found = [facts_of(design) for design in result.designs.values()]
+    facts_by_design = [facts_of(design) for design in result.designs.values()]
     words = (" of the initial design", " of the final design") if is_changed(result) else ("",)
-    modes = [_modes(facts, f"Natural modes{which}") for facts, which in zip(found, words, strict=True)]
-    return [*modes, _mounts(result, found[-1])]
+    modes = [_modes(facts, f"Natural modes{which}") for facts, which in zip(facts_by_design, words, strict=True)]
+    return [*modes, _mounts(result, facts_by_design[-1])]
 
 
 def _modes(facts: MountingFacts, title: str) -> Table:
@@ -30,12 +30,12 @@ def _modes(facts: MountingFacts, title: str) -> Table:
         driven = j in facts.excited
         critical = critical_speed(frequency, order) * RPM if order and driven else 0.0
         shares = [fixed(100.0 * share, 1) for share in facts.modes.energy[:, j]]
-        reached = number(critical) if critical else DASH
-        rows.append((name, number(frequency), "yes" if driven else "no", reached, *shares))
+        critical_text = number(critical) if critical else DASH
+        rows.append((name, number(frequency), "yes" if driven else "no", critical_text, *shares))
     unexcited = 6 - len(facts.excited)
-    rest = f"{unexcited} of 6 modes are not excited and not computed" if unexcited else "all modes are excited"
+    remark = f"{unexcited} of 6 modes are not excited and not computed" if unexcited else "all modes are excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
-    return Table(head, tuple(rows), title=title, note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
+    return Table(head, tuple(rows), title=title, note=f"Kinetic energy in %; {remark}.{_of_fluid(facts)}")
 
 
 def _of_fluid(facts: MountingFacts) -> str:
@@ -53,8 +53,8 @@ def _mounts(result: Result, facts: MountingFacts) -> Table:
     for k, spring in every_spring(result.final.engine.mounts):
         stiffness = " / ".join(trimmed(1e-3 * k) for k in spring.stiffness)
         place = ", ".join(trimmed(1e3 * c) for c in spring.position)
-        sags, moved = number(1e3 * facts.mount_sag[k]), number(1e3 * travels[k].max)
-        rows.append((spring.name, place, stiffness, trimmed(spring.loss_factor), sags, moved))
+        sags, largest_travel = number(1e3 * facts.mount_sag[k]), number(1e3 * travels[k].max)
+        rows.append((spring.name, place, stiffness, trimmed(spring.loss_factor), sags, largest_travel))
     axis = ", ".join(fixed(c, 3) for c in facts.torque_roll_axis)
     note = (
         f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "

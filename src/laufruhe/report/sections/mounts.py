@@ -1,4 +1,4 @@
-"""Force on every mount, main bearing and crank pin over the cycle, and what bearings lose, before and after."""
+"""Tables of forces on mounts, main bearings and crank pins, and friction power, initial and final."""
 
 from __future__ import annotations
 
@@ -23,13 +23,18 @@ def _table(result: Result, places: Places) -> Table:
     points, designs = result.problem.points, evaluations_with_loads(result)
     names = places.channel.places(result.problem.engine)
     measures = [
-        ((point.name, name) if len(points) > 1 else (name,), each)
+        ((point.name, name) if len(points) > 1 else (name,), by_design)
         for k, point in enumerate(points)
-        for name, *each in zip(names, *(place_measures(design, k, places.channel) for design in designs), strict=True)
+        for name, *by_design in zip(
+            names, *(place_measures(design, k, places.channel) for design in designs), strict=True
+        )
     ]
     unit, factor = readable(places.channel.unit)
-    scale = factor * max((each[0].max for _, each in measures), default=0.0)
-    rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in measures)
+    scale = factor * max((by_design[0].max for _, by_design in measures), default=0.0)
+    rows = tuple(
+        (*lead, *_cells([cycle_measures.times(factor) for cycle_measures in by_design], scale))
+        for lead, by_design in measures
+    )
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The initial design has no finite loads: {result.initial.resonance}." if result.initial.resonance else ""
     if places.channel.sums_places:

@@ -1,4 +1,4 @@
-"""Orders that the loads are made of, before and after."""
+"""Table of load amplitudes by order, initial and final."""
 
 from __future__ import annotations
 
@@ -44,8 +44,8 @@ def tables(result: Result) -> list[Table]:
     names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
-    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "all orders"
-    note = f"Amplitudes: {many} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
+    selection = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "all orders"
+    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
     return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
 
 

@@ -1,4 +1,4 @@
-"""Objectives in order of rank, and the designs that each of them does not tell apart."""
+"""Tables of objectives in order, and of the equal optima that each objective leaves."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def _row(number: int, rank: RankValue, last: RankValue) -> tuple[str, ...]:
 
 
 def _ends(rank: RankValue, name: str) -> str:
-    entry = next((each for each in rank.designs if each.name == name), None)
+    entry = next((decision_range for decision_range in rank.designs if decision_range.name == name), None)
     if entry is None:
         return DASH
     unit, factor = readable(entry.unit)
-    is_open = any(entry is each for each in rank.equal)
+    is_open = any(entry is decision_range for decision_range in rank.equal)
     # values below this are roundings
-    minimum = 1e-3 * max(abs(each.high) for each in rank.designs)
+    minimum = 1e-3 * max(abs(decision_range.high) for decision_range in rank.designs)
     values = (entry.low, entry.high) if is_open else (0.5 * (entry.low + entry.high),)
     ends = (trimmed(0.0 if abs(value) <= minimum else factor * value, 3) for value in values)
     return f"{' to '.join(ends)} {unit}".rstrip()

@@ -1,4 +1,4 @@
-"""Without a design: what the limits that conflict can reach, each while the others hold, and with which numbers."""
+"""Attainable values of conflicting limits, each with the other limits met, and the designs that attain them."""
 
 from __future__ import annotations
 
@@ -19,10 +19,12 @@ def tables(result: Result) -> list[Table]:
         (f"nearest to '{design.name}'", design) for design in result.reached if design.decisions
     ]
     designs += [("nearest to all limits", result.nearest)] if result.nearest is not None else []
-    known = [{decision.name: decision for decision in relevant_decisions(design.decisions)} for _, design in designs]
-    names = dict.fromkeys(name for each in known for name in each)
+    decisions_by_design = [
+        {decision.name: decision for decision in relevant_decisions(design.decisions)} for _, design in designs
+    ]
+    names = dict.fromkeys(name for decisions in decisions_by_design for name in decisions)
     first = ("value reached", *(figure(design.value, design.unit) for _, design in designs))
-    rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
+    rows = tuple((name, *(_value(decisions.get(name)) for decisions in decisions_by_design)) for name in names)
     head = ("", *(title for title, _ in designs))
     return [
         Table(head, (first, *rows) if names else (), title="Attainable values of the limits", note=NOTE, file="reach")
@@ -44,8 +46,8 @@ def sentences(result: Result) -> list[str]:
 
 def _sentence(limit: AttainableLimit, lead: str) -> str:
     if limit.why and math.isfinite(limit.value):
-        stands, required = figure(limit.value, limit.unit), f"{limit.side} {with_unit(limit.limit, limit.unit)}"
-        return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is required."
+        value_text, required = figure(limit.value, limit.unit), f"{limit.side} {with_unit(limit.limit, limit.unit)}"
+        return f"'{limit.name}' stays at {value_text}: {limit.why}; {required} is required."
     if limit.why:
         return f"The range of '{limit.name}' is not known: {limit.why}."
     minimum, beyond = ("smallest", "lower") if limit.side == "at most" else ("largest", "higher")
@@ -55,10 +57,12 @@ def _sentence(limit: AttainableLimit, lead: str) -> str:
         Proof.GLOBAL: f"the {minimum} value of '{limit.name}' is {value}, which is proven",
         Proof.WITHIN_GAP: f"the {minimum} value found of '{limit.name}' is {value}; none is {beyond} than {bound}",
     }
-    known = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else " without a proof"
-    said = words.get(proof, f"the {minimum} value found of '{limit.name}' is {value}, a local optimum{known}")
+    bound_text = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else " without a proof"
+    text_of_proof = words.get(
+        proof, f"the {minimum} value found of '{limit.name}' is {value}, a local optimum{bound_text}"
+    )
     ended = " Its search ended at the time limit; raise it." if limit.ended else ""
-    text = f"{lead}{said}; {limit.side} {with_unit(limit.limit, limit.unit)} is required.{ended}"
+    text = f"{lead}{text_of_proof}; {limit.side} {with_unit(limit.limit, limit.unit)} is required.{ended}"
     return text[:1].upper() + text[1:]
 
 

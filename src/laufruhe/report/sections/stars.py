@@ -1,4 +1,4 @@
-"""Ranked stars, their firing orders, and what uneven firing buys."""
+"""Tables of ranked stars, their firing orders, and the objective against deviation from even firing."""
 
 from __future__ import annotations
 

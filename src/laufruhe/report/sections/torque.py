@@ -1,4 +1,4 @@
-"""Torque of the crankshaft, the work that its flywheel stores, and how evenly it turns."""
+"""Table of crankshaft torque, stored work and degree of irregularity."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Counterweights and balancer weights as a workshop makes them: grams, gram millimetres, degrees."""
+"""Tables of counterweights and balancer weights in g, g mm and degrees, and of balance factors."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def tables(result: Result) -> list[Table]:
 
 def _weights(result: Result) -> Table:
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
-    made = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
-    scale = max((abs(rotor.unbalance) for rotor in made), default=0.0)
+    weights = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
+    scale = max((abs(rotor.unbalance) for rotor in weights), default=0.0)
     two = is_changed(result)
     rows = []
-    for rotor in made:
+    for rotor in weights:
         initial = before.get(rotor.name, rotor)
         if max(abs(rotor.unbalance), abs(initial.unbalance)) <= NEXT_TO_NOTHING * scale:
             continue
@@ -55,8 +55,8 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
     size = abs(rotor.unbalance)
     if size <= NEXT_TO_NOTHING * scale:
         return "0", DASH
-    turned = round(math.degrees(cmath.phase(rotor.unbalance)) % 360.0, 4) % 360.0
-    return number(GRAM_MILLIMETRES * size), trimmed(turned, 5)
+    angle = round(math.degrees(cmath.phase(rotor.unbalance)) % 360.0, 4) % 360.0
+    return number(GRAM_MILLIMETRES * size), trimmed(angle, 5)
 
 
 def _percent(factor: float | None) -> str:
@@ -65,9 +65,11 @@ def _percent(factor: float | None) -> str:
 
 def _factors(result: Result) -> Table:
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
-    names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
+    names = dict.fromkeys(balance.cylinders for design in designs for balance in balance_factors(design.engine))
     # a weight that a design lacks counts as zero there
-    factors = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
+    factors = [
+        {balance.cylinders: balance.factor for balance in balance_factors(design.engine, True)} for design in designs
+    ]
     rows = [(", ".join(cylinders), *(_percent(column.get(cylinders)) for column in factors)) for cylinders in names]
     head = ("throw of", *(("initial", "final") if len(factors) > 1 else ("balance factor",)))
     return Table(head, tuple(rows), title="Balance factors", note=_FACTOR, file="balance-factors")

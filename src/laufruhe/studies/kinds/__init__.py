@@ -11,11 +11,11 @@ from laufruhe.extension import extended
 from laufruhe.studies.part import Part
 
 
-def _found() -> Mapping[str, type[Part]]:
+def _find_kinds() -> Mapping[str, type[Part]]:
     modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
-    classes = [one for module in modules for one in vars(module).values() if isinstance(one, type)]
-    kinds = [one for one in classes if issubclass(one, Part) and "kind" in one.model_fields]
-    return extended("study_kinds", Part, kinds, lambda one: str(get_args(one.model_fields["kind"].annotation)[0]))
+    classes = [kind for module in modules for kind in vars(module).values() if isinstance(kind, type)]
+    kinds = [kind for kind in classes if issubclass(kind, Part) and "kind" in kind.model_fields]
+    return extended("study_kinds", Part, kinds, lambda kind: str(get_args(kind.model_fields["kind"].annotation)[0]))
 
 
-KINDS: Mapping[str, type[Part]] = _found()
+KINDS: Mapping[str, type[Part]] = _find_kinds()

@@ -1,4 +1,4 @@
-"""Engines with and without each of their balancer shafts, each set of shafts at its proven optimum."""
+"""Study kind `balancer sizing`: engines with every subset of their balancer shafts, each at its proven optimum."""
 
 from __future__ import annotations
 
@@ -88,9 +88,9 @@ class BalancerSizing(SweptPart):
         shared = bool(np.ptp(data["objective"].values[plain]) == 0.0)
         if shared:
             data = data.isel(point=np.concatenate([np.flatnonzero(plain)[:1], np.flatnonzero(~plain)]))
-        alone = len(set(data["case"].values.tolist())) == 1
+        has_one_case = len(set(data["case"].values.tolist())) == 1
         labels = [
-            _wrapped(shafts) if alone or (shared and shafts == "none") else f"{case}\n{_wrapped(shafts)}"
+            _wrapped(shafts) if has_one_case or (shared and shafts == "none") else f"{case}\n{_wrapped(shafts)}"
             for case, shafts in zip(data["case"].values.tolist(), data["shafts"].values.tolist(), strict=True)
         ]
         return bars(data, labels, words, data["shafts"].values == "none")

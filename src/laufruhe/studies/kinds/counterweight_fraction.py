@@ -1,4 +1,4 @@
-"""A metric over the balance factor at every speed, and the fraction proven best (Hasselgruber 1964, Fig. 10)."""
+"""Study kind `counterweight fraction`: a metric over the balance factor (Hasselgruber 1964, Fig. 10)."""
 
 from __future__ import annotations
 
@@ -65,9 +65,9 @@ class CounterweightFraction(SweptPart):
             _decided_fraction(record, path) if best else number[point.changes[path]]
             for point, record, best in zip(points, records, optimum, strict=True)
         ]
-        others = [axis for axis in self.axes() if axis.quantity != path]
+        other_axes = [axis for axis in self.axes() if axis.quantity != path]
         extra = {
-            **coordinates(others, points),
+            **coordinates(other_axes, points),
             path: ("point", values, {"units": "1", "long_name": "balance factor", "swept": 1}),
             "optimum": ("point", optimum, {"long_name": "true if the balance factor was open"}),
         }

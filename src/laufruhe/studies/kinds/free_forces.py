@@ -1,4 +1,4 @@
-"""Free forces and couples of the first two orders by layout, beside what tables print.
+"""Study kind `free forces`: free forces and couples of the first two orders by layout, compared with the literature.
 
 Handbooks tabulate them for the choice of a crankshaft: forces over F_h of one cylinder, couples
 about the middle over F_h a. An order that turns with the crank is taken by crank weights; what
@@ -130,9 +130,9 @@ class FreeForces(Part):
             name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)
             for name, words in _WORDS.items()
         }
-        known = [case.literature.model_dump(exclude_none=True) for case in self.cases]
+        literature = [case.literature.model_dump(exclude_none=True) for case in self.cases]
         for what in WHAT:
-            values = [[values_of.get(f"{what}_{order}", math.nan) for order in ORDERS] for values_of in known]
+            values = [[values_of.get(f"{what}_{order}", math.nan) for order in ORDERS] for values_of in literature]
             table[f"{what}_printed"] = variable(along, values, f"free {what} in the literature")
         for k, (name, which) in enumerate((("least", "shortest"), ("largest", "longest"))):
             ends = np.degrees([record["intervals"][k] for record in records])
@@ -153,11 +153,13 @@ class FreeForces(Part):
             minimum, maximum = float(row["least_interval"]), float(row["largest_interval"])
             even = maximum - minimum < 1e-6
             cells = [str(name), f"{maximum:.4g}" if even else f"{minimum:.4g} to {maximum:.4g}"]
-            cells += [_print_beside(row.sel(order=order), what) for what, order in columns]
+            cells += [_with_printed(row.sel(order=order), what) for what, order in columns]
             first = row.sel(order=1)
             rows.append([*cells, *(_plain(float(first[f"{what}_against"])) for what in WHAT)])
-        agreed, of = count_agreeing(data)
-        words = f"{agreed} of {of} printed values agree to half of the last of {data.attrs['digits']} digits."
+        agreed, printed_count = count_agreeing(data)
+        words = (
+            f"{agreed} of {printed_count} printed values agree to half of the last of {data.attrs['digits']} digits."
+        )
         legend = "Unit: force of one cylinder in the same order, for couples times the spacing; printed values "
         return [legend + "in brackets.", marked_table(head, rows), words]
 
@@ -177,9 +179,9 @@ class FreeForces(Part):
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
 
 
-def _print_beside(row: xr.Dataset, what: str) -> str:
-    ours, printed = float(row[what]), float(row[f"{what}_printed"])
-    return _plain(ours) if printed != printed else f"{_plain(ours)} ({printed:g})"
+def _with_printed(row: xr.Dataset, what: str) -> str:
+    computed, printed = float(row[what]), float(row[f"{what}_printed"])
+    return _plain(computed) if printed != printed else f"{_plain(computed)} ({printed:g})"
 
 
 def _plain(value: float) -> str:
@@ -187,8 +189,8 @@ def _plain(value: float) -> str:
 
 
 def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:
-    here = data.sel(order=order)
-    free, against, printed = (here[name].values for name in (what, f"{what}_against", f"{what}_printed"))
+    selected = data.sel(order=order)
+    free, against, printed = (selected[name].values for name in (what, f"{what}_against", f"{what}_printed"))
     rows = range(len(free))
     maximum = float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
     marks: list[p.Mark] = [

@@ -1,4 +1,4 @@
-"""Engines side by side, of equal cylinders or rebuilt to equal power (Hasselgruber 1964, Figs. 12 and 13)."""
+"""Study kind `layout comparison`: engines of equal cylinders or equal power (Hasselgruber 1964, Figs. 12 and 13)."""
 
 from __future__ import annotations
 
@@ -54,23 +54,25 @@ class LayoutComparison(SweptPart):
             raise scenes.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
         self._check_cylinders(scenes)
         at = self.combinations()[0]
-        told = [self._measures(scenes.problem(Point(case, at, self.metric)), case, scenes) for case in self.cases]
+        measures_by_case = [
+            self._measures(scenes.problem(Point(case, at, self.metric)), case, scenes) for case in self.cases
+        ]
         for name in self.further:
-            first, *others = (measures[name] for measures in told)
+            first, *others = (measures[name] for measures in measures_by_case)
             if isinstance(first, InputError) and all(isinstance(other, InputError) for other in others):
                 raise first
         return points
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure | InputError]:
         """Return further quantities by name, or the error of an engine that lacks one."""
-        scene, measures = MeasureContext(problem.engine, problem.points), dict[str, Measure | InputError]()
+        context, measures = MeasureContext(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
             # an engine without weights has a mass of zero
             is_mass = name in MEASURES and MEASURES[name][0].is_mass
             try:
                 with scenes.named(case):
                     measure = (
-                        Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
+                        Measure(*MEASURES[name]) if is_mass else context.measure(name, QuantityTable(), "study.further")
                     )
                     measures[name] = measure
             except InputError as error:
@@ -104,8 +106,8 @@ class LayoutComparison(SweptPart):
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the dataset of a sweep with the size of comparison and the further quantities."""
         power = self.cases[0].equal_power_to
-        at = EQUAL if power is None else f"the power of {power} cylinders"
-        data = super().dataset(points, records).assign_attrs(at=at)
+        size = EQUAL if power is None else f"the power of {power} cylinders"
+        data = super().dataset(points, records).assign_attrs(at=size)
         names = list(dict.fromkeys(name for record in records for name in record["further"]))
         if not names:
             return data
@@ -114,10 +116,10 @@ class LayoutComparison(SweptPart):
         about = {"long_name": "further quantity of the final design, in quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
         units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
-        both = ("point", "quantity")
+        dims = ("point", "quantity")
         return data.assign(
-            further=(both, values, about),
-            why_none=(both, why, {"long_name": "reason for a missing value"}),
+            further=(dims, values, about),
+            why_none=(dims, why, {"long_name": "reason for a missing value"}),
         ).assign_coords(
             quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
@@ -131,12 +133,12 @@ class LayoutComparison(SweptPart):
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
         """Draw initial and final bars of every engine; lines where something is swept."""
-        at, alike = data.attrs["at"], data.attrs["at"] == EQUAL
+        size, is_equal = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
             decided = (data["proof"].values != NOTHING_OPEN).any()
             words = f"Every point: {claim_of(data)}." if decided else "Initial designs."
-            return over_sweep(data, [], words if alike else f"At {at}. {words}")
-        words = f"Engines of {at}." if alike else f"At {at}."
+            return over_sweep(data, [], words if is_equal else f"At {size}. {words}")
+        words = f"Engines of {size}." if is_equal else f"At {size}."
         return side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
 
 
@@ -147,7 +149,7 @@ def _value(measure: Measure | InputError, design: Evaluation) -> float:
 
 
 def _least_flywheel(degree: float, design: Evaluation) -> float:
-    return max(swing_of(design.engine, at.point, design.fidelity).minimum_inertia(degree) for at in design.loads)
+    return max(swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads)
 
 
 def _ranking(data: xr.Dataset) -> list[Text]:
@@ -157,16 +159,16 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     for k, name in enumerate(data["quantity"].values.tolist()):
         values = data["further"].values[:, k]
         # loads that cancel leave a rounding
-        near = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
-        values = np.where(np.abs(values) < near, 0.0, values)
+        zero_level = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        values = np.where(np.abs(values) < zero_level, 0.0, values)
         columns.append((name, str(data["quantity_unit"].values[k]), values, data["why_none"].values[:, k].tolist()))
     swept, rows = swept_names(data), []
     scaled = [(name, *readable(unit), values, _places(values), why) for name, unit, values, why in columns]
     for k in sorted(range(points), key=lambda k: (math.isnan(best[k]), best[k])):
         row = [str(data["case"].values[k]), *(str(data[name].values[k]) for name in swept)]
         rows.append(row + [
-            f"{number(factor * values[k])} ({at[k]})" if at[k] else f"{NOTHING} {why[k]}".strip()
-            for _, _, factor, values, at, why in scaled
+            f"{number(factor * values[k])} ({places[k]})" if places[k] else f"{NOTHING} {why[k]}".strip()
+            for _, _, factor, values, places, why in scaled
         ])  # fmt: skip
     head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
     words = "Ranked by the first quantity; ranks by each quantity in parentheses. After a dash: why a value is missing."
@@ -175,8 +177,8 @@ def _ranking(data: xr.Dataset) -> list[Text]:
 
 def _places(values: np.ndarray) -> list[int]:
     finite = values[np.isfinite(values)]
-    near = _SAME * float(np.abs(finite).max(initial=0.0))
+    tolerance = _SAME * float(np.abs(finite).max(initial=0.0))
     return [
-        1 + int((finite < value - max(near, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
+        1 + int((finite < value - max(tolerance, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
         for value in values
     ]

@@ -41,8 +41,8 @@ class PercentilePart(Part):
         """Return one number for each case."""
         values = [record["value"] for record in records]
         words = f"load not exceeded in {self.share:g} % of the cycle"
-        found = {"percentile": variable("case", values, words, records[0]["unit"])}
-        return xr.Dataset(found, {"case": [point.case.name for point in points]}, self.about())
+        variables = {"percentile": variable("case", values, words, records[0]["unit"])}
+        return xr.Dataset(variables, {"case": [point.case.name for point in points]}, self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:

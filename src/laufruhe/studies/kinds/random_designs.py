@@ -1,4 +1,4 @@
-"""Random designs of one problem, evaluated: what lies between the bounds, beside the optimum that is proven."""
+"""Study kind `random designs`: random designs of one problem, compared with the proven optimum."""
 
 from __future__ import annotations
 
@@ -83,9 +83,11 @@ class RandomDesigns(Sampled):
         data = self.gathered(points, records)
         about = data["objective"].attrs
         for name, words in (("objective", "optimum"), ("lower_bound", "lower bound")):
-            column = variable("case", [one[name] for one in best], f"{about['long_name']}, {words}", about["units"])
+            column = variable(
+                "case", [record[name] for record in best], f"{about['long_name']}, {words}", about["units"]
+            )
             data[words.replace(" ", "_")] = column
-        return data.assign_coords(proof=("case", [one["proof"] for one in best]))
+        return data.assign_coords(proof=("case", [record["proof"] for record in best]))
 
     def _prepared(self, point: Point, scenes: Scenes) -> tuple[Problem, Designs, list[str]]:
         mark = scenes.fingerprint(Point(point.case), self.settings())

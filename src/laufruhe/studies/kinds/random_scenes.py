@@ -1,4 +1,4 @@
-"""Random scenes, each decided to its own optimum: what a proven design gains, whatever the engine."""
+"""Study kind `random scenes`: random problems, each optimised separately."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measures of a design over crank speed, its limits beside them, and the amplitude of every order."""
+"""Study kind `speed map`: measures over crank speed, limits, and the amplitude of every order."""
 
 from __future__ import annotations
 
@@ -101,19 +101,19 @@ class SpeedMapStudy(Part):
         return [Point(case) for case in self.cases]
 
     def _load(self, problem: Problem, case: CaseTable, scenes: Scenes) -> OperatingPoint:
-        names, wanted = [point.name for point in problem.points], self.operating_point
-        if wanted is not None and wanted not in names:
-            raise scenes.refused(case, "operating_points", f"has no '{wanted}'", nearest(wanted, names))
-        return problem.points[0 if wanted is None else names.index(wanted)]
+        names, name = [point.name for point in problem.points], self.operating_point
+        if name is not None and name not in names:
+            raise scenes.refused(case, "operating_points", f"has no '{name}'", nearest(name, names))
+        return problem.points[0 if name is None else names.index(name)]
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
         # mapped measures, at any speed, with the limits of this part
-        scene, limits = MeasureContext(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
+        context, limits = MeasureContext(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
         with scenes.named(case):
             if self.measures:
                 limits = {}
             for k, table in enumerate(self.measures, 1):
-                measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
+                measure = context.measure(table.quantity, table, f"measures[{k}].quantity")
                 where = f"measures[{k}].limit"
                 limits[measure] = math.inf if table.limit is None else si_value(table.limit, measure.unit, where)
         narrowed = {"operating_points", "orders"}
@@ -171,11 +171,11 @@ class SpeedMapStudy(Part):
         data = _readable(data)
         head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"above it, from to [{RPM}]"]
         rows = []
-        for case, design, one in _designs(data):
+        for case, design, curves in _designs(data):
             for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
-                here = one.sel(measure=name)
-                proof, label = str(one["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
-                cells = _row_of(*(here[what].values for what in ("speed", "value", "limit")))
+                values = curves.sel(measure=name)
+                proof, label = str(curves["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
+                cells = _row_of(*(values[what].values for what in ("speed", "value", "limit")))
                 # a case lists only its own measures
                 if cells is not None or proof in ("infeasible", FAILED):
                     rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
@@ -187,7 +187,9 @@ class SpeedMapStudy(Part):
         data = _readable(data)
         designs = list(_designs(data))
         panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
-        panels += [_orders(*one) for one in designs if "amplitude" in data and one[2]["amplitude"].notnull().any()]
+        panels += [
+            _orders(*design) for design in designs if "amplitude" in data and design[2]["amplitude"].notnull().any()
+        ]
         words = "Each design over speed, at constant load."
         words += (
             " Strokes on the axis: speeds at which an order meets a natural frequency."
@@ -203,11 +205,11 @@ class SpeedMapStudy(Part):
 def _row_of(speeds: Array, values: Array, limits: Array) -> list[str] | None:
     if np.isnan(values).all():
         return None
-    maximum, known = int(np.nanargmax(values)), limits[np.isfinite(limits)]
+    maximum, finite = int(np.nanargmax(values)), limits[np.isfinite(limits)]
     cells = [number(np.nanmin(values)), number(values[maximum]), f"{speeds[maximum]:.4g}"]
     over = speeds[values > limits * (1.0 + 1e-6)]
     where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
-    return [*cells, number(known[0]), where] if len(known) else [*cells, NOTHING, NOTHING]
+    return [*cells, number(finite[0]), where] if len(finite) else [*cells, NOTHING, NOTHING]
 
 
 def _speed_curves(
@@ -241,12 +243,12 @@ def _speed_curves(
     return {"values": values.tolist(), "orders": present, "sizes": [sizes[h].tolist() for h in present], "modes": modes}
 
 
-def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Array, own: float) -> list[float]:
-    lowest = np.full(len(speeds), own)
+def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Array, part_limit: float) -> list[float]:
+    lowest = np.full(len(speeds), part_limit)
     for limit in problem.limits:
         if replace(limit.measure, points=None) == measure and limit.measure.includes_point(load):
-            there = (speeds == load.speed) | (limit.measure.points is None)
-            lowest[there] = np.minimum(lowest[there], limit.maximum)
+            applies = (speeds == load.speed) | (limit.measure.points is None)
+            lowest[applies] = np.minimum(lowest[applies], limit.maximum)
     return [float(value) if math.isfinite(value) else math.nan for value in lowest]
 
 
@@ -289,23 +291,23 @@ def _panel(data: xr.Dataset, designs: Sequence[tuple[str, str, xr.Dataset]], k: 
     cases = list(dict.fromkeys(case for case, *_ in designs))
     lines: list[p.Mark] = []
     borders: list[p.Mark] = []
-    for case, design, one in designs:
-        speeds, values, limits = one["speed"].values, one["value"].values[:, k], one["limit"].values[:, k]
+    for case, design, curves in designs:
+        speeds, values, limits = curves["speed"].values, curves["value"].values[:, k], curves["limit"].values[:, k]
         is_initial = design == INITIAL
         single: p.Colour = "before" if is_initial else "after"
         colour = single if len(cases) == 1 else p.colour(cases.index(case), len(cases))
         label = design if len(cases) == 1 else f"{case}, {design}"
         lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if is_initial else ()))
-        there = np.isfinite(limits)
+        finite = np.isfinite(limits)
         # a limit at a single operating point is a stroke
-        look: dict[str, Any] = {"width": 1.2} if there.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}
-        borders.append(p.Line(speeds[there], limits[there], dash=p.DASHES[1], behind=True, **look))
+        look: dict[str, Any] = {"width": 1.2} if finite.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}
+        borders.append(p.Line(speeds[finite], limits[finite], dash=p.DASHES[1], behind=True, **look))
     name, unit = str(data["measure"].values[k]), str(data["measure_unit"].values[k])
     top = max(float(data[what].isel(measure=k).max()) for what in ("value", "limit") if data[what].notnull().any())
     label, ends = f"{name} [{unit}]" if unit else name, (0.0, 1.08 * top or 1.0)
     # a single panel has room for the name on its axis
-    alone = data.sizes["measure"] == 1 and "amplitude" not in data
-    axis, title = (p.Axis(label, ends), "") if alone else (p.Axis(ends=ends), label)
+    is_single = data.sizes["measure"] == 1 and "amplitude" not in data
+    axis, title = (p.Axis(label, ends), "") if is_single else (p.Axis(ends=ends), label)
     return p.Panel([*lines, *borders], _speed_axis(data), axis, title)
 
 
@@ -313,19 +315,21 @@ def _speed_axis(data: xr.Dataset) -> p.Axis:
     return p.Axis(f"crank speed [{RPM}]", (float(data["speed"].min()), float(data["speed"].max())))
 
 
-def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
+def _orders(case: str, design: str, curves: xr.Dataset) -> p.Panel:
     """Draw the amplitude of every order; strokes on the axis mark speeds at which it meets a natural frequency."""
-    speeds, top = one["speed"].values, float(one["amplitude"].max()) or 1.0
+    speeds, top = curves["speed"].values, float(curves["amplitude"].max()) or 1.0
     edge = float(speeds.max() + 0.015 * np.ptp(speeds))
     marks: list[p.Mark] = []
-    for k, order in enumerate(one["order"].values):
-        values, colour = one["amplitude"].values[:, k], p.colour(k, one.sizes["order"])
+    for k, order in enumerate(curves["order"].values):
+        values, colour = curves["amplitude"].values[:, k], p.colour(k, curves.sizes["order"])
         if np.isnan(values).all():
             continue
         marks.append(p.Line(speeds, values, colour))
         marks.append(p.Words(edge, (1.08 - 0.11 * k) * top, f"order {order:g}", colour=colour))
-        met = 2.0 * math.pi * PER_RAD * one["frequency"].values[0] / order if "frequency" in one else np.zeros(0)
-        met = met[(met > speeds.min()) & (met < speeds.max())]
-        marks.append(p.Line(met, np.zeros(len(met)), colour, width=0.0, marker="|", size=10.0))
-    title = f"{case}, {design}: orders of {one['amplitude'].attrs['of']} [{one['measure_unit'].values[0]}]"
-    return p.Panel(marks, _speed_axis(one), p.Axis(ends=(0.0, 1.15 * top)), title)
+        critical = (
+            2.0 * math.pi * PER_RAD * curves["frequency"].values[0] / order if "frequency" in curves else np.zeros(0)
+        )
+        critical = critical[(critical > speeds.min()) & (critical < speeds.max())]
+        marks.append(p.Line(critical, np.zeros(len(critical)), colour, width=0.0, marker="|", size=10.0))
+    title = f"{case}, {design}: orders of {curves['amplitude'].attrs['of']} [{curves['measure_unit'].values[0]}]"
+    return p.Panel(marks, _speed_axis(curves), p.Axis(ends=(0.0, 1.15 * top)), title)
