@@ -25,7 +25,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value, place_measures
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from one_cylinder import cylinder_pressure
 
 FAST, USUAL, QUICK = 12, 14, 20_000
@@ -171,7 +171,7 @@ def test_error_with_gas_is_not_below_the_true_one(seed: int) -> None:
     angles = QUICK if seed < FAST else ANGLES if seed < USUAL else 5 * ANGLES
     found = evaluate(problem)
     value = objective_value(problem, found)
-    stated = error_of(problem, found)
+    stated = objective_error(problem, found)
     assert abs(value - _truth(problem, angles)) <= (stated + 1e-9) * value
     # and it is worth reading
     assert stated < 0.05
@@ -207,7 +207,7 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
         whole[:, 1:] += np.stack([gas.imag, gas.real], axis=1)
         truth = max(truth, float(np.sqrt((whole**2).sum(axis=1)).max()))
     assert value == pytest.approx(truth, rel=1e-4)
-    assert abs(value - truth) <= error_of(problem, evaluation) * value + 1e-9 * value
+    assert abs(value - truth) <= objective_error(problem, evaluation) * value + 1e-9 * value
 
 
 def test_a_limited_peak_keeps_its_limit_at_the_bend(tmp_path: Path) -> None:

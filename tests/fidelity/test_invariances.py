@@ -14,7 +14,7 @@ from laufruhe.machine import Mount, OperatingPoint, Rotor, Seiliger, SliderCrank
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 
 SEEDS = first_fast(range(60), 8, 13)
 POWERS = {channels.MOUNT_FORCE: 1, channels.SHAKING_FORCE: 1, channels.ROLL_MOMENT: 2, channels.ROCKING_COUPLE: 2}
@@ -23,7 +23,7 @@ POWERS = {channels.MOUNT_FORCE: 1, channels.SHAKING_FORCE: 1, channels.ROLL_MOME
 
 def _value(problem: Problem) -> tuple[float, float]:
     evaluation = evaluate(problem)
-    return objective_value(problem, evaluation), error_of(problem, evaluation)
+    return objective_value(problem, evaluation), objective_error(problem, evaluation)
 
 
 def _changed(problem: Problem, parts: list[SliderCrank], rotors: list[Rotor], mounts: list[Mount]) -> Problem:

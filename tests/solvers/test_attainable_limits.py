@@ -26,7 +26,7 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections.reach import sentences, tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.attainable_limits import LONG, with_attainable_limits
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design, infeasible_result
 from laufruhe.solvers.result import Result, Status
@@ -249,7 +249,7 @@ def test_a_design_that_was_overlooked_is_the_result() -> None:
         assert found.objective.name == "mean mount force"
         assert found.objective.value == pytest.approx(found.final.value(found.problem.objective[0].measure))
         assert found.certificate.lower_bound == 0.0
-        assert found.error_estimate == error_of(found.problem, found.final) > 0.0
+        assert found.error_estimate == objective_error(found.problem, found.final) > 0.0
         assert not found.reached
 
 

@@ -28,7 +28,7 @@ TIMES, MOST_GAS = 4, 23040
 """Factor by which the steps of the gas pressure grow, and their largest number per cycle."""
 
 
-def error_of(problem: Problem, evaluation: Evaluation) -> float:
+def objective_error(problem: Problem, evaluation: Evaluation) -> float:
     """Return an upper bound of the relative error of the objective.
 
     With an automatic fidelity the error is against the reference physics. A fidelity that the file states counts as
@@ -120,4 +120,4 @@ def solve_accurately(problem: Problem, solve: Callable[[Problem], Result]) -> Re
         if better == result.problem.fidelity:
             break
         result = solve(problem.at(better))
-    return replace(result, error=partial(error_of, result.problem, result.final))
+    return replace(result, error=partial(objective_error, result.problem, result.final))

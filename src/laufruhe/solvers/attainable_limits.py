@@ -21,7 +21,7 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     conflict_message,
@@ -269,7 +269,7 @@ def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Res
         ),
         limits=limit_values(problem, candidate.final, {}, value),
         initial=result.initial,
-        error=partial(error_of, restored, candidate.final),
+        error=partial(objective_error, restored, candidate.final),
     )
 
 

@@ -23,7 +23,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import why_no_order
@@ -279,7 +279,7 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
         initial=initial,
         final=design.evaluation,
         message=message,
-        error=partial(error_of, problem, design.evaluation),
+        error=partial(objective_error, problem, design.evaluation),
         timing=timing,
     )
 
@@ -311,7 +311,7 @@ def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
         final=evaluation,
-        error=float if evaluation.resonance else partial(error_of, problem, evaluation),
+        error=float if evaluation.resonance else partial(objective_error, problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )
 

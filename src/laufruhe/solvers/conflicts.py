@@ -10,7 +10,7 @@ from laufruhe.problem.measure import Limit
 T = TypeVar("T")
 
 
-def smallest(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
+def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
     """Return a smallest subset that still conflicts: without any of its elements there is no conflict.
 
     Parameters
@@ -28,4 +28,4 @@ def smallest(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool])
 
 def smallest_conflict(limits: Sequence[Limit], conflicts: Callable[[Sequence[Limit]], bool]) -> tuple[str, ...]:
     """Return the names of a smallest set of limits that no design meets together."""
-    return tuple(limit.name for limit in smallest(limits, conflicts))
+    return tuple(limit.name for limit in smallest_conflicting(limits, conflicts))

@@ -38,7 +38,7 @@ MOST_STARS = 60
 """Largest number of stars, firing orders and sets of shafts that are solved one by one."""
 
 
-def solve_generally(
+def solve_by_local_programs(
     problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool], starts: Sequence[Sequence[Value]] = ()
 ) -> Result:  # fmt: skip
     """Return the best design of local programs from several starts, with the lower bound zero.
@@ -54,7 +54,7 @@ def solve_generally(
     """
     phasing = problem.phasing
     if phasing is not None and (phasing.continuous or phasing.throw_bounds is not None):
-        return solve_moved_throws(problem, phasing, lambda moved: solve_generally(moved, decide, by_cones))
+        return solve_moved_throws(problem, phasing, lambda moved: solve_by_local_programs(moved, decide, by_cones))
     if phasing is not None:
         return solve_star_by_star(problem, decide)
     started = time.perf_counter()

@@ -34,7 +34,7 @@ WIDER = (0.0, 10.0 * SAMPLED)
 """Further relative slacks, tried in turn until the solver finds a design."""
 
 
-def solve_in_order(problem: Problem, solve: Solve) -> Result:
+def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
     """Minimise each rank in order, with limits on the objectives of earlier ranks."""
     single = problem.changed(ranks=())
     stages: list[Result] = []

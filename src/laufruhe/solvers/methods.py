@@ -47,7 +47,7 @@ from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_polished
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
 from laufruhe.solvers.failed_proof import without_proof
-from laufruhe.solvers.lexicographic import solve_in_order
+from laufruhe.solvers.lexicographic import solve_lexicographic
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
@@ -82,9 +82,9 @@ def _closes_without_places(problem: Problem) -> bool:
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
     """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
-    from laufruhe.solvers.general import solve_generally
+    from laufruhe.solvers.general import solve_by_local_programs
 
-    return solve_generally(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
+    return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
 
 
 def _solve_flywheel(problem: Problem) -> Result:
@@ -459,7 +459,7 @@ class Reduction:
 
 REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("refined sampling", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
-    Reduction("lexicographic objectives", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
+    Reduction("lexicographic objectives", lambda p: bool(p.ranks), lambda p, decide, _: solve_lexicographic(p, decide),
               _refuse_ranks),
     Reduction("constant limits", lambda p: bool(_constant_limits(p)), _without_constant_limits),
     Reduction("constant objective", _has_constant_objective, _solve_without_decisions),

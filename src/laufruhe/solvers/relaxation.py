@@ -46,7 +46,7 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
         return result
     counts = ((len(getattr(problem, what)) - len(getattr(relaxed, what)), name) for what, name in PARTS)
     left_out = " and ".join(counted(count, name) for count, name in counts if count)
-    return with_bound(result, certificate.lower_bound, f"bound without {left_out}")
+    return with_better_bound(result, certificate.lower_bound, f"bound without {left_out}")
 
 
 def _with_all_limits(proven: Result, problem: Problem) -> Result:
@@ -58,7 +58,7 @@ def _with_all_limits(proven: Result, problem: Problem) -> Result:
     return replace(proven, problem=proven.problem.changed(limits=problem.limits), limits=tuple(limits))
 
 
-def with_bound(result: Result, bound: float, source: str) -> Result:
+def with_better_bound(result: Result, bound: float, source: str) -> Result:
     """Return a result with a lower bound from another source, if that is higher than its own.
 
     Parameters

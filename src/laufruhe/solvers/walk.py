@@ -26,7 +26,7 @@ from laufruhe.problem.phasing import SOONEST, Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import unproven_certificate
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import Design, limit_values, priced_decisions, values_of
 from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
@@ -411,7 +411,7 @@ def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -
             return False
         # the bound may hold for the samples of the fidelity only
         coarse = replace(evaluation, samples=min(evaluation.samples, result.problem.fidelity.samples))
-        factor = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
+        factor = 1.0 + 2.0 * objective_error(problem, coarse) + ROUNDING
         if witness.value * factor + numerical_zero(problem, evaluation.engine) >= bound:
             return False
     standings = ((limit, evaluation.check_limit(limit)) for limit in problem.limits)
@@ -443,7 +443,7 @@ def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bo
         limits=limit_values(problem_of_design, witness.evaluation),
         final=witness.evaluation,
         message="",
-        error=partial(error_of, problem_of_design, witness.evaluation),
+        error=partial(objective_error, problem_of_design, witness.evaluation),
         phasing=details,
         ranks=_rank_values(result, witness),
         nearest=None,

@@ -34,7 +34,7 @@ from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, OpenNo
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate, unproven_certificate
 from laufruhe.prove.witness import Witness, check_near_witness
 from laufruhe.solvers import walk
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
 from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
@@ -85,7 +85,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
         limits=limit_values(problem, final), initial=initial, final=final,
         message="" if is_feasible else "the best assembly violates a limit, which the choice ignores; relax it",
-        error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
+        error=partial(objective_error, problem, final), timing={"solve": time.perf_counter() - started},
         details=search.result(chosen, [part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
     return result if witness is None else without_proof(result, BoundError("a walk", bound, value))
@@ -108,7 +108,7 @@ def _walk(problem: Problem, lots: Sequence[Lot], start: Chosen, bound: float, se
             best_known, best_evaluation, minimum = chosen, evaluation, objective_value(problem, evaluation)
             neighbours = list(_neighbours(lots, chosen))
             queue = [neighbours[k] for k in random.permutation(len(neighbours))]
-    margin = 1.0 + 2.0 * error_of(problem, best_evaluation) + walk.ROUNDING
+    margin = 1.0 + 2.0 * objective_error(problem, best_evaluation) + walk.ROUNDING
     return best_known if minimum * margin + numerical_zero(problem, best_evaluation.engine) < bound else None
 
 

@@ -32,7 +32,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, make_certificate
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     Design,
@@ -265,7 +265,7 @@ def robust_result(
         initial=evaluate(problem),
         final=design.evaluation,
         message="" if is_feasible else message,
-        error=partial(error_of, problem, details.worst_engine),
+        error=partial(objective_error, problem, details.worst_engine),
         timing=timing,
         details=details,
     )  # fmt: skip

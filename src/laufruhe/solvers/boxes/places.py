@@ -25,7 +25,7 @@ from laufruhe.solvers.boxes.search import divide_boxes
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
-from laufruhe.solvers.relaxation import with_bound
+from laufruhe.solvers.relaxation import with_better_bound
 from laufruhe.solvers.result import Result, Status
 
 Solve: TypeAlias = Callable[[Problem], Result]
@@ -112,7 +112,7 @@ def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Prop
         return result
     first = RebalancedDesign(evaluate_design(problem, values_of(problem, result), result.final.samples), result)
     _, bound, _ = divide_boxes(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
-    return with_bound(result, bound, f"{method} with places at the corners of their bounds")
+    return with_better_bound(result, bound, f"{method} with places at the corners of their bounds")
 
 
 class PlaceSearch(RebalancedSearch[_Box]):

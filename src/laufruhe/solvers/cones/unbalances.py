@@ -33,7 +33,7 @@ from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.cones.newton_polish import Optimum, polish
 from laufruhe.solvers.cones.tie_break import break_ties
-from laufruhe.solvers.conflicts import smallest
+from laufruhe.solvers.conflicts import smallest_conflicting
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
@@ -272,4 +272,4 @@ def smallest_conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str,
     def excluded(indices: Sequence[int]) -> bool:
         return is_infeasible(replace(affine, limits=tuple(affine.limits[k] for k in indices)))
 
-    return tuple(names[k] for k in smallest(range(len(affine.limits)), excluded))
+    return tuple(names[k] for k in smallest_conflicting(range(len(affine.limits)), excluded))

@@ -11,7 +11,7 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import ProofStrength, make_certificate
-from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import quote_names, violated_limits, with_constant_limits
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
@@ -88,7 +88,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
             value, bound, zero_level, problem.tolerance, ProofStrength.EXACT, proof.kkt_residual, method
         ),
         phasing=details,
-        error=partial(error_of, result.problem, result.final),
+        error=partial(objective_error, result.problem, result.final),
     )
 
 
