@@ -224,7 +224,7 @@ def test_time_is_not_solved_for() -> None:
 def test_open_mounts_keep_all_modes() -> None:
     problem = load(PROBLEMS / "powertrain-least-force.toml")
     assert choose(problem, 0.3).fidelity.modes is None
-    with pytest.raises(ModelError, match="mounts that are open"):
+    with pytest.raises(ModelError, match="mounts, which are open"):
         solve(replace(problem, fidelity=Fidelity(mounts="rigid")))
 
 

@@ -41,4 +41,4 @@ def test_error_of_a_mean_with_corners_is_told_and_not_exceeded() -> None:
     error = abs(limit.value / truth - 1.0)
     assert 1e-4 < error <= limit.error_estimate < 10.0 * error
     (grid,) = tables(result)
-    assert "Samples may have missed" in grid.note
+    assert "from sampling the cycle" in grid.note

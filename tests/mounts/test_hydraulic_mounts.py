@@ -219,7 +219,7 @@ def test_a_table_is_read_with_its_units(tmp_path: Path) -> None:
         (HYDRAULIC, ROWS, '[[constraints]]\nlimit = "natural frequencies"\nmin = "4 Hz"', "depends on frequency"),
         (HYDRAULIC, ROWS, '[[constraints]]\nlimit = "kinetic-energy decoupling"\nmin = 0.5', "depends on frequency"),
         (HYDRAULIC.replace('mass = "25 kg"', 'mass = "0 kg"'), ROWS, "", "fluid_track.mass"),
-        (HYDRAULIC.replace("260 N/mm", "0 N/mm"), ROWS, "", "is zero, and moves no fluid"),
+        (HYDRAULIC.replace("260 N/mm", "0 N/mm"), ROWS, "", "is zero, so no fluid moves"),
         (TABLED, "1, 200, 5\n10, 150, 30\n5, 420, 8\n", "", "have to rise"),
         (TABLED, "1, 200, 5\n10, 150, -30\n", "", "has a loss angle of -30 deg in row 2"),
         (TABLED, "1, 200, 5\n", "", "fewer than two rows"),

@@ -267,7 +267,7 @@ def test_both_are_proven_and_stops_save_stiffness(least_stiff) -> None:
     ("cases", "more", "told"),
     [
         ("", LIMIT, "needs load cases"),
-        ('[[load_cases]]\nname = "nothing"\n', "", "is no load"),
+        ('[[load_cases]]\nname = "nothing"\n', "", "has no load"),
         (CASES + CASES, "", "bump"),
         (CASES, LIMIT.replace("max", 'load_cases = ["pothole"]\nmax'), "is no load case here"),
         (CASES, LIMIT.replace("max", 'mounts = ["rear"]\nmax'), "is no mount here"),

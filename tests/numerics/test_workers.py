@@ -230,7 +230,7 @@ def test_what_ends_its_workers_is_given_up() -> None:
     with Processes(1) as pool:
         with pytest.raises(WorkerDied):
             pool.submit(os._exit, 3).result()
-        with pytest.raises(WorkersGone, match="again and again"):
+        with pytest.raises(WorkersGone, match="repeatedly"):
             list(unordered_map(os._exit, [3], pool))
 
 

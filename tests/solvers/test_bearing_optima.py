@@ -173,7 +173,7 @@ def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None
     alone = read(tmp_path, rubbing + WEBS + asked("mean friction power", 'bearings = ["2"]'))
     measure = alone.objective[0].measure
     assert result.final.value(measure) == pytest.approx(lost[1], rel=2e-4)
-    with pytest.raises(InputError, match=r"objective\.alternating.*its steady part rubs as well; leave it out"):
+    with pytest.raises(InputError, match=r"objective\.alternating.*which includes the steady load; leave it out"):
         read(tmp_path, rubbing + WEBS + asked("mean friction power", "alternating = true"))
     assert with_alternating_loads(alone).objective == alone.objective
 

@@ -234,7 +234,7 @@ orders = [1]
     assert [part.reciprocating_mass for part in result.final.engine.slider_cranks] == pytest.approx(
         [0.7, 0.7], rel=1e-4
     )
-    with pytest.raises(InputError, match="nothing of this engine follows"):
+    with pytest.raises(InputError, match="has no effect in this engine"):
         loaded(tmp_path, changed(text, '{ x = "50 mm" }', '{ x = "50 mm", reciprocating_mass = "1 kg" }'))
 
 
