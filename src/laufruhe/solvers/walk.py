@@ -35,7 +35,7 @@ from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
 from laufruhe.solvers.stars.star_results import phase_decisions
 from laufruhe.solvers.values import ObjectiveValue, RankValue
 
-MOST, SEED = 64, 0
+MAX_EVALUATIONS, SEED = 64, 0
 """Largest number of evaluations, and seed of the random directions."""
 SHARE, SECONDS = 0.03, 0.01
 """Processor time of a walk: share of the time of the solve, and smallest time [s]."""
@@ -154,7 +154,7 @@ class _LocalSearch:
         pending = [next(source, None) for source in sources]
         count = 0
         for k in itertools.cycle(range(len(sources))):
-            if not any(pending) or count >= MOST or is_over():
+            if not any(pending) or count >= MAX_EVALUATIONS or is_over():
                 return witness
             if (step := pending[k]) is None:
                 continue

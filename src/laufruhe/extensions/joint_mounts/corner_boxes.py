@@ -45,7 +45,7 @@ BOXES = 4
 """Boxes for each vertex, with up to three numbers."""
 WORTH = 0.7
 """Gain below which the series of an order converges fast enough for useful bounds."""
-FEW = 2
+MIN_CORNER_SHARE = 2
 """Smallest budget of vertices, as a multiple of those of a box."""
 NO_PRICE = 1e-8
 """Price of a limit, in objectives, that counts as zero."""
@@ -125,7 +125,7 @@ class DesignBoxes:
     def max_boxes(self) -> int:
         """Box budget: as requested, or for some tens of seconds."""
         count = len(self.lower)
-        if self.max_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
+        if self.max_corners < MIN_CORNER_SHARE * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
             return 0
         return self.loads.problem.search.boxes_or(BOXES * self.max_corners // max(4 ** (count - 3), 1))
 

@@ -99,7 +99,7 @@ def _walk(problem: Problem, lots: Sequence[Lot], start: Chosen, bound: float, se
     """Return an assembly below a bound that a walk by exact evaluations finds; None if it finds none."""
     random, deadline = np.random.default_rng(walk.SEED), time.thread_time() + seconds
     best_known, best_evaluation, minimum, queue = start, _evaluated(problem, lots, start), math.inf, [start]
-    for _ in range(walk.MOST):
+    for _ in range(walk.MAX_EVALUATIONS):
         if not queue or time.thread_time() > deadline:
             break
         chosen = queue.pop()

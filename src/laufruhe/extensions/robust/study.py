@@ -42,7 +42,7 @@ CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0
 MOUNTED = 200
 """Most engines with mount forces: each costs as much as a thousand free forces."""
-LEAST, TALL = 0.1, 0.7
+MIN_FORCE, DENSITY_HEIGHT = 0.1, 0.7
 """Left end of the axis [kp], where smaller forces are drawn; height of a density over that of a row."""
 _TOP, _STEP = -0.55, 0.3
 """Position of the lowest label above the rows, and distance of labels, in rows."""
@@ -269,7 +269,7 @@ class ToleranceStudy(Part):
         top = _TOP - 0.25 - (_STEP if len(stated) > 1 else 0.0)
         panel = p.Panel(
             [mark for k, row in enumerate(rows) for mark in _row(row, k)] + _marks(data, len(rows)),
-            p.Axis("largest free force over the cycle [kp]", (LEAST, max(2.0 * maximum, 10.0 * LEAST)), log=(1.0,)),
+            p.Axis("largest free force over the cycle [kp]", (MIN_FORCE, max(2.0 * maximum, 10.0 * MIN_FORCE)), log=(1.0,)),
             p.Axis(ends=(len(rows) - 0.5, top), ticks=[(k, _label(row)) for k, row in enumerate(rows)], grid=False),
         )
         legend: list[p.Mark] = [
@@ -315,9 +315,9 @@ def _label(row: xr.Dataset) -> str:
 def _row(row: xr.Dataset, k: int) -> list[p.Mark]:
     places, density = _density(row["random"].values / GRAVITY, row["share"].values)
     worst, nominal = float(row["worst"]) / GRAVITY, float(row["nominal"]) / GRAVITY
-    marker = max(nominal, LEAST)
+    marker = max(nominal, MIN_FORCE)
     return [
-        p.Area(places, np.full(len(places), k), k - TALL * density),
+        p.Area(places, np.full(len(places), k), k - DENSITY_HEIGHT * density),
         p.Line([worst], [k - 0.3], "after", marker="|", size=14.0, width=0.0),
         p.Words(worst * 1.08, k - 0.3, f"{worst:.0f}", "after"),
         p.Line([marker], [k - 0.3], marker="D", width=0.0),

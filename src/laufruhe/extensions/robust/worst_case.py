@@ -310,7 +310,7 @@ class _TermAbout:
         self.lengths = lengths(self.rows)
         block_reaches = [_reach(norm, block, cached) for block in blocks]
         ends = np.cumsum([0, *(reach.move.shape[-1] for reach in block_reaches)])
-        self.own = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self.slices = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
         self.moves = np.concatenate([np.zeros((*self.rows.shape, 0)), *(reach.move for reach in block_reaches)], axis=2)
         self.reaches = np.array([reach.rows for reach in block_reaches]).reshape(len(blocks), len(self.rows))
         self.sizes = weight * np.array([reach.size for reach in block_reaches])
@@ -323,7 +323,7 @@ class _TermAbout:
             return bound
         pulls = np.einsum("kd,kdn->kn", rows, self.moves)
         pull_sum = np.zeros(len(rows))
-        for block, numbers in zip(self.blocks, self.own, strict=True):
+        for block, numbers in zip(self.blocks, self.slices, strict=True):
             pull_sum += (
                 np.hypot.reduce(pulls[:, numbers], axis=1) if block.is_disc else np.abs(pulls[:, numbers]).sum(axis=1)
             )
@@ -346,7 +346,7 @@ def _over_majorants(
     The ends of up to MOST_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
     bounded one by one.
     """
-    numbers_of = parts[0].own
+    numbers_of = parts[0].slices
     count = parts[0].moves.shape[2]
     constant, slope, curvature = 0.0, np.zeros(count), np.zeros((count, count))
     for part, majorant in zip(parts, majorants, strict=True):

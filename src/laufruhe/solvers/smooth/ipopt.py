@@ -185,7 +185,7 @@ class _Program:
 
     solver: Any
     clock: _Clock
-    kept: Any = None
+    memory: Any = None
 
     def value(self, y: Array, parameters: Sequence[float]) -> float:
         """Return the objective at a point."""

@@ -38,7 +38,7 @@ NARROWEST = 1e-9
 _MOST_PROOFS = 8
 # number of angles of an arc in a mixture: smallest; largest for shared angles and for throws, by the number of shared
 # angles; and the largest phase between two angles in the highest order that counts [rad]
-_FEWEST, _MOST_SHARED, _MOST, _APART = 3, (1, 5, 3), (12, 6, 5), 0.6
+_MIN_STEPS, _MAX_SHARED_STEPS, _MAX_STEPS, _STEP = 3, (1, 5, 3), (12, 6, 5), 0.6
 # relative size of an order that does not count for the number of angles of an arc
 _NEGLIGIBLE = 0.02
 
@@ -391,13 +391,13 @@ class Mixture:
         throws, shared_count = len(program.order_sizes), orders.shape[1] - 1
         rows, self._weights = program.reduced, program.order_sizes[:, : len(orders)]
         is_heavy = self._weights > _NEGLIGIBLE * self._weights.max()
-        step_limits = (_MOST[shared_count],) * throws + (_MOST_SHARED[shared_count],) * shared_count
+        step_limits = (_MAX_STEPS[shared_count],) * throws + (_MAX_SHARED_STEPS[shared_count],) * shared_count
         side_orders = [
             *(np.where(row, orders[:, 0], 0.0) for row in is_heavy),
             *np.where(is_heavy.any(axis=0), orders[:, 1:].T, 0.0),
         ]
         steps = [
-            min(max(math.ceil(float(np.abs(row).max(initial=0.0)) * width / _APART) + 1, _FEWEST), limit)
+            min(max(math.ceil(float(np.abs(row).max(initial=0.0)) * width / _STEP) + 1, _MIN_STEPS), limit)
             if width > 0.0
             else 1
             for row, width, limit in zip(side_orders, upper - lower, step_limits, strict=True)
