@@ -269,7 +269,9 @@ class ToleranceStudy(Part):
         top = _TOP - 0.25 - (_STEP if len(stated) > 1 else 0.0)
         panel = p.Panel(
             [mark for k, row in enumerate(rows) for mark in _row(row, k)] + _marks(data, len(rows)),
-            p.Axis("largest free force over the cycle [kp]", (MIN_FORCE, max(2.0 * maximum, 10.0 * MIN_FORCE)), log=(1.0,)),
+            p.Axis(
+                "largest free force over the cycle [kp]", (MIN_FORCE, max(2.0 * maximum, 10.0 * MIN_FORCE)), log=(1.0,)
+            ),
             p.Axis(ends=(len(rows) - 0.5, top), ticks=[(k, _label(row)) for k, row in enumerate(rows)], grid=False),
         )
         legend: list[p.Mark] = [
