@@ -57,7 +57,7 @@ class PageState:
     def from_json(cls, body: object) -> PageState:
         """Parse a request; `Refused` if it is malformed."""
         if not isinstance(body, dict) or not set(body) <= {"edits", "held", "design", "has", "position"}:
-            raise _strange("request", "is no table of edits, held, design, has and position")
+            raise _strange("request", "must be a table of edits, held, design, has and position")
         design, has, position = body.get("design", {}), body.get("has", ""), body.get("position", 0)
         if not isinstance(design, dict) or len(design) > MOST_EDITS or not all(map(_is_number, design.values())):
             raise _strange("design", "is no table of names and numbers")

@@ -40,7 +40,7 @@ class ParetoFront:
 
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
-            raise ModelError("what is open here has no front that is drawn while one looks; hold what is not affine")
+            raise ModelError("these open numbers have no front; fix those that loads are not affine in")
         others = tuple(limit for limit in problem.limits if limit.measure != across)
         top = 1e300
         self._limit = Limit(across.name, across, top)
