@@ -164,13 +164,13 @@ class Scale:
         """
         if than is not None:
             return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
-        return self._once("loses", fidelity, lambda own: self.largest_change(own, self.best))
+        return self._cached_bound("loses", fidelity, lambda own: self.largest_change(own, self.best))
 
     def relative_sampling_error(self, fidelity: Fidelity) -> float:
         """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
-        return self._once("misses", fidelity, self.sampling_error)
+        return self._cached_bound("misses", fidelity, self.sampling_error)
 
-    def _once(self, name: str, fidelity: Fidelity, error: Callable[[Evaluation], float]) -> float:
+    def _cached_bound(self, name: str, fidelity: Fidelity, error: Callable[[Evaluation], float]) -> float:
         key = name, replace(fidelity, tolerance=None)
         if key not in self._known:
             self._known[key] = relative(error(self.evaluation(fidelity)), self.value)
@@ -221,7 +221,7 @@ class Scale:
         by_name = {rotor.name: rotor for rotor in rotors}
         for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
             rotor = by_name[drive.rotor]
-            rotors.append(rotor.placed(*(at + (k == drive.axis) for k, at in enumerate(rotor.place))))
+            rotors.append(rotor.placed(*(coordinate + (k == drive.axis) for k, coordinate in enumerate(rotor.place))))
         return [rotor_loads([rotor], 1.0, self.problem.engine.cycle) for rotor in rotors]
 
     @cached_property
@@ -300,11 +300,11 @@ def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float
     for change in (lambda gas: _straight(gas, cycle), _thinned):
         points = tuple(replace(point, gas=change(fidelity.gas_of(point))) for point in problem.points)
         changed = evaluate(replace(problem, points=points, fidelity=still), evaluation.engine)
-        changes.append(sum(term.weight * _apart(term.measure, initial, changed) for term in scale.terms))
+        changes.append(sum(term.weight * _norm_of_difference(term.measure, initial, changed) for term in scale.terms))
     return steps, min(changes)
 
 
-def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
+def _norm_of_difference(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
     # norm of the difference at many angles, which also shows spikes
     pairs = zip(ours.loads, theirs.loads, strict=True)
     differences = [measure.load.signal(a) + measure.load.signal(b).mapped(np.negative) for a, b in pairs]

@@ -58,8 +58,8 @@ class BatchNorm:
         starts = range(0, len(features), block)
         if not self.norm.is_monotone_in_lengths:
             for start in starts:
-                own = slice(start, start + block)
-                norms[own] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[own]))
+                part = slice(start, start + block)
+                norms[part] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[part]))
             return norms
 
         def work(block_starts: Sequence[int]) -> None:

@@ -34,7 +34,7 @@ class Cluster(Executor):
         call, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
         # cancelling the future cancels the call
         answer.add_done_callback(lambda done: call.cancel() if done.cancelled() else None)
-        call.add_done_callback(partial(_tell, answer))
+        call.add_done_callback(partial(_copy_result, answer))
         return answer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -52,7 +52,7 @@ class Cluster(Executor):
         return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
 
 
-def _tell(answer: Future[Any], call: Any) -> None:
+def _copy_result(answer: Future[Any], call: Any) -> None:
     if not answer.set_running_or_notify_cancel():
         return
     try:

@@ -63,7 +63,9 @@ def enclosing_balls(points: Array) -> EnclosingBalls:
         if not len(active):
             break
         candidates = np.concatenate([support[active], farthest[:, None]], axis=1)
-        selection, radii[active], centres[active], shares[active] = _of_few(scaled[active[:, None], candidates])
+        selection, radii[active], centres[active], shares[active] = _ball_of_candidates(
+            scaled[active[:, None], candidates]
+        )
         support[active] = np.take_along_axis(candidates, selection, axis=1)
     return EnclosingBalls(radii * units, centres * units[:, None], support, shares)
 
@@ -73,7 +75,7 @@ def _squares(points: Array, centres: Array) -> Array:
     return np.asarray(np.einsum("skd,skd->sk", offsets, offsets))
 
 
-def _of_few(points: Array) -> tuple[Indices, Array, Array, Array]:
+def _ball_of_candidates(points: Array) -> tuple[Indices, Array, Array, Array]:
     """Return support indices, radii, centres and shares of the balls of d + 2 points, shape (sets, d + 2, d).
 
     The last point lies outside the ball of the others, so it is a support point. Among the circumcentres of all subsets

@@ -14,7 +14,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Step:
-    """One report of the progress of a search.
+    """Report of the progress of a search.
 
     Attributes
     ----------

@@ -178,10 +178,10 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
     signals: dict[str, tuple[str, str, tuple[CurveAxis, ...], Callable[[PointLoads], Spectrum]]] = {
-        "shaking_force": ("shaking force", "N", (), lambda one: one.wrench.mapped(lambda c: c[..., :3])),
-        "shaking_moment": ("shaking moment", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 3:])),
-        "roll_moment": ("roll moment", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 3:4])),
-        "rocking_couple": ("rocking couple", "N m", (), lambda one: one.wrench.mapped(lambda c: c[..., 4:])),
+        "shaking_force": ("shaking force", "N", (), lambda loads: loads.wrench.mapped(lambda c: c[..., :3])),
+        "shaking_moment": ("shaking moment", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 3:])),
+        "roll_moment": ("roll moment", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 3:4])),
+        "rocking_couple": ("rocking couple", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 4:])),
     }
     for name, words, place, channel in _places(first):
         axes = (CurveAxis(place, tuple(channel.places(first.engine))),)
@@ -190,7 +190,7 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         name: [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
         for name, (_, _, _, signal) in signals.items()
     }
-    count = max(len(one.coefficients) for rows in spectra.values() for row in rows for one in row)
+    count = max(len(spectrum.coefficients) for rows in spectra.values() for row in rows for spectrum in row)
 
     def amplitudes(spectrum: Spectrum) -> Array:
         # a resonance has no finite amplitude
@@ -200,7 +200,7 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
         return np.where(np.isfinite(values), values, math.inf)
 
     fields = [
-        Field(name, words, unit, axes, np.array([[amplitudes(one) for one in row] for row in spectra[name]]))
+        Field(name, words, unit, axes, np.array([[amplitudes(spectrum) for spectrum in row] for row in spectra[name]]))
         for name, (words, unit, axes, _) in signals.items()
     ]
     orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))

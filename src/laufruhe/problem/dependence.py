@@ -112,7 +112,7 @@ def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
     return name, row | {KINDS[kind]: _LETTERS[letter] for kind, letter in additions if kind in KINDS}
 
 
-def _with_added(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
+def _with_extensions(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
     """Return the table of the core with the lines of extensions about their own channels or kinds."""
     missing = set(CHANNELS).difference(core_rows)
     table: dict[str, Mapping[Kind, Dependence]] = {
@@ -135,7 +135,7 @@ def _with_added(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Ma
     return table
 
 
-TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_added(dict(map(_row, _TABLE.strip().splitlines()[1:])))
+TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_extensions(dict(map(_row, _TABLE.strip().splitlines()[1:])))
 """Dependences by the name of the channel and the kind of decision."""
 # loads of bearings depend on the positions of rotors on the shafts that they carry
 _OF_BEARINGS = frozenset(

@@ -60,7 +60,7 @@ class Evaluation(EvaluatedDesign):
         """Names of the mounts in the order of the engine."""
         return [mount.name for mount in self.engine.mounts]
 
-    def rows(self, measure: Measure, samples: int | None = None, bends: Sequence[Array] | None = None) -> Rows:
+    def rows(self, measure: Measure, samples: int | None = None, kink_angles: Sequence[Array] | None = None) -> Rows:
         """Return the rows of a measure of loads or masses over the whole cycle.
 
         Parameters
@@ -76,7 +76,7 @@ class Evaluation(EvaluatedDesign):
             return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
         signals = with_common_base(self.engine.cycle.base_order, self.signals(measure.load))
         points = [loads.point for loads in self.loads]
-        return load_rows(measure, points, signals, self.engine, samples or self.samples, bends)
+        return load_rows(measure, points, signals, self.engine, samples or self.samples, kink_angles)
 
     def signals(self, channel: LoadChannel) -> list[Spectrum]:
         """Return the spectrum of a channel at each operating point, shape (n, places, d)."""

@@ -304,7 +304,7 @@ def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, 
     if phasing.firing_order is not None:
         orders = [phasing.firing_order]
     elif phasing.cylinders <= _MOST_PERMUTED:
-        orders = [(1, *others) for others in itertools.permutations(range(2, phasing.cylinders + 1))]
+        orders = [(1, *remaining) for remaining in itertools.permutations(range(2, phasing.cylinders + 1))]
     else:
         orders = []
     moves: dict[tuple[float, ...], float] = {}

@@ -440,17 +440,17 @@ class Problem:
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
         """Return the engine with decisions at these values; by default all decisions."""
-        chosen = self.decisions if decisions is None else decisions
-        if any(decision.address_drives for decision in chosen):
-            return self.fixed_at(values, chosen).engine
-        return self.numbers(values, chosen).engine(self.engine)
+        selected = self.decisions if decisions is None else decisions
+        if any(decision.address_drives for decision in selected):
+            return self.fixed_at(values, selected).engine
+        return self.numbers(values, selected).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
         """Return the numbers of the engine with decisions at these values; symbols of a smooth program are allowed."""
-        chosen = self.decisions if decisions is None else decisions
-        on_mounts = any(decision.mount_drives for decision in chosen)
+        selected = self.decisions if decisions is None else decisions
+        on_mounts = any(decision.mount_drives for decision in selected)
         numbers = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
-        return apply_decisions(numbers, chosen, values)
+        return apply_decisions(numbers, selected, values)
 
 
 def _check_name(name: object) -> None:
