@@ -234,7 +234,7 @@ def test_an_extension_speaks_of_its_own_channels_alone(line: str, said: str, mon
     """Another line about a channel of the package would change what is proven of it."""
     monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
     with pytest.raises(ModelError, match=said):
-        module._with_added(module.TABLE)
+        module._with_extensions(module.TABLE)
 
 
 def test_a_line_of_an_extension_is_one_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -242,5 +242,5 @@ def test_a_line_of_an_extension_is_one_of_the_table(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(module, "CHANNELS", {**CHANNELS, own.name: own})
     line = "own force   a a a  b m >  >  s s  0"
     monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
-    row = module._with_added(module.TABLE)["own force"]
+    row = module._with_extensions(module.TABLE)["own force"]
     assert row == {kind: module.TABLE["mount force"][kind] for kind in module._COLUMNS}
