@@ -165,7 +165,7 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     Parameters
     ----------
     source
-        Path of a study file, its text, or its tables. Its problems lie beside it, or in the working folder.
+        Path of a study file, its text, or its tables. Its problems are in the same folder, or in the working folder.
     jobs
         Largest number of processes.
 

@@ -131,7 +131,11 @@ def test_what_no_design_keeps_is_said_and_not_drawn(tmp_path: Path) -> None:
 
 
 BAD = [
-    ('from = "3000 rpm", to = "1000 rpm", points = 3', "", "go nowhere; write the lower speed first"),
+    (
+        'from = "3000 rpm", to = "1000 rpm", points = 3',
+        "",
+        "do not ascend; write the lower speed as from and the higher as to",
+    ),
     ('from = "1000 rpm", to = "3000 rpm"', "", "either points or step"),
     ('from = "1000 rpm", to = "3000 rpm", step = "5000 rpm"', "", "does not fit between their ends"),
     ('from = "1 m", to = "3000 rpm", points = 3', "", "is not a unit of a speed of rotation"),

@@ -22,7 +22,7 @@ _TAKEN = ("exists with other contents", "choose another name")
 
 
 def write_draft(file: Path, name: str | None) -> str:
-    """Write a problem file with its schema beside it, and return the message about it."""
+    """Write a problem file and its schema into one folder, and return the message about it."""
     source = _checked_source(name) if name is not None else _requested_source(file)
     command = "solve"
     if source is not None and source not in engines():

@@ -64,9 +64,10 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:
-    """Write pages and pictures of every problem, and an index of several.
+    """Measure error and time of every model fidelity for each problem, and write pages and pictures.
 
-    Return the document to show, the name of its page, and a function that makes JSON.
+    Several problems get an index. Problems with an open flywheel are left out. Return the document to show, the name
+    of its page, and a function that makes JSON.
     """
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in open_kinds(problem)]

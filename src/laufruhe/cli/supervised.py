@@ -80,5 +80,5 @@ def _interrupted(number: int, _: FrameType | None) -> None:
 
 
 def is_interrupted() -> bool:
-    """Return True if this command was asked to end."""
+    """Return True if a signal requested the end of this command."""
     return bool(_heard)

@@ -1,1 +1,1 @@
-"""Capabilities beside the core, a folder each; the core imports none and finds them by being here."""
+"""Capabilities outside the core, a folder each; the core imports none and finds all folders of this package."""

@@ -65,7 +65,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 
 
 def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
-    """Return the choice of `choose` from a known reference."""
+    """Choose the cheapest fidelity within a tolerance, from error bounds relative to a known reference (F10)."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:

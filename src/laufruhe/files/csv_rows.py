@@ -1,4 +1,4 @@
-"""Rows of numbers in a CSV file beside a problem file."""
+"""Rows of numbers in a CSV file in the folder of a problem file."""
 
 from __future__ import annotations
 

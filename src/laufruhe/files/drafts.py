@@ -69,7 +69,7 @@ class _Excitation:
 
 
 def draft_of_engine(name: str) -> str:
-    """Return the text of a draft for an engine of the catalogue; `Refused` if there is none of this name."""
+    """Return the text of a draft problem file for a catalogue engine; `Refused` if no engine has this name."""
     entry = engine_named(name, "engine")
     lines = {key: f"# {key} = {toml_value(value)}" for key, value in entry.engine.items()}
     published = [line for key, line in lines.items() if key not in entry.assumed]

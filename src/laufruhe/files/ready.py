@@ -97,6 +97,6 @@ def schema_line(is_study: bool = False) -> str:
 
 
 def schema_file(is_study: bool = False) -> tuple[str, str]:
-    """Return name and text of the schema beside a file."""
+    """Return name and text of the schema for a file."""
     name = STUDY_SCHEMA if is_study else SCHEMA
     return name, (Path(__file__).parent / name).read_text(encoding="utf-8")

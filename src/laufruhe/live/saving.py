@@ -38,7 +38,7 @@ class Saved:
     numbers
         Placeholder, name in results and SI unit of every number.
     note
-        Files needed beside it, or the reason for having no file.
+        Files needed in addition to it, or the reason for having no file.
     """
 
     text: str = ""

@@ -112,7 +112,10 @@ class FiringModel(StarModel):
         return StarNorm(measure.norm, origin.vectors, moves, slope, None, origin.grid)
 
     def _loads_of_cylinder(self, load: LoadChannel, k: int) -> list[Spectrum]:
-        """Return the load of cylinder k fired in slot 0 at every point; only its gas if the star has the remainder."""
+        """Return the load spectrum of cylinder k alone, fired in slot 0, at every operating point.
+
+        A load that depends on unbalances has only its gas part here; the rows of the star hold its inertia part.
+        """
         engine = self.problem.engine
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)

@@ -94,7 +94,7 @@ class StarProblem:
 
     @property
     def compressed(self) -> StarProblem:
-        """Problem whose root mean squares have as few rows as possible (S12)."""
+        """Equivalent problem whose root mean squares have at most as many rows as columns (S12)."""
         terms, limits = (
             tuple((number, compress_norm(norm) if norm.norm.is_euclidean else norm) for number, norm in pairs)
             for pairs in (self.terms, self.limits)

@@ -92,7 +92,7 @@ class ThrowMoves:
 
     def candidate(self, x: Array) -> Candidate:
         """Return the crank at deviations x [rad], shape (size,)."""
-        # a rounding error beside a step would count as another firing angle
+        # a rounding error from a step would count as another firing angle
         throws, bank, split = self.angles(np.where(np.abs(x) < ZERO_DEVIATION, 0.0, x))
         return replace(
             self.start,

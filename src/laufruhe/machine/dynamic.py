@@ -13,7 +13,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 
 
 class Dynamic(Protocol):
-    """A spring along one own axis of a mount, beside its constant stiffness there."""
+    """A spring along one axis of a mount, in parallel with its constant stiffness."""
 
     @property
     def axis(self) -> int:

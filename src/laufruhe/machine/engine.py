@@ -76,13 +76,13 @@ class Engine:
     slider_cranks
         In the order of cylinder numbers (C3).
     mounts
-        Empty for an engine whose shaking loads alone are asked for.
+        Empty for an engine whose shaking loads alone are requested.
     block
         The body that elastic mounts carry; without one the mounts are rigid.
     bearings
-        Main bearings of its shafts; empty where nothing is asked of them.
+        Main bearings of its shafts; empty if no measure refers to them.
     flywheel
-        What turns with the crank; None where nothing is asked of it.
+        Parts that turn with the crank; None if no measure refers to them.
     geared
         Shares of the inertia of all that turns on shafts of other speeds.
     load_cases

@@ -34,7 +34,7 @@ class Extra(ABC):
         """Return the part of an engine whose lengths and masses are so many times as large."""
 
     def turning_inertia(self, _parts: Sequence[SliderCrank], /) -> float | None:
-        """Return the inertia of all that turns beside pistons and rods [kg m2]; None where it gives none."""
+        """Return the inertia of all rotating parts except pistons and rods [kg m2]; None if it has none."""
         return None
 
     @property

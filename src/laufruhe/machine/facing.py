@@ -18,7 +18,7 @@ from laufruhe.machine.slider_crank import SliderCrank, Swept
 from laufruhe.numerics.roots import rising_root
 
 MOST_AHEAD = 0.5 * math.pi
-"""Crank angle by which one of two pistons may come to its dead centre first: farther apart they hardly compress."""
+"""Crank angle by which one piston may lead the other to its dead centre: beyond it they hardly compress."""
 STEPS = 720
 
 

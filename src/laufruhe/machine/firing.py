@@ -36,7 +36,7 @@ class FiringLattice:
     Attributes
     ----------
     steps
-        R, the number of different crank angles at which something fires, a turn apart
+        R, the number of different crank angles at which a cylinder fires, within one turn
         counted as one.
     slots
         Step of each of the n firings of a cycle, in their order.
@@ -61,12 +61,14 @@ def firing_lattice(cycle: Cycle, cylinders: int) -> FiringLattice:
 
 
 def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], ...]:
-    """Return the dead centres of each throw's cylinders, in steps after cylinder 1, the throw beside throw 1 (S6).
+    """Return the dead centres of each throw's cylinders (S6).
+
+    Values are steps after cylinder 1, for a throw at the angle of throw 1.
 
     Raises
     ------
     NoEvenStarError
-        If two cylinders of one throw are apart by no whole number of steps.
+        If the angle between two cylinders of one throw is no whole number of steps.
     """
     first = layout.dead_centre_turn(0)
     out = []

@@ -1,7 +1,7 @@
 """Shares of the firings of a cycle between throws when intervals are bounded (S25).
 
-Cylinders of one throw fire as far apart as their banks and pins stand, give or take whole turns, whatever
-the throw does. Firings are numbered from 0 to n - 1: a throw takes a set of them, all throws
+The interval between cylinders of one throw is the angle between their banks and pins, plus whole turns. It does
+not depend on the throw. Firings are numbered from 0 to n - 1: a throw takes a set of them, all throws
 together take each once, and the moments of the firings are then a linear program.
 """
 

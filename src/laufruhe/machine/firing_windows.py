@@ -4,7 +4,7 @@ A cylinder fires at t_k = 2 pi l_k - (theta_p + c_k), p its throw, c_k what its 
 turns. Bounds on intervals, and on throws, are bounds on differences of two throws, or of a throw and
 nothing: a network whose shortest paths are the tightest bounds, and which no crank keeps where a circle is negative.
 Where the bank angle or split pins are open, it is one of own angles, theta_p - s_k beta with beta their sum and
-s_k = +- 1/2 the side of a cylinder; two of one throw are as far apart as beta lets them be. Throws that are open are
+s_k = +- 1/2 the side of a cylinder; the angle between two of one throw depends on beta. Throws that are open are
 then counted from where cylinder 1 at its dead centre has the first one, as theta_p - s_1 beta.
 """
 

@@ -25,7 +25,7 @@ DEGREES = 4
 """Number of functions whose jumps are computed: the value and its first three derivatives."""
 SAME_ANGLE = 1e-10
 _WIDTH = 0.06
-"""Longest interval beside a kink on which a polynomial is fitted for the derivatives [rad]."""
+"""Longest interval next to a kink on which a polynomial is fitted for the derivatives [rad]."""
 _NODES = 6
 _PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
 # shortest interval, and the largest degree of a polynomial that it determines to enough digits
@@ -121,7 +121,7 @@ class SignalKinks:
         return np.minimum(total, self.beyond(count, base)[0])
 
     def curvature(self, period: float) -> Array:
-        """Return the second derivative of the closed form at equal steps and beside each kink, shape (n, ...)."""
+        """Return the second derivative of the closed form at equal steps and at both sides of kinks, shape (n, ...)."""
         steps = period * np.arange(_STEPS) / _STEPS
         return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 

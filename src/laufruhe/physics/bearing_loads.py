@@ -11,7 +11,7 @@ A rod that is hinged to a master rod presses its knuckle pin so; the master's pi
 master's piston leans on its wall by as much more as turns the master rod back (B11).
 
 Pins, webs and counterweights load the crankshaft, each in its own plane; it is taken as cut in the
-middle of its journals, so that the two bearings beside a load share it by the lever rule (B4). Bearings
+middle of its journals, so that the two bearings next to a load share it by the lever rule (B4). Bearings
 are linear in every unbalance on their shaft. Taken as one beam, the shaft hands some of a load on to farther
 bearings (B6), still linear. What gears and belts add is not modelled.
 """
@@ -39,7 +39,7 @@ from laufruhe.physics.star_loads import order_index, spread
 
 OfPart: TypeAlias = Callable[[Cycle, SliderCrank, float, GasModel | None, Fidelity], Spectrum]
 PinReaction: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array, ...]]
-"""What is felt of the force at a piston pin, at some angles of the crank; whether masses at other pins count."""
+"""Reaction to the force at a piston pin, at some crank angles; the flag is True if masses at other pins count."""
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
@@ -313,7 +313,7 @@ def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], 
 def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
     """Return the shares by the lever rule, shape (bearings, places) (B4).
 
-    A load beside all bearings hangs over: the two nearest carry it, the far one upwards.
+    A load outside all bearings hangs over: the two nearest carry it, the far one upwards.
     """
     order = np.argsort(bearings)
     x = np.asarray(bearings, dtype=float)[order]

@@ -71,7 +71,7 @@ def phase_waves(phases: int, orders: Sequence[int]) -> NDArray[np.complex128]:
 def _joined_tables(
     phases: int, places: Sequence[float], orders: Sequence[int]
 ) -> tuple[list[Array], list[tuple[int, ...]]]:
-    """Return tables of contributions of groups of throws, one row for each of their joint steps."""
+    """Return tables of sums of F_h and C_h (S1) over groups of throws; one row for each combination of steps."""
     waves = phase_waves(phases, orders).T
     single = [np.stack([waves, x * waves], axis=-1).reshape(phases, -1).view(float) for x in places]
     width = 1
@@ -131,7 +131,7 @@ class StarSpace:
         Of the throws along x [m].
     mirror, reflect
         Whether a star equals its front-back mirror image, and the star that turns the
-        other way round, in all that is asked of it (S2).
+        other way round, in all measures of the problem (S2).
     """
 
     phases: int

@@ -56,7 +56,7 @@ class Fidelity:
         How bearings share its loads: "cut" in the middle of every journal, or as a "beam" of one stiffness
         along all of them.
     tolerance
-        Relative error of the objective that an automatic choice was asked for.
+        Relative error of the objective that was requested of an automatic choice.
 
     Raises
     ------

@@ -43,7 +43,7 @@ def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArra
 
 
 def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChamber, SliderCrank, Cycle, float]:
-    # Y3: gas, piston and cycle of one chamber, and its pace; a burn is told in crank angles of the engine
+    # Y3: gas, piston and cycle of one chamber, and its pace; a burn is stated in crank angles of the engine
     check_chamber(gas, part)
     swept = part.swept
     if isinstance(gas, Wiebe) and swept.pace != 1.0:

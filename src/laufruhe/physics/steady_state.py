@@ -54,7 +54,7 @@ def periodic_state(
     """Return the steady state by integration over one period, shot until it closes (E28).
 
     The start that repeats itself is found by Newton's method; the columns of its matrix
-    are integrated beside the motion itself.
+    are integrated together with the motion itself.
 
     Raises
     ------
@@ -181,8 +181,8 @@ class TimeMounting:
 def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
     """Return the mount forces by order of the equations that time integrates, without bump stops (E25, E26).
 
-    What integration alone is off by shows beside these; what E26 changes shows beside
-    `ElasticMounting.forces`.
+    A comparison with these forces shows the error of the integration alone; one with `ElasticMounting.forces`
+    shows the effect of E26.
 
     Returns
     -------

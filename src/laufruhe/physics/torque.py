@@ -51,7 +51,7 @@ class TorqueFacts:
     excursion
         Work that is stored and given back within the cycle [J] (T2).
     irregularity
-        Largest less smallest speed over the mean speed (T3); None where no inertia of what turns is told.
+        Largest less smallest speed over the mean speed (T3); None if the inertia of rotating parts is unknown.
     """
 
     mean: float
@@ -165,7 +165,7 @@ class Swing:
     bent_inertia: Array
 
     def speeds(self, inertia: float) -> Array:
-        """Return the crank speed over the cycle with an inertia beside pistons and rods [rad/s] (F2-F4).
+        """Return the crank speed over the cycle with an inertia without pistons and rods [rad/s] (F2-F4).
 
         Raises
         ------
@@ -189,7 +189,7 @@ class Swing:
         return float((speeds.max() - speeds.min()) / self.speed)
 
     def minimum_inertia(self, degree: float) -> float:
-        """Return the least inertia beside pistons and rods for a degree of irregularity [kg m2] (T3).
+        """Return the least inertia without pistons and rods for a degree of irregularity [kg m2] (T3).
 
         Zero where none is needed. The degree falls as the inertia grows.
         """
@@ -218,7 +218,7 @@ def _compute_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) ->
 
 
 def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
-    """Return the degree of irregularity with an inertia beside pistons and rods [kg m2] (T3)."""
+    """Return the degree of irregularity with an inertia without pistons and rods [kg m2] (T3)."""
     return swing_of(engine, point, fidelity).irregularity(inertia)
 
 
@@ -240,9 +240,9 @@ def _reduced_inertia(part: SliderCrank) -> float:
 
 
 def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
-    """Return the inertia beside pistons and rods [kg m2]: of uneven speed, flywheel or extension; else None.
+    """Return the inertia without pistons and rods [kg m2]: of uneven speed, flywheel or extension; else None.
 
-    None where none of these is told.
+    None if none of these is known.
     """
     if fidelity.is_uneven:
         return fidelity.crank_inertia

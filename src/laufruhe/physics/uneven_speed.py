@@ -125,7 +125,7 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
         for part in engine.slider_cranks:
             total += _slider_loads(part, motion, fidelity)
         total[:, 3] += torque.values(motion.angle)
-        # what speeds up beside the crank (L8)
+        # parts that accelerate with the crank (L8)
         total[:, 3] += geared_factor(engine) * fidelity.crank_inertia * motion.acceleration
         return total
 

@@ -47,7 +47,7 @@ class FrictionTest:
     x, y
         Of every reading.
     target
-        Speed [rad/s], or brake mean pressure [Pa], that is asked for.
+        Speed [rad/s], or brake mean pressure [Pa], that is requested.
     friction, deviations
         Told by the line, and how many deviations are looked at to either side.
     """

@@ -79,7 +79,7 @@ def bodies(axes: Axes, pose: Pose) -> None:
 
 
 def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
-    """Draw the walls of a cylinder between its dead centres, and return a point beside them."""
+    """Draw the walls of a cylinder between its dead centres, and return a point next to them."""
     turn = cmath.exp(1j * pose.part.bank)
     along = complex((pose.piston - pose.crank) / turn)
     ends = [Pose.at_angle(pose.part, phi).piston for phi in np.linspace(0.0, math.tau / abs(pose.part.shaft.ratio), 13)]

@@ -87,7 +87,7 @@ Mark: TypeAlias = Line | Bars | Area | Words
 class Axis:
     """Axis of numbers, or of texts at their places (`ticks`).
 
-    The end may be the smaller value; without ends the marks decide. A logarithmic axis is told the first figures
+    The end may be the smaller value; without ends the marks decide. A logarithmic axis takes the first figures
     of its ticks.
     """
 

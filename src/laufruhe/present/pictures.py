@@ -41,7 +41,7 @@ _CAPTIONS = {
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
-    "willans": "Fuel over the load at the brake, or drag over speed, and the line that gives the friction.",
+    "willans": "Fuel over brake load with the Willans line, or drag over speed; the fitted line gives the friction.",
     "torque": "Torque of gas, pistons and rods, its work and orders, and the crank speed with the flywheel.",
     "bearings": "Force on each main bearing over a cycle, on block and crankshaft, and its wear.",
     "spectrum": "Amplitudes of the loads by order of crank speed.",

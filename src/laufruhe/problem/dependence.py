@@ -147,7 +147,7 @@ _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
 
 def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
-    """Return the dependence of a channel on one kind of decision of a problem; UNKNOWN by default."""
+    """Return how a channel varies with decisions of one kind (affine, smooth ...): table entry and exceptions."""
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
     entry = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)

@@ -76,7 +76,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Sector:
-    """A complex number of limited size with its angle between bounds; a disc if these are a turn apart (C4)."""
+    """A complex number of limited size with its angle between bounds; a disc if these differ by a turn (C4)."""
 
     upper: float
     angles: tuple[float, float] = (0.0, math.tau)

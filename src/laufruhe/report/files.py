@@ -217,7 +217,7 @@ def write_all(texts: Mapping[Path, str]) -> None:
 
 @contextmanager
 def _stage_for(place: Path) -> Iterator[Path]:
-    """Yield an unfinished folder beside a place; remove those that killed runs left there."""
+    """Yield an unfinished folder next to a path; remove those that killed runs left there."""
     missing = [path for path in place.parents if not path.exists() and not path.is_symlink()]
     mark = f".unfinished-{hashlib.sha256(place.name.encode(errors='surrogateescape')).hexdigest()[:8]}-"
     with ExitStack() as stack:

@@ -62,7 +62,7 @@ def fidelity_of(result: Result) -> str:
         return text
     chosen = "" if f.tolerance is None else f" Chosen for an error of {f.tolerance:g}."
     if result.error_estimate < NEGLIGIBLE:
-        return f"{text}{chosen} Numerical error: negligible."
+        return f"{text}{chosen} Numerical error of the objective: negligible."
     return f"{text}{chosen} Numerical error of the objective: at most {100.0 * result.error_estimate:.1g} %."
 
 

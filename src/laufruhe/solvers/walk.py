@@ -178,7 +178,7 @@ class _LocalSearch:
         return witness
 
     def _evaluate(self, point: Point, best: EvaluatedPoint | None) -> EvaluatedPoint | None:
-        """Evaluate a design; None without finite loads, or if its objective is not below that of the best one."""
+        """Evaluate a design; None without finite loads, or if a feasible best design is at least as good."""
         problem = point.problem
         try:
             engine, final = problem.design(point.values), self.final

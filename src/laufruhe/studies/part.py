@@ -96,7 +96,7 @@ class Part(Table):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return one piece of work as JSON values; it depends on the settings and the point only.
 
-        A `ModelError` is the fault of the point, and is told so.
+        A `ModelError` is the fault of the point, and is recorded as such.
         """
         raise NotImplementedError
 

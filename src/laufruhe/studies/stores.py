@@ -38,7 +38,10 @@ class Store(Protocol):
 def stores_of(
     study: StudyFile, scenes: Scenes, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
-    """Yield every store with the fingerprints that it holds: regions for draws, one file for all other points."""
+    """Yield each store with the fingerprints of the points assigned to it, finished or not.
+
+    Random draws of a part go to regions of an array, all other points to one file.
+    """
     marks, root = set(tasks), regions_in(finished.parent)
     templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
     if templates:
@@ -55,7 +58,7 @@ def stores_of(
 
 
 def regions_in(folder: Path) -> Path:
-    """Return the folder of the store of draws, beside the folder of results."""
+    """Return the folder of the store of draws, next to the folder of results."""
     return folder.with_name(f"{folder.name}.zarr")
 
 

@@ -64,7 +64,7 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
     Parameters
     ----------
     named
-        Coordinates that tell rows apart beside case and swept values.
+        Coordinates that distinguish rows in addition to case and swept values.
     """
     data = readable_metric(data)
     columns = ["case", *named, *swept_names(data)]

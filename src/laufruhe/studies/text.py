@@ -19,9 +19,9 @@ UNSTATED = "not in the study"
 """Replaces the study's number for values that it does not state."""
 
 NEGLIGIBLE = 0.07
-"""Change of a force that cannot be told apart in the bars of a printed figure, by which the study judges."""
+"""Change of a force that is invisible in the bars of a printed figure, by which the study judges."""
 NOTICEABLE = 0.15
-"""Change that stands out in the same bars: about twice what cannot be told apart."""
+"""Change that stands out in the same bars: about twice the invisible change."""
 PRINTED_FALL = 0.05
 """Allowed on a printed fall of the mean force: a rod ratio of 0.22 instead of 0.26 takes off four points, a compression
 ratio of 20.5 instead of 17 five, and the study prints neither."""
@@ -29,7 +29,7 @@ ratio of 20.5 instead of 17 five, and the study prints neither."""
 
 @dataclass(frozen=True)
 class Verdict:
-    """Statement of a source beside the value found here, with the tolerance or reason that decides."""
+    """Statement of a source with the value computed here, with the tolerance or reason that decides."""
 
     statement: str
     paper: str

@@ -33,7 +33,7 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.warm_start import first_search, is_convex, reoptimise, solve_by_cones
 
 REFERENCE_STEPS = 1440
-"""Steps over the period at which the optimum beside which a regret is counted is solved."""
+"""Steps over the period for the optimum from which a regret is measured."""
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
 KEEPS = 1e-3
 """Share by which a design may be beyond a limit at the reference and count as a decision."""
@@ -105,7 +105,7 @@ class Trade:
         Reference objective of the design as given, and of the best design known [SI]; NaN where nothing is open.
     flywheel
         Crank inertia at which the constant speed was priced [kg m2], and the relative
-        change of the objective that the uneven speed makes; None where no load is asked.
+        change of the objective that the uneven speed makes; None if no measure is of a load.
     time_domain
         Comparison in time; None for rigid mounts.
     left_out

@@ -1,4 +1,4 @@
-"""Economics of balancer shafts: least force over their number and mass, beside engines with more cylinders.
+"""Economics of balancer shafts: least force over their number and mass, compared with engines of more cylinders.
 
 The engines with more cylinders have no shafts and equal power (eqs. 14-23); `worth` holds the rules.
 """

@@ -34,7 +34,7 @@ from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.text import NOTHING, Text, marked_table, number, statement_table
 
 SAME = 1e-4
-"""Relative difference of forces below which proofs cannot tell designs apart."""
+"""Relative difference of forces below which proofs cannot distinguish designs."""
 LINE = 0.052
 """Height of a line of text over that of its panel."""
 
@@ -91,7 +91,7 @@ class BuildTable(Table):
 
 
 class Economics(Part):
-    """Least force over number and mass of shafts, beside the engine with one more cylinder at equal power."""
+    """Least force over number and mass of shafts, compared with the engine with one more cylinder at equal power."""
 
     kind: Literal["economics"]
     alternating: bool = f.optional(

@@ -6,7 +6,7 @@ with its own certificate on the exact model, and the price of the limit says wha
 The economics are the study's own (Hasselgruber 1964, Massenausgleich): shafts are justified
 by comparison with the engine of one more cylinder, and by what they change at the mounts.
 
-W1  What cannot be told apart. Two forces closer than `NEGLIGIBLE` look alike in the bars by
+W1  Indistinguishable forces. Two forces closer than `NEGLIGIBLE` look alike in the bars by
     which the study judges.
 W2  What is noticed. A fall of twice that, `NOTICEABLE`, stands out in the same bars.
 W3  A set of shafts is worth building if it takes off a noticeable share of the least force

@@ -145,7 +145,7 @@ class CoupleNorms:
         heavy = np.argsort(-shares, kind="stable")[:2]
         touching_points = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
         for row, chosen in zip(touching_points, itertools.product(turns, repeat=len(heavy)), strict=True):
-            # small beside what no couple changes, where there is any
+            # small compared with the part that no couple changes, if there is one
             row[heavy] = np.array(chosen) / np.maximum(shares[heavy], 1e-300)
         constant_part = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
         unit = SMALL * max(constant_part, float(shares.max(initial=0.0)) * SHORT)

@@ -158,7 +158,7 @@ class HighOrder:
 
 @dataclass(frozen=True, eq=False)
 class Chord:
-    """Absolute value |constant + slopes' s| over a box, bounded above by the chord between its ends."""
+    """Absolute value |constant + slopes' s| over a box, bounded above by the chord between its values at the bounds."""
 
     constant: float
     slopes: Array

@@ -203,7 +203,10 @@ def is_lifted(problem: Problem) -> bool:
 
 
 def open_mounts(problem: Problem, lower: Array, upper: Array, frames: PlaneFrames | None = None) -> OpenMounts:
-    """Return the open mounts of a problem that `is_lifted`, for open numbers between bounds, shape (n,) each."""
+    """Return matrices and bounds of the open mounts over a box of the decisions; the problem must be `is_lifted`.
+
+    The box has the bounds `lower` and `upper`, shape (n,) each.
+    """
     mounting, maps = mounting_in(problem.engine), ParameterMaps(problem, lower, upper, frames)
     root = mass_root(mounting.block)
     count, centre = len(maps.low), np.array(mounting.block.centre_of_gravity)

@@ -1,4 +1,4 @@
-"""Replicating a paper by a file: expressions, what may be asked of a case, and what is drawn."""
+"""Replicating a paper by a file: expressions, quantities of a case, and pictures."""
 
 from laufruhe.extension import Extension
 

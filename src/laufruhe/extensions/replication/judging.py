@@ -1,4 +1,4 @@
-"""Statements of a source beside what is computed here."""
+"""Statements of a source compared with computed values."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 class Replication(Part):
-    """Part of a paper or textbook: what it says beside what is computed here."""
+    """Part of a paper or textbook: its statements, compared with values computed here."""
 
     kind: Literal["replication"]
     says: str = f.optional("Statement of the source, in a sentence.", "")
@@ -177,7 +177,7 @@ class Replication(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return the source's words, and every statement beside our value."""
+        """Return the source's words, and every statement with the computed value."""
         lead = [f"Source: {data.attrs['says']}"] if data.attrs["says"] else []
         return [*lead, *rows(data)]
 

@@ -154,4 +154,4 @@ RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "lower bound": _bound,
     **{f"{c} over the cycle": partial(_over_cycle, Measure(c)) for c in CHANNELS.values() if c.is_load},
 }
-"""Quantities beside the measures."""
+"""Quantities in addition to the measures."""

@@ -1,4 +1,4 @@
-"""Picture of the best assembly beside random assemblies, the given one, and parts of mean mass."""
+"""Picture of the best assembly together with random assemblies, the given one, and parts of mean mass."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ FREE = 3
 LENGTHS = np.linspace(0.0, 1.0, 9)[1:]
 """Shares of a step towards an assignment that are tried."""
 PER_KILOGRAM = 0.01
-"""Mass step for the slopes of loads [kg]: small beside a piston."""
+"""Mass step for the slopes of loads [kg]: small compared with a piston."""
 
 
 def solve_assembly(problem: Problem, *_: object) -> Result:

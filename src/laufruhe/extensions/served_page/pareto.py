@@ -18,7 +18,7 @@ POINTS = 25
 _USUAL = ("maximum mount force", "mean mount force", "rms shaking force", "rms rocking couple", "counterweight mass",
           "balancer mass", "maximum main-bearing force")  # fmt: skip
 _NARROW = 1e-3
-"""Relative width of a range that is too narrow for points between its ends."""
+"""Relative width of a range that is too narrow for points within it."""
 
 
 def partners(problem: Problem) -> dict[str, Measure]:
@@ -40,7 +40,7 @@ class ParetoFront:
 
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
-            raise ModelError("these open numbers have no front; fix those that loads are not affine in")
+            raise ModelError("a live Pareto front needs affine decisions and loads as objective; fix the others")
         others = tuple(limit for limit in problem.limits if limit.measure != across)
         top = 1e300
         self._limit = Limit(across.name, across, top)

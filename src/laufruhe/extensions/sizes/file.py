@@ -38,7 +38,7 @@ from laufruhe.problem.problem import Problem
 
 
 class WebsTable(Table):
-    """The two webs beside every pin."""
+    """The two webs adjacent to every pin."""
 
     width: f.OpenPositiveLength = f.required("Width of a web across the shaft.")
     thickness: f.OpenPositiveLength = f.required("Width along the shaft.")

@@ -29,7 +29,7 @@ BIG_END, ROD_LENGTH, _ACROSS = "big end", ("rod", "length"), ("diameter", "width
 
 @dataclass(frozen=True)
 class Webs:
-    """Two webs of a rectangular section beside each pin.
+    """Two webs of a rectangular section adjacent to each pin.
 
     Attributes
     ----------

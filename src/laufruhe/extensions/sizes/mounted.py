@@ -74,7 +74,7 @@ def _starts(program: LocalProgram, without_mounts: Problem) -> list[Array]:
 
 
 def _decision_values(without_mounts: Problem, result: Result) -> list[Value]:
-    """Return the values of decisions, read from a result."""
+    """Return the values of the decisions of a problem in its order; affine ones from the unbalances of rotors."""
     values = {entry.name: entry.value for entry in result.decisions}
     rotors = {rotor.name: rotor.unbalance for rotor in result.final.engine.rotors}
     unbalances = {rotor.name: rotor.unbalance for rotor in result.initial.engine.rotors}

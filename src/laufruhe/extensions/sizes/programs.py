@@ -1,6 +1,6 @@
 """Lower bounds of boxes of sizes by multipliers of the whole problem, if unbalances are open too (Z14).
 
-Rows are affine in masses and unbalances. With the masses as further decisions between their ends, and factors at their
+Rows are affine in masses and unbalances. With the masses as further decisions within their bounds, and factors at their
 minimum, a box has a cone program whose optimum is a lower bound. Its multipliers bound the box, and with the factors
 and masses of any other box they bound that one.
 """

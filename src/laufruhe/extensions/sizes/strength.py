@@ -59,7 +59,7 @@ def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 
 def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the bearing forces beside each throw [N], by its own piece of shaft, shape (n, 2 cylinders, 3) (Z4).
+    """Return the forces of bearings next to each throw [N], from its piece of shaft, shape (n, 2 cylinders, 3) (Z4).
 
     Raises
     ------
@@ -89,7 +89,7 @@ def journal_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -
 
 
 def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return bending force [N] and torque [N m] of the journals beside each throw, shape (n, 2 cylinders, 4) (Z6)."""
+    """Return bending force [N] and torque [N m] of the journals next to each throw, shape (n, 2 cylinders, 4) (Z6)."""
     forces = side_forces(engine, point, fidelity)
     places = [bearing.x for part in engine.slider_cranks for bearing in _span(engine, part)]
     torques = _torques(engine, point, fidelity, places)
@@ -198,7 +198,7 @@ def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def side_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Return edge stresses per force and torque of the journals beside each throw, shape (2 cylinders, 4) (Z6)."""
+    """Return edge stresses per force and torque of the journals next to each throw, shape (2 cylinders, 4) (Z6)."""
     rows = []
     for part in engine.slider_cranks:
         for diameter, width in map(_journal, _span(engine, part)):

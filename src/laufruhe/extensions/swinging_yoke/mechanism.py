@@ -23,7 +23,7 @@ _WEIGHT = 7850.0 * _THICKNESS
 class SwingingYoke(SliderCrank):
     """Crank with a swinging lever; the ram takes the place of the piston.
 
-    The pivot is at -i e beside the crank axis, in the plane turned to the ram's axis (C5). alpha = 0 where the
+    The pivot is at -i e from the crank axis, in the plane turned to the ram's axis (C5). alpha = 0 where the
     crank pin lies along that axis; the slow stroke, towards the crank, has the pin on the far side of the pivot.
 
     Attributes

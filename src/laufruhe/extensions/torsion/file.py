@@ -69,7 +69,7 @@ class CrankTable(SectionTable):
 
 
 class DiscTable(Table):
-    """A disc beside the throws."""
+    """A disc in addition to the throws."""
 
     name: Name
     end: Literal["front", "rear"]
@@ -176,7 +176,7 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     """A disc a throw from the front, with what its pistons and rods reduce to the crank."""
     places = sorted({throw.x for throw in throws}, reverse=True)
     at = [[k for throw in throws if throw.x == x for k in throw.cylinders] for x in places]
-    # what of a throw's mass turns beside its rods
+    # the mass of a throw that turns, without its rods
     turning = [sum(abs(throw.unbalance) for throw in throws if throw.x == x) for x in places]
     inertias = _for_each(table.throw_inertia, len(places), "torsion.throw_inertia", "throws")
     dampings = _for_each(table.cylinder_damping, len(places), "torsion.cylinder_damping", "throws")

@@ -87,7 +87,7 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
 
 
 def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:
-    # names of orders where they leave the panel, above it or to its right, apart from each other
+    # names of orders where they leave the panel, above it or to its right, without overlap
     above = [order for order in orders if order * high / math.tau > reach]
     right = [order for order in orders if order not in above]
     width, height = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi

@@ -34,8 +34,8 @@ MOST_OPEN, MOST_BOXES = 3, 3000
 def solve_torsion(problem: Problem) -> Result:
     """Return the best discs, shafts and absorbers found, with the bound of the boxes, or a proven conflict of limits.
 
-    Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. What else
-    is asked has a bound by these in it alone.
+    Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. A bound
+    of any other measure uses these numbers only.
     """
     started = time.perf_counter()
     initial = evaluate(problem)

@@ -38,7 +38,7 @@ class DriveKind(ABC):
     Attributes
     ----------
     keys
-        Of [engine], beside those of every drive.
+        Of [engine], in addition to those of every drive.
     has_rod
         Whether a connecting rod swings between crank pin and piston.
     """

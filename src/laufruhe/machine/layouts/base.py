@@ -89,7 +89,7 @@ class LayoutKind(ABC):
     Attributes
     ----------
     keys
-        Of [engine], beside those of every layout.
+        Of [engine], in addition to those of every layout.
     lists
         Of the keys `throws`, `firing_order`, `slider_cranks` and `shafts` those that it takes.
     openable
@@ -101,7 +101,7 @@ class LayoutKind(ABC):
     is_free
         Whether every slider-crank is listed, and nothing is placed.
     fires_evenly
-        Whether open throws stand on the steps of even firing alone, and are told apart by loads on the block.
+        True if open throws take the steps of even firing only, and loads on the block distinguish them.
     needs_rod
         Whether a drive without a connecting rod means nothing here.
     has_pistons

@@ -63,7 +63,7 @@ class Mechanism:
         x, throw, bank, firing_angle, shaft
             Place [m] and angles [rad]; see `SliderCrank`.
         pin_mass
-            What turns at the crank pin beside the rod's share [kg].
+            Rotating mass at the crank pin without the rod's share [kg].
         """
         plain = SliderCrank(
             name=f"cylinder {number}",

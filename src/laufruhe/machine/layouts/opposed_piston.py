@@ -30,7 +30,7 @@ def facing_pistons(
     lead
         Crank angle by which its pistons come to their dead centre first [rad].
     pin_mass
-        What turns at its crank pins beside the rods' shares [kg].
+        Rotating mass at its crank pins without the rods' shares [kg].
 
     Raises
     ------

@@ -33,7 +33,7 @@ class MasterRod(Mechanism):
     piston_mass
         Without any rod's share [kg], where `rod` is given.
     knuckle_mass
-        At every knuckle pin, beside the rod's share [kg].
+        At every knuckle pin, without the rod's share [kg].
     rod
         Mass, centre of gravity from the knuckle pin and inertia of an articulated rod.
     """

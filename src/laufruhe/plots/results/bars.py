@@ -59,7 +59,7 @@ def _measures(design: Evaluation, k: int) -> Array:
 def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, top: float) -> None:
     factor = in_thousands(top, "N")[0]
     all_mounts = values[0].shape[1] - 1
-    # the group of all mounts stands apart
+    # the group of all mounts is separated by a gap
     places = np.array([k - part[0] + (0.3 if k == all_mounts and len(part) > 1 else 0.0) for k in part])
     # least height of a bar with a number inside
     room = 0.18 * axes.figure.dpi / axes.bbox.height * factor * top

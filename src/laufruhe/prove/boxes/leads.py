@@ -7,9 +7,9 @@ at c by a part linear in the leads, which is minimal at a corner, and by a remai
     N(V(c + d, x)) >= <Z, V(c, x)> + sum_s d_s <Z, V_s'(c, x)> - sum_s r_s^2 K_s / 2,                (P13)
 
 K_s bounds the norm of the second derivative of the load of shaft s for every lead. Unbalances on a shaft of ratio n
-turn by n d_s. Their share of V lies on an arc, between its ends and the tangents there, and d_s is sin(n d_s) / n up to
-|n^2 r_s^3| / 6. The minimum over unbalances is concave in this share, so minimal at one of these corners. For peaks the
-remainder counts the rows of Z alone: a kink of slope J at a distance a < r_s from an angle adds J (r_s - a).
+turn by n d_s. Their share of V lies on an arc, between its end points and the tangents there. d_s is sin(n d_s) / n
+up to |n^2 r_s^3| / 6. The minimum over unbalances is concave in this share, so minimal at one of these corners. For
+peaks the remainder counts the rows of Z alone: a kink of slope J at a distance a < r_s from an angle adds J (r_s - a).
 """
 
 from __future__ import annotations

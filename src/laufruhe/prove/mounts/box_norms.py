@@ -168,7 +168,7 @@ def _lengths(rows: Array) -> Array:
 
 
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
-    """Bound the root of a weighted sum of squares; orders whose series may diverge count as zero."""
+    """Return a linear lower bound of a weighted root sum of squares; orders whose series may diverge count as zero."""
     is_finite = np.isfinite(answer.remainder)
     value, slopes = (
         np.where(is_finite[..., None], answer.value, 0.0),

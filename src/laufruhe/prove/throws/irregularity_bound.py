@@ -1,11 +1,11 @@
 """Lower bound of the degree of irregularity by the work that is stored at even speed (T11).
 
-With u = w^2 between its ends u_1 < u_2 and m = J_0 + J, F2 is m u / 2 - W = E, a constant. By the work S that is
+With u = w^2 between its bounds u_1 < u_2 and m = J_0 + J, F2 is m u / 2 - W = E, a constant. By the work S that is
 stored at even speed (T2), tight where the inertia is large,
 
     u_2 - u_1 >= S / (m_max / 2 + (J_max - J_min) / 4),      delta >= (1 + (u_2 - u_1) / w_0^2)^(1/2) - 1,
 
-for half of m times u less its middle spans no more than m_max (u_2 - u_1) / 2, and w_0^2 lies between the ends.
+for m (u - u_mid) / 2 has a peak to peak of at most m_max (u_2 - u_1) / 2, and w_0^2 lies between u_1 and u_2.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class StoredWorkBound:
 
     @classmethod
     def from_engine(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float) -> StoredWorkBound:
-        """Return the relation for cylinders that fire at any angles, with the inertia of all rotating parts [kg m2]."""
+        """Return the bound for any firing angles; `inertia` is that of all rotating parts [kg m2]."""
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
         cylinders = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
         inertias = [moving_inertia(cylinder, fidelity, angles)[0] for cylinder in cylinders]

@@ -322,7 +322,7 @@ class SmoothProgram:
         return {side: Price.both(price) for side, price in prices_by_side.items()}
 
     def _to_variables(self, mounts: Sequence[float]) -> Array:
-        # logarithms for decisions with bounds far apart
+        # logarithms for decisions whose bounds have a large ratio
         values = np.asarray(mounts, dtype=float)
         return np.where(self._is_logarithmic, np.log(np.where(self._is_logarithmic, values, 1.0)), values)
 

@@ -26,8 +26,8 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
 
     Returns
     -------
-    The problem without these sets, and the evaluation without optional shafts; every design violates the limits that
-    this evaluation violates.
+    The problem without these sets of shafts, and the evaluation without any optional shaft. Every design violates the
+    limits that this evaluation violates.
     """
     placing = tuple(limit for limit in limits if limit.measure.channel.is_placing)
     phasing = problem.phasing

@@ -98,7 +98,7 @@ class FreeForcesCase(CaseTable):
 
 
 class FreeForces(Part):
-    """Free forces and couples of the first two orders by layout, beside the literature."""
+    """Free forces and couples of the first two orders by layout, compared with the literature."""
 
     kind: Literal["free forces"]
     cases: list[FreeForcesCase] = Field(min_length=1)  # type: ignore[assignment]

@@ -50,7 +50,7 @@ class SpeedsTable(f.Table):
     @model_validator(mode="after")
     def _is_a_range(self) -> SpeedsTable:
         if self.first >= self.last:
-            raise f.refusal("go nowhere; write the lower speed first")
+            raise f.refusal("do not ascend; write the lower speed as from and the higher as to")
         if (self.points is None) == (self.step is None):
             raise f.refusal("need either points or step; give one of them")
         if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MOST_SPEEDS:
