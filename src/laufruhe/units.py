@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 LONGEST = 100
 """Largest number of characters of a number with its unit."""
-MOST_FACTORS = 12
+MAX_FACTORS = 12
 """Largest number of names in one unit."""
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
@@ -24,7 +24,7 @@ THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
 _NAME = r"(?!\d)(?:(?![⁰¹²³⁴-⁹])[\w°%])+"
 _POWERED = rf"{_NAME}(?:⁻?[⁰¹²³⁴-⁹]| ?(?:\^|\*\*) ?-?[0-9](?:\.[0-9]{{1,3}})?)?"
-_PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MOST_FACTORS - 1}}}")
+_PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MAX_FACTORS - 1}}}")
 """Unit as a product of names and powers below ten; the registry would evaluate other texts as expressions."""
 _OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
 # full names of units of angle
@@ -231,7 +231,7 @@ def pattern(unit: str) -> str:
     return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}) *$"
 
 
-_SHOWN = {
+_UNITS = {
     "rad": ("deg", math.degrees(1.0)),
     "rad/s": ("rpm", 30.0 / math.pi),
     "m": ("mm", 1e3),
@@ -242,11 +242,11 @@ _SHOWN = {
 
 def readable(unit: str) -> tuple[str, float]:
     """Return the unit of reports for an SI unit, with powers as printed, and the factor on an SI value."""
-    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    name, factor = _UNITS.get(unit, (unit, 1.0))
     return name.replace("^2", "²").replace("^3", "³"), factor
 
 
 def quantity_text(value: float, unit: str, digits: int = 4) -> str:
     """Return an SI value as text with a common unit that files accept: degrees, mm, rpm, N/mm^2."""
-    name, factor = _SHOWN.get(unit, (unit, 1.0))
+    name, factor = _UNITS.get(unit, (unit, 1.0))
     return f"{value * factor:.{digits}g} {name}".rstrip()

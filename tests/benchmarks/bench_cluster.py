@@ -29,7 +29,7 @@ from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import SERIAL, unordered_map
 from laufruhe.plots.picture import save_picture
 from laufruhe.present import picture as p
-from laufruhe.studies.sampled import MOST_TABLED
+from laufruhe.studies.sampled import MAX_TABLED
 from studies import clusters
 
 OUT = PAGES / "cluster.md"
@@ -280,7 +280,7 @@ def asked() -> argparse.Namespace:
     """How much of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=8)
-    parser.add_argument("--evaluations", type=at_least(2 * MOST_TABLED), default=1_000_000)
+    parser.add_argument("--evaluations", type=at_least(2 * MAX_TABLED), default=1_000_000)
     parser.add_argument("--solves", type=at_least(100), default=1000)
     parser.add_argument("--long", type=int, default=5000)
     return parser.parse_args()
@@ -312,7 +312,7 @@ def main() -> None:
         sizes = grown(folder / "grown", given.evaluations, given.solves)
         long = [LONG, "", COSTS, BAR, at_once(folder / "long", given.long).row(), ""] if given.long else []
     each_one = [f"One more takes {1e6 * each_of(costs):,.1f} µs of one core." for costs in sizes]
-    lines += ["## Growth with size", "", TABLED.format(MOST_TABLED), COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
+    lines += ["## Growth with size", "", TABLED.format(MAX_TABLED), COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
     lines += [each_one[0], "", "Proven solves (least mean mount force, 144 samples of a cycle):", ""]
     lines += [COSTS, BAR, *(cost.row() for cost in sizes[1]), "", each_one[1]]
     lines += ["", *long, "![Growth with size and workers](cluster.png)", "", "## A thousand million, on paper", ""]

@@ -28,7 +28,7 @@ from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
 LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and c.is_block_load)
 # twist needs discs and shafts, and is tested with them
-OF_CRANKCASE = (channels.Needs.NOTHING, channels.Needs.BEARINGS)
+OF_CRANKCASE = (channels.Needs.UNCONDITIONAL, channels.Needs.BEARINGS)
 INSIDE = tuple(
     Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and not c.is_block_load for norm in c.norms
 )

@@ -61,5 +61,5 @@ def test_dots_of_errors_too_small_to_tell_do_not_pile_up() -> None:
     assert len(dots) == 14
     pixels = axes.transData.transform(dots)
     assert min(math.dist(one, other) for one, other in combinations(pixels, 2)) > 0.9 * trade.DOT * figure.dpi
-    assert sum(dots[:, 1] < trade.LEAST_ERROR) == 12
+    assert sum(dots[:, 1] < trade.MIN_ERROR) == 12
     assert axes.get_ylim()[0] < dots[:, 1].min()

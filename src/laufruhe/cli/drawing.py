@@ -19,7 +19,7 @@ from laufruhe.numerics.processes import ForkedWorker, Processes, call_by_name
 if TYPE_CHECKING:
     from laufruhe.solvers.result import Result
 
-MOST = 3
+MAX_VIEWS = 3
 """Largest number of processes that draw the pictures of a result."""
 SELDOM = 200_000
 """Number of new objects after which a process collects garbage: pictures have many, and little of it."""
@@ -69,7 +69,7 @@ def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Cal
     if problem.phasing is not None:
         problem = replace(problem, phasing=replace(problem.phasing, layout=_no_design, realise=_no_design))
     drawn = replace(result, problem=problem, error=float)
-    return ask("laufruhe.plots:draw_in_shares", drawn, folder, kinds, min(MOST, processors() - 1))
+    return ask("laufruhe.plots:draw_in_shares", drawn, folder, kinds, min(MAX_VIEWS, processors() - 1))
 
 
 def _no_design(*_: Any) -> NoReturn:

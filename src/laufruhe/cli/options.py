@@ -79,7 +79,7 @@ StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")]
 FROM = "Engine of the catalogue, or ready problem, to start from."
 COPIED = "Ready problems to copy, with all files that they refer to."
-SHOWN = "Engines to show: published figures, source, and assumptions."
+ENGINE_ARGUMENT = "Engines to show: published figures, source, and assumptions."
 FromOption = Annotated[
     str | None, typer.Option("--from", metavar="NAME", help=FROM, autocompletion=_completed("engines problems"))
 ]
@@ -90,7 +90,7 @@ NamesArgument = Annotated[
 ToOption = Annotated[Path, typer.Option("--to", metavar="DIR", help="Folder of the copies.")]
 KeysArgument = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[KEY...]", help=SHOWN, show_default=False, autocompletion=_completed("engines")),
+    typer.Argument(metavar="[KEY...]", help=ENGINE_ARGUMENT, show_default=False, autocompletion=_completed("engines")),
 ]
 QUIET = "Print errors only."
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]

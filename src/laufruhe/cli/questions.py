@@ -33,19 +33,19 @@ class _Question:
     ----------
     usual
         Default answer.
-    among
+    choices
         All possible answers; empty if there are many.
     """
 
     key: str
     words: str
     usual: str = ""
-    among: tuple[str, ...] = ()
+    choices: tuple[str, ...] = ()
 
 
 _QUESTIONS = (
-    _Question("layout", "Layout", "inline", among=_LAYOUTS),
-    _Question("cycle", "Cycle", "four-stroke", among=("four-stroke", "two-stroke")),
+    _Question("layout", "Layout", "inline", choices=_LAYOUTS),
+    _Question("cycle", "Cycle", "four-stroke", choices=("four-stroke", "two-stroke")),
     _Question("cylinders", "Cylinders", "4"),
     _Question("bank_angle", "Angle between the banks [deg]", "90"),
     _Question("split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0"),
@@ -67,7 +67,7 @@ def ask_engine() -> tuple[str, dict[str, Any]]:
     answers: dict[str, Any] = {}
     for question in _QUESTIONS:
         if _applies(question.key, answers):
-            hint, usual = f" ({', '.join(question.among)})" if question.among else "", question.usual
+            hint, usual = f" ({', '.join(question.choices)})" if question.choices else "", question.usual
             if question.key == "firing_order":
                 usual = _usual_order(answers)
                 if LAYOUTS[answers["layout"]].takes("bank_stagger"):
@@ -112,8 +112,8 @@ def _applies(key: str, answers: Answers) -> bool:
 
 def _read(question: _Question, before: Answers, text: str) -> Any:
     # the answer as a file has it
-    if question.among and text not in question.among:
-        raise refused(question.key, text, "is none of these", nearest(text, question.among))
+    if question.choices and text not in question.choices:
+        raise refused(question.key, text, "is none of these", nearest(text, question.choices))
     separators = _SEPARATORS.get(question.key)
     value = _value(text) if separators is None else [_value(part) for part in re.split(separators, text) if part]
     _check({**before, question.key: value})

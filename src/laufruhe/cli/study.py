@@ -31,7 +31,7 @@ def run_study(
     folder = out if out is not None else Path("results") / display_path(path).stem
     points = folder / FINISHED_POINTS
     option, file_list = "--out" if out is not None else "results", file_names(study)
-    with files.staged(files.FileSet(folder, option, "study", file_list, beside=[FINISHED_POINTS])) as stage:
+    with files.staged(files.FileSet(folder, option, "study", file_list, kept_names=[FINISHED_POINTS])) as stage:
         datasets, seconds = run(study, path.parent, points, _Progress(say), jobs or processors())
         command = typed("laufruhe", "study", str(path))
 
@@ -61,17 +61,17 @@ class _Progress:
         self._first: tuple[float, int] | None = None
         self._last = 0.0
 
-    def __call__(self, done: int, whole: int) -> None:
+    def __call__(self, done: int, total: int) -> None:
         now = time.perf_counter()
         if self._first is None:
             self._first = (now, done)
-        elif now - self._last < pace() and done < whole:
+        elif now - self._last < pace() and done < total:
             return
         self._last, remaining = now, ""
         began, before = self._first
-        if before < done < whole:
-            seconds = (now - began) / (done - before) * (whole - done)
+        if before < done < total:
+            seconds = (now - began) / (done - before) * (total - done)
             remaining = (
                 f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
             )
-        self._say(f"{done} of {whole} points{remaining}")
+        self._say(f"{done} of {total} points{remaining}")

@@ -164,7 +164,7 @@ class Scale:
         """
         if than is not None:
             return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
-        return self._cached_bound("loses", fidelity, lambda own: self.largest_change(own, self.best))
+        return self._cached_bound("loses", fidelity, lambda candidate: self.largest_change(candidate, self.best))
 
     def relative_sampling_error(self, fidelity: Fidelity) -> float:
         """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""

@@ -23,10 +23,10 @@ from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
 
 Loc: TypeAlias = tuple[str | int, ...]
-MOST_COMPLAINTS = 20
+MAX_COMPLAINTS = 20
 """Largest number of complaints about a file at once."""
 _CLOSE = 0.6
-_FEW = 3
+_MAX_NAMED = 3
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
 """Kinds of extension objects by the keys of a file that name such an object."""
 _COUNTED = {
@@ -47,12 +47,12 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """Return one complaint for each wrong key, at most `MOST_COMPLAINTS` and the number of further ones.
+    """Return one complaint for each wrong key, at most `MAX_COMPLAINTS` and the number of further ones.
 
     If keys belong to extensions that are not installed, only these are reported.
     """
     complaints: dict[str, Complaint] = {}
-    errors = error.errors(include_url=False)[: 10 * MOST_COMPLAINTS]
+    errors = error.errors(include_url=False)[: 10 * MAX_COMPLAINTS]
     details = [(*_walk(detail["loc"], model), detail) for detail in errors]
     unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
     for loc, tables, detail in details:
@@ -65,7 +65,7 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
     if lacking:
         # other complaints may follow from the missing extension
         return lacking
-    first = list(complaints.values())[:MOST_COMPLAINTS]
+    first = list(complaints.values())[:MAX_COMPLAINTS]
     further = error.error_count() - len(errors) + len(complaints) - len(first)
     summary = [Complaint("file", "", f"has {further} more such faults", "correct these first")] if further else []
     return (*first, *summary)
@@ -124,7 +124,7 @@ def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
     parts = set(_plain(word).split())
     holding = sorted(
         candidate for candidate in words
-        if len(word) >= _FEW and (word.lower() in candidate.lower() or parts < set(_plain(candidate).split()))
+        if len(word) >= _MAX_NAMED and (word.lower() in candidate.lower() or parts < set(_plain(candidate).split()))
     )  # fmt: skip
     close = difflib.get_close_matches(_plain(word), plain, n=1, cutoff=_CLOSE)
     if len(holding) == 1 or (close and not holding):
@@ -170,7 +170,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
             return Complaint(where, value_text(value), *missing_extension(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # two or three words are all named, because the nearest spelling may be the wrong one
-        remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
+        remedy = nearest(str(value), words) if len(words) > _MAX_NAMED else "use one of: " + ", ".join(words)
         return Complaint(where, value_text(value), "is not allowed", remedy)
     if kind in _COUNTED:
         sense, key, remedy = _COUNTED[kind]
@@ -257,7 +257,7 @@ def errors_at_key(where: str, value: str = "") -> Iterator[None]:
         raise Refused(complaint.where, complaint.value or None, complaint.rule, complaint.remedy) from None
 
 
-def require_one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
+def require_one_of(table: BaseModel, where: str, key: str, other: str, value: Any = None, named: str = "") -> None:
     """Raise `Refused` unless exactly one of two keys is given.
 
     Parameters
@@ -268,7 +268,7 @@ def require_one_of(table: BaseModel, where: str, key: str, other: str, shown: An
         Path of the table.
     key, other
         The two keys.
-    shown
+    value
         Value in the message.
     named
         Name of the other key in the remedy; by default the key.
@@ -276,7 +276,7 @@ def require_one_of(table: BaseModel, where: str, key: str, other: str, shown: An
     present = [getattr(table, k) not in (None, []) for k in (key, other)]
     if present[0] == present[1]:
         state = f"is given twice, also as {other}" if present[0] else "is missing"
-        raise Refused(f"{where}.{key}", shown, state, f"give {key} or {named or other}, one of them")
+        raise Refused(f"{where}.{key}", value, state, f"give {key} or {named or other}, one of them")
 
 
 def refuse_keys(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from laufruhe.files.complaints import Refused
 
-MOST_ROWS, MOST_BYTES = 100_000, 10_000_000
+MAX_ROWS, MAX_BYTES = 100_000, 10_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
@@ -29,9 +29,9 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
         if path.exists() and not path.is_file():
             raise Refused(key, file, "is no file", remedy)
         with path.open("rb") as stream:
-            content = stream.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise Refused(key, file, f"is larger than {MOST_BYTES // 1_000_000} MB", "remove rows")
+            content = stream.read(MAX_BYTES + 1)
+        if len(content) > MAX_BYTES:
+            raise Refused(key, file, f"is larger than {MAX_BYTES // 1_000_000} MB", "remove rows")
         text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         reason = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
@@ -51,6 +51,6 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
                 rule = f"line {number} is no {row_name} of numbers"
                 raise Refused(key, file, rule, "write: " + ", ".join(columns)) from None
         heading = False
-        if len(rows) > MOST_ROWS:
-            raise Refused(key, file, f"has more than {MOST_ROWS} rows", "remove rows")
+        if len(rows) > MAX_ROWS:
+            raise Refused(key, file, f"has more than {MAX_ROWS} rows", "remove rows")
     return rows

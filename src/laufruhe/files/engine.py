@@ -26,7 +26,7 @@ T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
-_OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.name for own in k.keys), *k.lists)))
+_OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(option.name for option in k.keys), *k.lists)))
 _OF_PISTONS = (
     "drive", "bore", "stroke", "rod_ratio", "rod_length", "offset", "reciprocating_mass", "rod", "rod_inertia_deficit",
 )  # fmt: skip
@@ -315,8 +315,8 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
 
 
 def _sizes(table: EngineTable) -> Sizes:
-    own = {key.name: getattr(table, key.name) for key in DRIVES[table.drive].keys}
-    values = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in own.items()}
+    options = {key.name: getattr(table, key.name) for key in DRIVES[table.drive].keys}
+    values = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in options.items()}
     values = {name: value.start if isinstance(value, Open) else value for name, value in values.items()}
     length = None if table.rod_length is None else Open.from_value(table.rod_length).start
     return Sizes(table.stroke or 0.0, table.offset, length, table.rod_ratio, values)
@@ -327,7 +327,7 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     drive, sizes = DRIVES[table.drive], _sizes(table)
     ratio, length = sizes.rod_ratio, sizes.rod_length
     if drive.has_rod:
-        require_one_of(table, "engine", "rod_ratio", "rod_length", shown=ratio)
+        require_one_of(table, "engine", "rod_ratio", "rod_length", value=ratio)
     with errors_at_key("engine.offset"):
         radius = drive.radius(sizes)
     rod = length if length is not None else (radius / ratio if ratio else math.inf)

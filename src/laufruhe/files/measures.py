@@ -176,8 +176,8 @@ class MeasureContext:
             if value == []:
                 raise Refused(f"{where}.{key}", [], "is empty", "leave it out to count all")
             if value is not None and key not in channel.keys:
-                shown = value if key == "of" else None
-                raise Refused(f"{where}.{key}", shown, _why_stray(key, channel), "leave it out")
+                wrong_value = value if key == "of" else None
+                raise Refused(f"{where}.{key}", wrong_value, _why_stray(key, channel), "leave it out")
         points, cases = ([named.name for named in listed] for listed in (self.points, self.engine.load_cases))
         _check_known(table.operating_points, points, f"{where}.operating_points", "operating point")
         _check_known(table.load_cases, cases, f"{where}.load_cases", "load case")
@@ -279,7 +279,7 @@ def objectives_of(
 
 def _terms(table: ObjectiveTable, scene: MeasureContext, where: str) -> tuple[Term, ...]:
     # norms of loads come before numbers of the mounts
-    require_one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
+    require_one_of(table, where, "minimise", "terms", value=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
         return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
     terms = [

@@ -220,8 +220,8 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
         refuse_keys(place, _ELASTIC, where, *_NOT_RIGID)
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
-            own = f"places[{k}]." if place.relative_stiffness else ""
-            raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
+            prefix = f"places[{k}]." if place.relative_stiffness else ""
+            raise Refused(f"mounts.{prefix}relative_stiffness", stiffness, "carries nothing", "give one a value")
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
             values = _values(table, place, key, where, "add it, or mirror_of")

@@ -19,7 +19,7 @@ from laufruhe.machine import Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
 from laufruhe.physics.seiliger_cycle import motored_cycle
 from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
-MOST_POINTS = 200
+MAX_POINTS = 200
 """Largest number of operating points; each takes 14 MB and 0.2 s on four mounts."""
 SAME_SPEED = 0.01
 """Relative difference of speeds within which rows of a fuel table belong together."""
@@ -177,8 +177,8 @@ def operating_points(
                 load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
                 share = table.weight / len(speeds) / len(loads)
                 points.append(OperatingPoint(f"{name}{suffix}", speed, load, share))
-    if len(points) > MOST_POINTS:
-        rule = f"makes {len(points)} operating points, more than {MOST_POINTS}"
+    if len(points) > MAX_POINTS:
+        rule = f"makes {len(points)} operating points, more than {MAX_POINTS}"
         raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
     require_distinct([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)

@@ -19,7 +19,7 @@ from laufruhe.files.fields import Open, Table
 from laufruhe.files.rotors import BalancerShaftTable
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import (
-    MOST_ORDERS,
+    MAX_ORDERS,
     NoEvenStarError,
     even_patterns,
     firing_lattice,
@@ -288,7 +288,7 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
     fixed_order = phasing.firing_order
     orders = lap_orders(phasing.cycle, layout, throws) if fixed_order is None else [fixed_order]
     allowed = []
-    for order in itertools.islice(orders, MOST_ORDERS):
+    for order in itertools.islice(orders, MAX_ORDERS):
         intervals = intervals_of(phasing.cycle, firing_turns(layout, throws, order))
         if min(intervals) > SOONEST:
             allowed.append((round(max(intervals) - min(intervals), 9), order))

@@ -41,7 +41,7 @@ class Quantity(ABC):
     follow: ClassVar[Mapping[Place, str]]
 
     @abstractmethod
-    def values(self, value: float, given: Mapping[Place, float]) -> Mapping[Place, float]:
+    def values(self, value: float, followers: Mapping[Place, float]) -> Mapping[Place, float]:
         """Return the numbers that follow from the value of the quantity and from their values in the file [SI]."""
 
 
@@ -52,9 +52,9 @@ class StrokeOverBore(Quantity):
     words = "Ratio of stroke to bore; both follow at the displacement that engine.stroke and engine.bore give."
     follow: ClassVar[Mapping[Place, str]] = {("engine", "stroke"): "m", ("engine", "bore"): "m"}
 
-    def values(self, value: float, given: Mapping[Place, float]) -> Mapping[Place, float]:
+    def values(self, value: float, followers: Mapping[Place, float]) -> Mapping[Place, float]:
         """Return stroke s and bore b with s / b = value and s b^2 as in the file [m]."""
-        stroke, bore = given["engine", "stroke"], given["engine", "bore"]
+        stroke, bore = followers["engine", "stroke"], followers["engine", "bore"]
         new_bore = math.cbrt(stroke * bore**2 / value)
         return {("engine", "stroke"): value * new_bore, ("engine", "bore"): new_bore}
 
@@ -86,13 +86,13 @@ def with_followers(tables: Mapping[str, Any]) -> Mapping[str, Any]:
         if name in quantities:
             value = read_number(_NUMBERS[name], ("quantities", name), quantities[name])
             assert isinstance(value, float)
-            given = {place: _given(tables, place, unit, name) for place, unit in quantity.follow.items()}
-            for place, number in quantity.values(value, given).items():
+            followers = {place: _follower(tables, place, unit, name) for place, unit in quantity.follow.items()}
+            for place, number in quantity.values(value, followers).items():
                 tables = with_value_at(tables, place, AddressDrive(place, quantity.follow[place]).written(number))
     return tables
 
 
-def _given(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> float:
+def _follower(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> float:
     try:
         number = at(tables, place)
     except (TypeError, KeyError, IndexError, AttributeError):

@@ -40,11 +40,11 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Origin, Problem, Search
 from laufruhe.problem.problem import Path as Place
 
-DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
+DEEPEST, MAX_ENTRIES, MAX_BYTES = 16, 1000, 1_000_000
 """Limits of a file: depth of nested tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
 STDIN, UNNAMED = Path("-"), Path("problem")
-MOST_OPEN = 200
+MAX_OPEN = 200
 # control characters except tab and line feed, and marks of the direction of text
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
@@ -68,9 +68,9 @@ def load(source: str | Path | Mapping[str, Any]) -> Problem:
 def tables_and_path(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
     """Return the tables of a file or text, and the path that messages name."""
     if isinstance(source, Mapping):
-        return _whole(plain(source, DEEPEST + 1), UNNAMED), UNNAMED
+        return _merged(plain(source, DEEPEST + 1), UNNAMED), UNNAMED
     if isinstance(source, str) and ("\n" in source or "=" in source):
-        return _whole(_parsed(source.encode("utf-8"), UNNAMED), UNNAMED), UNNAMED
+        return _merged(_parsed(source.encode("utf-8"), UNNAMED), UNNAMED), UNNAMED
     if not isinstance(source, str | os.PathLike):
         remedy = "give a path, the text of a problem file, or its tables"
         raise wrong_call("problem", source, f"is of type {type(source).__name__}", remedy)
@@ -174,20 +174,20 @@ def tables_of(path: Path) -> dict[str, Any]:
     The path `-` is standard input. An engine of the catalogue is written out in the tables.
     """
     if path == STDIN:
-        return _whole(_parsed(_standard_input(), display_path(path)), display_path(path))
+        return _merged(_parsed(_standard_input(), display_path(path)), display_path(path))
     try:
         with path.open("rb") as stream:
-            content = stream.read(MOST_BYTES + 1)
+            content = stream.read(MAX_BYTES + 1)
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
         raise _unreadable(path, "does not exist", nearest_file(path, "check the path")) from None
     except OSError as error:
         raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
-    return _whole(_parsed(content, path), path)
+    return _merged(_parsed(content, path), path)
 
 
-def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+def _merged(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     # checked tables, an engine of the catalogue written out
     _check_shape(tables, path)
     with errors_in_file(path):
@@ -204,8 +204,8 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
         if strange is not None:
             rule = f"contains U+{ord(strange.group()):04X}, which is not a printable character"
             raise refused(where, "", rule, "remove it; in a path write / for \\", path)
-        if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
-            maximum = f"at most {MOST_ENTRIES} are read"
+        if isinstance(node, dict | list) and len(node) > MAX_ENTRIES:
+            maximum = f"at most {MAX_ENTRIES} are read"
             raise refused(where or "file", "", f"has {len(node)} entries", maximum, path)
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
             raise refused(where, "", "is a whole number of more than 64 bits", "write a smaller one", path)
@@ -213,12 +213,12 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
 
 @cache
 def _standard_input() -> bytes:
-    return sys.stdin.buffer.read(MOST_BYTES + 1)
+    return sys.stdin.buffer.read(MAX_BYTES + 1)
 
 
 def _parsed(content: bytes, path: Path) -> dict[str, Any]:
-    if len(content) > MOST_BYTES:
-        raise _unreadable(path, f"is larger than {MOST_BYTES // 1_000_000} MB", "a problem takes a few kB")
+    if len(content) > MAX_BYTES:
+        raise _unreadable(path, f"is larger than {MAX_BYTES // 1_000_000} MB", "a problem takes a few kB")
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -313,9 +313,9 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
 def _check_decisions(problem: Problem) -> None:
     """Raise `Refused` for open numbers without effect or objective, too many, or that rename operating points."""
     decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
-    if len(decisions) > MOST_OPEN:
+    if len(decisions) > MAX_OPEN:
         remedy = "fix some, or couple some to others"
-        raise Refused(decisions[MOST_OPEN].name, None, f"is open in addition to {MOST_OPEN} other numbers", remedy)
+        raise Refused(decisions[MAX_OPEN].name, None, f"is open in addition to {MAX_OPEN} other numbers", remedy)
     for decision in decisions:
         if not any(drive.acts for drive in decision.drives):
             raise Refused(decision.name, None, without_effect, "fix or leave it out")

@@ -20,7 +20,7 @@ from laufruhe.files.measures import SIDES, limit_name
 from laufruhe.files.nested import number_at
 from laufruhe.files.problem_file import file_model
 
-MOST_POINTS = 100_000
+MAX_POINTS = 100_000
 _DIGITS = 12
 
 
@@ -280,8 +280,8 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
         raise Refused(missing[0], None, "is missing", "a spaced sweep needs from, to and points")
     if sweep.points < 2:
         raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
-    if sweep.points > MOST_POINTS:
-        raise Refused("points", sweep.points, f"is more than {MOST_POINTS}", "give fewer")
+    if sweep.points > MAX_POINTS:
+        raise Refused("points", sweep.points, f"is more than {MAX_POINTS}", "give fewer")
     span = _span(sweep.quantity, sweep.first, sweep.last, sweep.spacing)
     with np.errstate(all="ignore"):
         numbers = (np.geomspace if span.is_log else np.linspace)(span.low, span.high, sweep.points)

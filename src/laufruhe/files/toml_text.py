@@ -143,12 +143,12 @@ def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
         elif mark.group() in _CLOSING.values() and brackets:
             brackets.pop()
     if brackets:
-        opened = brackets[-1]
+        bracket_offset = brackets[-1]
         is_next = not text[begin:offset].strip() and (_ENTRY.match(line) or _HEAD.match(line))
         if message.startswith("Unclosed") and ahead and not is_next:
             return offset, "a comma is missing between two entries", "add it"
-        if message.startswith(("Unclosed", "Expected ']")) or (is_next and "\n" in text[opened:offset]):
-            return opened, f"{text[opened]} is not closed", f"add {_CLOSING[text[opened]]}"
+        if message.startswith(("Unclosed", "Expected ']")) or (is_next and "\n" in text[bracket_offset:offset]):
+            return bracket_offset, f"{text[bracket_offset]} is not closed", f"add {_CLOSING[text[bracket_offset]]}"
     for start, rule_and_remedy in _STATEMENTS.items():
         if message.startswith(start):
             return offset, *rule_and_remedy

@@ -39,7 +39,7 @@ from laufruhe.solvers.result import Result
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW, SERVED = "use laufruhe page {file}", "the server optimises it, or use its own control"
 OBJECTIVE = "objective"
-NOTHING = "Nothing that is open here can be moved live."
+NO_SLIDERS = "Nothing that is open here can be moved live."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
@@ -63,7 +63,7 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
     how = SERVED if is_served else HOW.format(file=file)
     moving = _moving(result.problem, values)
     fixed = tuple(_unmoved(result.problem, how))
-    model = replace(model, unmoved=fixed, why_not="" if moving.decisions else NOTHING)
+    model = replace(model, unmoved=fixed, why_not="" if moving.decisions else NO_SLIDERS)
     try:
         filled = _filled(model, problem, moving, result, values, is_served)
     except ModelError as error:
@@ -113,7 +113,7 @@ def _filled(
         signals=tuple(collected.signals.values()),
         curves=curves,
         measures=measures,
-        designs=tuple(_design(name, x, moving, affine.domains, collected.asked) for name, x in designs),
+        designs=tuple(_design(name, x, moving, affine.domains, collected.queries) for name, x in designs),
         reference=None if is_served else _reference(result),
         unmoved=(*bare.unmoved, *collected.unmoved),
     )
@@ -127,7 +127,7 @@ class _Collected:
         self.decided = {limit.name: limit for limit in result.limits}
         self.signals: dict[Measure, Signal] = {}
         self.unmoved: list[tuple[str, str]] = []
-        self.asked: list[Measure | None] = []
+        self.queries: list[Measure | None] = []
 
     def signal(self, measure: Measure) -> int:
         """Return the index of a measure's signal; all norms share it."""
@@ -154,7 +154,7 @@ class _Collected:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
         follows = (measure.is_mass or measure.is_load) and is_affine(measure.channel, self.kinds, self.model.problem)
         follows = follows and measure.norm.name in NORMS_OF_PAGE
-        self.asked.append(measure if follows and not stays else None)
+        self.queries.append(measure if follows and not stays else None)
         base = DisplayedMeasure(
             role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit)
         )

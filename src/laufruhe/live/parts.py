@@ -16,7 +16,7 @@ from laufruhe.present.numbers import share
 from laufruhe.prove.certificate import Proof
 
 VERSION = 1
-MOST_MB = 2.0
+MAX_MB = 2.0
 """Largest size of the compressed numbers of a page."""
 
 
@@ -36,7 +36,7 @@ class Slider:
         Bounds of the angle [rad], where that is open.
     angle
         Name of the angle in results.
-    shown, factor
+    unit_text, factor
         The unit of the file, and its factor on an SI value.
     """
 
@@ -48,7 +48,7 @@ class Slider:
     upper: float
     angles: tuple[float, float]
     angle: str
-    shown: str
+    unit_text: str
     factor: float
 
 
@@ -169,9 +169,9 @@ class LiveModel:
     def too_large(self) -> str:
         """Reason why the model does not fit a page; empty if it does."""
         size = len(self._packed[1]) / 1e6
-        if size <= MOST_MB:
+        if size <= MAX_MB:
             return ""
-        return f"The loads of this problem take {size:.2g} MB; a page carries at most {MOST_MB:g} MB."
+        return f"The loads of this problem take {size:.2g} MB; a page carries at most {MAX_MB:g} MB."
 
     @cached_property
     def _packed(self) -> tuple[list[dict[str, Any]], str]:

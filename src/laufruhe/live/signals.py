@@ -20,7 +20,7 @@ from laufruhe.problem.measure import Measure, kinks_of, narrow_signal
 PEAK = NORMS["maximum"]
 NORMS_OF_PAGE = frozenset({"mean", "maximum", "rms", "peak to peak", "worst mean"})
 """Norms that the page's scripts know; a measure of another one cannot be followed live."""
-NOTHING = 1e-13
+ZERO = 1e-13
 """Share of the largest order that all orders left out come to at the most."""
 
 
@@ -36,7 +36,7 @@ class Waves:
         """Return the non-zero orders of a series, shape (n, ...)."""
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
         smallest = np.argsort(size, kind="stable")
-        left_out = smallest[np.cumsum(size[smallest]) <= NOTHING * size.max(initial=0.0)]
+        left_out = smallest[np.cumsum(size[smallest]) <= ZERO * size.max(initial=0.0)]
         used = np.setdiff1d(np.arange(len(size)), left_out)
         return cls(used, coefficients[used])
 
@@ -123,17 +123,17 @@ def signal_of(model: AffineModel, measure: Measure) -> Signal:
 def _of_load(model: AffineModel, measure: Measure) -> Signal:
     problem, channel = model.problem, measure.load
     pairs = model.spectra(channel)
-    every = [signal for own, by in pairs for signal in (own, *by)]
+    every = [signal for constant_signal, by in pairs for signal in (constant_signal, *by)]
     # the period of one evaluation, in whose steps its means and peaks are sought
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
-    constant = with_common_base(base, [own for own, _ in pairs])
+    constant = with_common_base(base, [constant_signal for constant_signal, _ in pairs])
     columns = [with_common_base(base, by) for _, by in pairs]
     # kinks of all signals, for every norm
-    signals = [reduce(add, by, own) for own, by in zip(constant, columns, strict=True)]
+    signals = [reduce(add, by, constant_signal) for constant_signal, by in zip(constant, columns, strict=True)]
     bends = kinks_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []
-    for share, own, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
-        counted = [narrow_signal(measure, signal, problem.engine) for signal in (own, *by)]
+    for share, constant_signal, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
+        counted = [narrow_signal(measure, signal, problem.engine) for signal in (constant_signal, *by)]
         points.append(_point(float(share), counted[0], counted[1:], at))
     names = channel.places(problem.engine)
     places = tuple(names[k] for k in measure.places(names)) or ("block",)

@@ -33,7 +33,7 @@ MAXIMUM = NORMS["maximum"]
 UNIT_MARGIN, MIN_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative violation of a limit that counts as none."""
-MOST_NUMBERS = 60_000_000
+MAX_NUMBERS = 60_000_000
 """Largest number of coefficients of one measure; a solver needs about ten times that memory."""
 
 
@@ -314,7 +314,7 @@ class AffineModel:
         kinked = bare_signals if self.kink_model is None else self.kink_model.bare.signals(channel)
         kinks = kinks_of(measure, [signal.with_base(base) for signal in kinked], self.problem.engine)
         bare = self._rows(measure, bare_signals, base, samples, parts, kinks)
-        if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
+        if bare.vectors.size * len(self._changes) > MAX_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
         slopes = [self._rows(measure, column, base, samples, parts, kinks).vectors for column in column_signals]

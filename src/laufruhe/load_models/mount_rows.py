@@ -16,7 +16,7 @@ from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 
-LEAST_SAMPLES = 32
+MIN_SAMPLES = 32
 SAMPLES_PER_ORDER = 4
 """Number of samples per period of the highest order."""
 
@@ -71,7 +71,7 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
     exact = measure.norm.is_euclidean
     # orders differ between points: all have the samples that the highest order needs
     highest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
-    samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * highest))
+    samples = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
     for point in chosen:
         signal = point.response.force if measure.channel is channels.MOUNT_FORCE else point.response.travel
         counted = np.flatnonzero(measure.counted(point.orders)).tolist()

@@ -76,10 +76,10 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
     root = ca.DM(mass_root(block))
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
-    opened = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
+    fixed = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)
     rows, directions, spring_travels, mounts = [], [], [], len(problem.engine.mounts)
     springs = every_spring(problem.engine.mounts)
-    for (place, spring), numbers in zip(springs, opened.mounts or problem.mount_numbers, strict=True):
+    for (place, spring), numbers in zip(springs, fixed.mounts or problem.mount_numbers, strict=True):
         axes = turned_axes(lib, numbers[TURNED])
         arm = [p - c for p, c in zip(numbers[POSITION], block.centre_of_gravity, strict=True)]
         motion = ca.SX(point_motion(lib, arm))

@@ -75,7 +75,7 @@ class PhaseLeadModel:
         Bounds and baseline values of the leads [rad], shape (leads,).
     names
         Names of the shafts with an open lead.
-    whole
+    base_model
         Loads of the whole engine with the leads at their baseline values.
     """
 
@@ -85,8 +85,8 @@ class PhaseLeadModel:
         self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
         self.start = np.array([d.real_start for d in self.leads])
         self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
-        self.whole = AffineModel(replace(problem, decisions=problem.unbalances), True, True)
-        self.domains = self.whole.domains
+        self.base_model = AffineModel(replace(problem, decisions=problem.unbalances), True, True)
+        self.domains = self.base_model.domains
         self._shafts = [AffineModel(problem_of_shafts(problem, name.__eq__), True, True) for name in self.names]
         self._fixed = AffineModel(problem_of_shafts(problem, lambda name: name not in self.names), True, True)
         self._cache: dict[Measure, tuple[LoadShare, list[LoadShare]]] = {}
@@ -120,7 +120,7 @@ class PhaseLeadModel:
             Whether the rows of a mean are averages over the step about each sample (P7).
         """
         if not measure.is_load:
-            norm = self.whole.norm(measure, samples)
+            norm = self.base_model.norm(measure, samples)
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
             return PhaseLeadNorm(norm, (zeros,) * len(self.names))
         fixed, shafts = self.shares(measure)

@@ -134,7 +134,7 @@ class StarModel:
         self.layout: Layout = phasing.layout(*geometry)
         self._origin = space.first if origin is None else origin
         self.problem = with_upright_angles(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
-        self._whole = AffineModel(self.problem, keep_all=True)
+        self._full_model = AffineModel(self.problem, keep_all=True)
         self._origin_motored = self._motored(self._origin)
         self._one_moved = {
             (k, p): self._motored(tuple(p if j == k else step for j, step in enumerate(self._origin)))
@@ -144,19 +144,19 @@ class StarModel:
         }
         self.base = common_base([model.base for model in self.models])
         for model in self.models:
-            model.base, model.kink_model = self.base, self._whole
-        self.domains = self._whole.domains
+            model.base, model.kink_model = self.base, self._full_model
+        self.domains = self._full_model.domains
         self._cache: dict[tuple[int, bool], StarProblem] = {}
 
     @property
     def models(self) -> list[AffineModel]:
         """Load models of the stars that determine all other stars."""
-        return [self._whole, self._origin_motored, *self._one_moved.values()]
+        return [self._full_model, self._origin_motored, *self._one_moved.values()]
 
     @property
     def samples(self) -> int:
         """Number of samples over one period of the loads that the fidelity of the problem asks for."""
-        return self._whole.full_samples
+        return self._full_model.full_samples
 
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)
@@ -175,7 +175,7 @@ class StarModel:
         return self._cache[key]
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
-        complete, motored = self._whole.at(samples, averaged), self._origin_motored.at(samples, averaged)
+        complete, motored = self._full_model.at(samples, averaged), self._origin_motored.at(samples, averaged)
         moved = {place: model.at(samples, averaged) for place, model in self._one_moved.items()}
         return StarProblem(
             self._norms(complete.terms, motored.terms, {place: problem.terms for place, problem in moved.items()}),

@@ -19,7 +19,7 @@ from fractions import Fraction
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
+from laufruhe.load_models.affine import MAX_NUMBERS, AffineModel, AffineNorm
 from laufruhe.load_models.isolated_cylinders import (
     BANK_SAMPLES,
     isolate_cylinder,
@@ -299,7 +299,7 @@ class ThrowWaves:
             measure, samples, averaged=True, peaks=PEAK_STEPS if uses_averages(self.problem, measure) else 0
         )
         count = len(self.parts) * len(self.orders) * fixed.constant.size
-        if count > MOST_NUMBERS:
+        if count > MAX_NUMBERS:
             raise ModelError(f"{2e-6 * count:.0f} million numbers at once")
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
         for coefficients, part in zip(waves, self.parts, strict=True):

@@ -36,7 +36,7 @@ from laufruhe.problem.measure import Measure, counted_rotors, narrow_signal, rad
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
-LEAST_SAMPLES = 72
+MIN_SAMPLES = 72
 NEGLIGIBLE, LEFT_OUT = 1e-9, 1e-2
 """Largest share of the root mean square in the omitted orders: of forces, and of the roll moment of gas."""
 INSIDE_LEFT_OUT, HIGHEST = 1e-2, 24.0
@@ -253,7 +253,7 @@ def _wrench_of(loads: PointLoads) -> Spectrum:
 
 
 def _steps(spectrum: SymbolicSpectrum) -> int:
-    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(spectrum.orders.max()) / spectrum.base))
+    return max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * float(spectrum.orders.max()) / spectrum.base))
 
 
 def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:

@@ -17,7 +17,7 @@ from laufruhe.machine import kinematics
 from laufruhe.machine.slider_crank import SliderCrank, Swept
 from laufruhe.numerics.roots import rising_root
 
-MOST_AHEAD = 0.5 * math.pi
+MAX_AHEAD = 0.5 * math.pi
 """Crank angle by which one piston may lead the other to its dead centre: beyond it they hardly compress."""
 STEPS = 720
 
@@ -126,10 +126,10 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
 def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing:
     ahead = math.remainder(part.firing_angle - other.firing_angle, cycle_angle)
     ahead = 0.0 if abs(ahead) < 1e-12 else ahead
-    if abs(ahead) >= MOST_AHEAD:
+    if abs(ahead) >= MAX_AHEAD:
         raise ModelError(
             f"{part.name} and {other.name} share a chamber and come to their dead centres "
-            f"{math.degrees(abs(ahead)):.6g} deg apart; bring them within {math.degrees(MOST_AHEAD):g} deg"
+            f"{math.degrees(abs(ahead)):.6g} deg apart; bring them within {math.degrees(MAX_AHEAD):g} deg"
         )
     plain = all(
         type(piston) is SliderCrank and abs(piston.shaft.ratio) == 1.0 and not piston.offset for piston in (part, other)

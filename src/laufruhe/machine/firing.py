@@ -21,7 +21,7 @@ from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.exact_angles import SAME_TURN, angle_of
 
-MOST_ORDERS = 4096
+MAX_ORDERS = 4096
 ORDERS_LOOKED_AT = 200_000
 
 

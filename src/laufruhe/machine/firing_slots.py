@@ -20,9 +20,9 @@ from laufruhe.machine.engine import Cycle
 Shape: TypeAlias = tuple[tuple[int, float, float], ...]
 Cover: TypeAlias = tuple[tuple[int, Shape], ...]
 
-_MOST_COVERS = 500
-_MOST_BROKEN = 40
-_MOST_LOOKED_AT = 20_000
+_MAX_COVERS = 500
+_MAX_BROKEN = 40
+_MAX_LOOKED_AT = 20_000
 # of the unevenness allowed
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _SLACK = 1e-9
@@ -116,12 +116,12 @@ class FiringSlots:
     def _first_covers(self, slack: float, throw_slots: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
         """Return covers in order of unevenness, as many as pay for a program, and True if these are all."""
         even, covers = self.cycle.angle / self.count, dict[Cover, None]()
-        maximum = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
+        maximum = min(_MAX_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
         complete = False
         for share in _SHARES:
             low, high = self.minimum - slack, self.maximum + slack
             narrowed = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
-            budget = _Budget(_MOST_LOOKED_AT)
+            budget = _Budget(_MAX_LOOKED_AT)
             covers |= dict.fromkeys(itertools.islice(narrowed._covers(throw_slots, budget), maximum + 1))
             if len(covers) > maximum or budget.left <= 0:
                 return list(covers)[:maximum], False

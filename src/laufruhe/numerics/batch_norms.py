@@ -18,7 +18,7 @@ from laufruhe.numerics.norms import Grid, Norm
 
 CACHE_BYTES = 1 << 19
 """Size of the block of rows that one thread works on [bytes]."""
-_LEAST_BLOCK = 16
+_MIN_BLOCK = 16
 _PARTS_OF_COMPLEX = 2
 
 
@@ -53,7 +53,7 @@ class BatchNorm:
             Size of a block.
         """
         components, _, k = self.rows.shape
-        block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
+        block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _MIN_BLOCK)
         norms = np.empty(len(features))
         starts = range(0, len(features), block)
         if not self.norm.is_monotone_in_lengths:

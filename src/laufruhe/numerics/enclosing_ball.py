@@ -13,7 +13,7 @@ from laufruhe.numerics.arrays import Array, Indices
 SAME = 1e-13
 """Relative tolerance of a radius within which a point counts as inside."""
 # regularisation of the linear system for points that coincide or are collinear: relative, and absolute
-_FLAT, _NOTHING = 1e-15, 1e-290
+_FLAT, _TINY = 1e-15, 1e-290
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +122,6 @@ def _centre_shares(points: Array) -> Array:
     products = edges @ edges.swapaxes(-1, -2)
     squares = np.einsum("...kk->...k", products).copy()
     size = edges.shape[-2]
-    products += (_FLAT * squares.sum(axis=-1) + _NOTHING)[..., None, None] * np.eye(size)
+    products += (_FLAT * squares.sum(axis=-1) + _TINY)[..., None, None] * np.eye(size)
     shares = 0.5 * np.linalg.solve(products, squares[..., None])[..., 0]
     return np.concatenate([1.0 - shares.sum(axis=-1, keepdims=True), shares], axis=-1)

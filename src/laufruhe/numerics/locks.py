@@ -14,13 +14,13 @@ except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 
-_KEPT: set[int] = set()
+_OPEN_FILES: set[int] = set()
 """File handles of the folders that this process has locked."""
 
 
 def _let_go() -> None:
-    while _KEPT:
-        os.close(_KEPT.pop())
+    while _OPEN_FILES:
+        os.close(_OPEN_FILES.pop())
 
 
 if hasattr(os, "register_at_fork"):
@@ -38,12 +38,12 @@ def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool | None]:
         yield None
         return
     handle = os.open(folder, os.O_RDONLY)
-    _KEPT.add(handle)
+    _OPEN_FILES.add(handle)
     try:
         yield _locked(handle, wait)
     finally:
-        if handle in _KEPT:
-            _KEPT.discard(handle)
+        if handle in _OPEN_FILES:
+            _OPEN_FILES.discard(handle)
             os.close(handle)
 
 

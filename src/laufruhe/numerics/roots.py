@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-_MOST_HALVINGS = 200
+_MAX_HALVINGS = 200
 
 
 def rising_root(function: Callable[[float], float], below: float, above: float) -> float:
@@ -17,7 +17,7 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
     below, above
         Arguments with a value of at most zero, and with a value above zero.
     """
-    for _ in range(_MOST_HALVINGS):
+    for _ in range(_MAX_HALVINGS):
         middle = 0.5 * (below + above)
         if not below < middle < above:
             break

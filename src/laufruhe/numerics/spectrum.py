@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from laufruhe.numerics.exact_angles import Turn, phasors
 from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, find_kinks, join_kinks
 
-MOST_SIGNAL_KINKS = 24
+MAX_SIGNAL_KINKS = 24
 """Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
 JUMP_OFFSET = 1e-3 * SAME_ANGLE
 """Angle behind a jump at which samples are taken [rad]: above its rounding error, without effect on smooth parts."""
-MOST_WAVES = 9
+MAX_WAVES = 9
 """Largest number of coefficients of a signal that is sampled by a matrix product in place of a transform."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
@@ -150,7 +150,7 @@ class Spectrum:
         if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + offset
             return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
-        if len(self.coefficients) <= MOST_WAVES:
+        if len(self.coefficients) <= MAX_WAVES:
             # a product with few waves takes less time than a transform
             flat = self.coefficients.reshape(len(self.coefficients), -1)
             values = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
@@ -270,18 +270,18 @@ class Mapped(Spectrum):
         vars(self).update(base=source.base, source=source, linear=linear)
 
     @cached_property
-    def _whole(self) -> Spectrum:
+    def _resolved(self) -> Spectrum:
         return self.source.mapped(self.linear)
 
     @property
     def coefficients(self) -> NDArray[np.complex128]:
         """Coefficients of the source, mapped."""
-        return self._whole.coefficients
+        return self._resolved.coefficients
 
     @property
     def kinks(self) -> SignalKinks | None:
         """Kinks of the source, mapped."""
-        return self._whole.kinks
+        return self._resolved.kinks
 
     @property
     def step(self) -> int:
@@ -366,7 +366,7 @@ def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
 
 def spectrum_with_kinks(
     signal: Callable[[NDArray[np.float64]], NDArray[np.float64]], samples: int, base: Fraction,
-    breaks: NDArray[np.float64], maximum: int = MOST_SIGNAL_KINKS,
+    breaks: NDArray[np.float64], maximum: int = MAX_SIGNAL_KINKS,
 ) -> Spectrum:  # fmt: skip
     """Return the spectrum of a function of the angle whose derivatives jump (L5a).
 

@@ -25,7 +25,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.rigid_body import plane_wrench
 
 _TAIL = 1e-15
-_MOST_STEPS = 1 << 16
+_MAX_STEPS = 1 << 16
 
 
 class Direction(IntEnum):
@@ -225,7 +225,7 @@ def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale:
         If steps that fine do not resolve them: the crank all but locks.
     """
     steps = 64
-    while steps <= _MOST_STEPS:
+    while steps <= _MAX_STEPS:
         alpha = 2.0 * np.pi * np.arange(steps) / steps
         sampled = np.stack([np.broadcast_to(row, alpha.shape) for row in rows(alpha)])
         table = 2.0 * np.fft.rfft(sampled)[:, :-1] / steps

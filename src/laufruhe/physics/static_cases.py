@@ -19,7 +19,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import GRAVITY
 
-MOST_STEPS, HALVINGS, CLOSED, ROUNDED = 200, 40, 1e-12, 1e-15
+MAX_STEPS, HALVINGS, CLOSED, ROUNDED = 200, 40, 1e-12, 1e-15
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
         return float(0.5 * q @ stiffness @ q + 0.5 * stops.stiffness @ over**2 - wrench @ q)
 
     q: Array = np.asarray(np.linalg.solve(stiffness, wrench), dtype=np.float64)
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         over = stops.beyond(stops.rows @ q)
         pull = wrench - stiffness @ q - stops.rows.T @ (stops.stiffness * over)
         step: Array = np.asarray(np.linalg.solve(stiffness + stops.added(over != 0.0), pull), dtype=np.float64)

@@ -24,7 +24,7 @@ from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.time_model import TimeModel, time_model
 
-MOST_SHOTS = 60
+MAX_SHOTS = 60
 CLOSED = 1e-9
 # what integration over a period makes of its tolerance
 ROUNDING = 100.0
@@ -116,7 +116,7 @@ def integrated(*arguments: Any, **more: Any) -> Array:
 def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: float, has_stops: bool) -> Array:
     """Find the start (y, y'), shape (2 n,), that one period of `run` returns to, by Newton's method from rest (E28)."""
     start, step = np.zeros(2 * count), size * 1e-4
-    for _ in range(MOST_SHOTS):
+    for _ in range(MAX_SHOTS):
         ends = run(start[:, None] + np.column_stack([np.zeros(2 * count), step * np.eye(2 * count)]))
         slope = (ends[:, 1:] - ends[:, :1]) / step
         gap = ends[:, 0] - start

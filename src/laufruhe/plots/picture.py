@@ -23,7 +23,7 @@ from laufruhe.plots.style import as_svg, heading, page, save, styled
 from laufruhe.plots.words import SMALL, grouped, ink_on, legible, separate_texts, typeset
 from laufruhe.present.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
-MOST_ENTRIES, FEW_ENTRIES = 8, 5
+MAX_ENTRIES, FEW_ENTRIES = 8, 5
 
 
 def draw(picture: Picture) -> Figure:
@@ -140,7 +140,7 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
 def _named(picture: Picture) -> Sequence[Mark]:
     labelled = {getattr(m, "label", ""): m for p in picture.panels for m in p.marks}
     marks = list(picture.legend) or [mark for label, mark in labelled.items() if label]
-    if len(marks) <= MOST_ENTRIES:
+    if len(marks) <= MAX_ENTRIES:
         return marks
     return [marks[k] for k in np.linspace(0, len(marks) - 1, FEW_ENTRIES).round().astype(int)]
 

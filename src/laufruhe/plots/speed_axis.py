@@ -17,7 +17,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
 
 LIMIT = VERMILION
-MOST_NAMES, _NAME_GAP = 5, 0.1
+MAX_NAMES, _NAME_GAP = 5, 0.1
 """Operating points that are all named, and room between two names [inch]."""
 # line styles distinguish orders in print
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
@@ -44,7 +44,7 @@ def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
     points = sorted(result.problem.points, key=lambda point: point.speed)
     for point in points:
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
-    named = points if len(points) <= MOST_NAMES else [points[0], points[-1]]
+    named = points if len(points) <= MAX_NAMES else [points[0], points[-1]]
     width, height = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
     names = [fit_line(point.name, width / len(named) - _NAME_GAP) for point in named]
     (low, high), widest = axes.get_xlim(), max(map(width_of, names)) + _NAME_GAP

@@ -47,7 +47,7 @@ _BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2
 _TITLE, _ENGINE = 13.0, 10.0
 _LINE = 1.35 / 72.0
 """Height of a line of text of one point [inch]."""
-_HANDLE, _APART = 1.6, 1.6
+_HANDLE, _GAP = 1.6, 1.6
 _PER_TICK = 0.6
 """Room that a number of a lying axis takes [inch]."""
 
@@ -171,7 +171,7 @@ def _legend(
 ) -> Legend:
     legend = figure.legend(
         handles=list(entries), loc="upper left", bbox_to_anchor=corner, ncols=columns, frameon=False, fontsize=SMALL,
-        borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_APART, labelcolor=INK,
+        borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_GAP, labelcolor=INK,
     )  # fmt: skip
     for text in legend.get_texts():
         text.set_text(fit_line(text.get_text(), room - 2.6 * SMALL / 72.0))
@@ -182,8 +182,8 @@ def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:
     size = SMALL / 72.0
     for columns in range(len(labels), 0, -1):
         split = [list(part) for part in np.array_split(list(labels), columns)]
-        width = sum(max(map(width_of, part)) + (_HANDLE + 0.8 + _APART) * size for part in split)
-        if width - _APART * size <= room or columns == 1:
+        width = sum(max(map(width_of, part)) + (_HANDLE + 0.8 + _GAP) * size for part in split)
+        if width - _GAP * size <= room or columns == 1:
             return max(map(len, split)), columns
     return 0, 1
 

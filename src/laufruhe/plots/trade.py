@@ -17,7 +17,7 @@ from laufruhe.plots.style import Page, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
 from laufruhe.studies.trade import Trade, TradeRow
 
-LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
+MIN_ERROR, MIN_REGRET = 1e-7, 1e-8
 PANEL, DOT = (5.4, 4.4), 0.13
 """Width and height of the panel, and room of a dot [inch]."""
 NAME_HEIGHT = 0.036
@@ -53,20 +53,20 @@ def _drawn(trade: Trade) -> Figure:
     axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
     errors = _places(axes, np.array([row.error for row in rows]), times)
     front = _front(rows)
-    joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= LEAST_ERROR)
+    joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= MIN_ERROR)
     axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
     decides = np.array([row.decides and not math.isnan(row.regret) for row in rows])
     axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
-    regrets = [max(row.regret, LEAST_REGRET) for row, is_drawn in zip(rows, decides, strict=True) if is_drawn]
+    regrets = [max(row.regret, MIN_REGRET) for row, is_drawn in zip(rows, decides, strict=True) if is_drawn]
     dots = axes.scatter(
-        times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
+        times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(MIN_REGRET, 1.0), s=55, zorder=3,
         edgecolors=INK, linewidths=0.5,
     )  # fmt: skip
     if times.max() < _FEW_DECADES * times.min():
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
     # the band under the axis has its own label
-    minimum = 1.01 * LEAST_ERROR if min(row.error for row in rows) < LEAST_ERROR else 0.0
+    minimum = 1.01 * MIN_ERROR if min(row.error for row in rows) < MIN_ERROR else 0.0
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > minimum else ""))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
@@ -76,7 +76,7 @@ def _drawn(trade: Trade) -> Figure:
     hollow = "" if decides.all() else " Hollow: no design, or one beyond a limit."
     heading(
         sheet.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
-        f"Line: fidelities that no other beats in time and error. Regrets below {_power(LEAST_REGRET)} are drawn there."
+        f"Line: fidelities that no other beats in time and error. Regrets below {_power(MIN_REGRET)} are drawn there."
         f"{hollow} Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip
     return sheet.figure
@@ -84,7 +84,7 @@ def _drawn(trade: Trade) -> Figure:
 
 def _places(axes: Axes, errors: Array, times: Array) -> Array:
     """Return the drawn errors; very small ones stand in a band under the axis."""
-    small = errors < LEAST_ERROR
+    small = errors < MIN_ERROR
     width, height = PANEL
     low, end = np.log10(axes.get_xlim())
     across = width * (np.log10(times) - low) / (end - low)
@@ -93,7 +93,7 @@ def _places(axes: Axes, errors: Array, times: Array) -> Array:
         used = {levels[neighbour] for neighbour in order[:j] if across[k] - across[neighbour] < DOT}
         levels[k] = next(level for level in range(len(errors)) if level not in used)
     band = DOT * (levels.max(initial=0) + 1.5) if small.any() else 0.0
-    minimum = LEAST_ERROR if small.any() else 0.5 * errors.min()
+    minimum = MIN_ERROR if small.any() else 0.5 * errors.min()
     top = 2.0 * max(errors.max(), 2.0 * minimum)
     decades = (math.log10(top) - math.log10(minimum)) / max(height - band, 0.5 * height)
     axes.set_ylim(minimum * 10.0 ** (-decades * band), top)

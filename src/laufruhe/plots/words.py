@@ -20,7 +20,7 @@ from matplotlib.transforms import Affine2D
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import FONT, families
-from laufruhe.present.numbers import NOTHING, number
+from laufruhe.present.numbers import ROUNDS_TO_ZERO, number
 
 INK, FAINT = "#222222", "#5c5c5c"
 SMALL = 9.0
@@ -156,7 +156,7 @@ def omitted_words(largest: float, maximum: float, unit: str) -> str:
     """Return what is said of a load too small to draw; empty if it is drawn."""
     if largest > UNSEEN * maximum:
         return ""
-    return "zero" if largest <= NOTHING * maximum else f"at most {number(largest, 2)} {unit}"
+    return "zero" if largest <= ROUNDS_TO_ZERO * maximum else f"at most {number(largest, 2)} {unit}"
 
 
 def separate_texts(texts: Sequence[Text]) -> None:

@@ -18,7 +18,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
 MAIN_SHARE = 0.1
-MOST_ORDERS = 3
+MAX_ORDERS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +99,7 @@ def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[floa
             sizes[order] = max(sizes.get(order, 0.0), size)
     top = max(sizes.values(), default=0.0)
     strong = sorted((order for order, size in sizes.items() if size > MAIN_SHARE * top > 0.0), key=lambda o: -sizes[o])
-    return tuple(strong[:MOST_ORDERS])
+    return tuple(strong[:MAX_ORDERS])
 
 
 def critical_speed(frequency: float, order: float) -> float:

@@ -10,7 +10,7 @@ from laufruhe.units import readable
 DASH = "-"
 RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
 """Factors on rad/s and on rad."""
-NOTHING = 1e-9
+ROUNDS_TO_ZERO = 1e-9
 
 
 def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
@@ -23,7 +23,7 @@ def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
     """
     if not math.isfinite(value):
         return DASH
-    if value == 0.0 or abs(value) <= NOTHING * scale:
+    if value == 0.0 or abs(value) <= ROUNDS_TO_ZERO * scale:
         return "0"
     size = math.floor(math.log10(abs(value)))
     if not -4 <= size <= 6:
@@ -69,7 +69,7 @@ _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 
 def in_grams(value: float, unit: str, scale: float) -> str:
     """Return " = " and a mass in g or an unbalance in g mm; empty for other units."""
-    if unit not in _WORKSHOP or abs(value) <= NOTHING * scale:
+    if unit not in _WORKSHOP or abs(value) <= ROUNDS_TO_ZERO * scale:
         return ""
     name, factor = _WORKSHOP[unit]
     return f" = {number(value * factor)} {name}"

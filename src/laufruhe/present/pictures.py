@@ -51,7 +51,7 @@ _CAPTIONS = {
     "trade": "Objective over the allowed deviation from even firing.",
 }
 PICTURES: Mapping[str, ResultPicture] = extended(
-    "pictures", ResultPicture, [ResultPicture(*each) for each in _CAPTIONS.items()]
+    "pictures", ResultPicture, [ResultPicture(*caption) for caption in _CAPTIONS.items()]
 )
 
 

@@ -81,7 +81,7 @@ class Need:
 class Needs:
     """Needs of the channels of the core."""
 
-    NOTHING = Need(lambda _: True, "", "")
+    UNCONDITIONAL = Need(lambda _: True, "", "")
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
     ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
     BEARINGS = Need(lambda e: e.bearings, "main bearings", "list them in [[main_bearings]]")
@@ -155,7 +155,7 @@ class Channel:
     name: str
     unit: str
     keys: tuple[str, ...] = ()
-    needs: Need = Needs.NOTHING
+    needs: Need = Needs.UNCONDITIONAL
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
     depends_on_loads: bool = True
@@ -320,8 +320,8 @@ def names_of_cylinders(engine: Engine) -> Sequence[str]:
 
 PlaceSpec: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
 """Keys that narrow a load, part that it needs, and function that returns the names of its places."""
-IN_EACH_CYLINDER: PlaceSpec = (IN_CYLINDERS, Needs.NOTHING, names_of_cylinders)
-AT_EACH_CRANK_PIN: PlaceSpec = (AT_CYLINDERS, Needs.NOTHING, names_of_cylinders)
+IN_EACH_CYLINDER: PlaceSpec = (IN_CYLINDERS, Needs.UNCONDITIONAL, names_of_cylinders)
+AT_EACH_CRANK_PIN: PlaceSpec = (AT_CYLINDERS, Needs.UNCONDITIONAL, names_of_cylinders)
 AT_EACH_BEARING: PlaceSpec = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
 OF_EACH_BEARING: PlaceSpec = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
 Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
@@ -529,7 +529,7 @@ def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
     return lambda loads: channel.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True))
 
 
-_ON_CRANK: PlaceSpec = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
+_ON_CRANK: PlaceSpec = (ON_BLOCK, Needs.UNCONDITIONAL, lambda _: ("crankshaft",))
 
 
 def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:

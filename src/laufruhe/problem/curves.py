@@ -33,7 +33,7 @@ from laufruhe.problem.loads import PointLoads
 if TYPE_CHECKING:
     import xarray as xr
 
-MOST_STEPS = 1_000_000
+MAX_STEPS = 1_000_000
 STEPS = 720
 """Default number of samples over the cycle."""
 
@@ -49,7 +49,7 @@ class CurveAxis:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """Quantity as an array along the common axes of all fields and along axes of its own.
+    """Quantity as an array along the common axes of all fields and along further axes.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Field:
         Name in headings.
     unit
         SI unit; empty for a ratio.
-    own
+    own_axes
         Axes of this quantity alone, after the common ones.
     values
         Values, shape (common axes ..., own axes ...).
@@ -68,13 +68,13 @@ class Field:
     name: str
     words: str
     unit: str
-    own: tuple[CurveAxis, ...]
+    own_axes: tuple[CurveAxis, ...]
     values: Array
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
         """Yield heading and index of each column, one for each index of its own axes."""
-        for index in itertools.product(*(range(len(axis.labels)) for axis in self.own)):
-            labels = [(axis.name, axis.labels[k]) for axis, k in zip(self.own, index, strict=True)]
+        for index in itertools.product(*(range(len(axis.labels)) for axis in self.own_axes)):
+            labels = [(axis.name, axis.labels[k]) for axis, k in zip(self.own_axes, index, strict=True)]
             texts = [f"{name} {label}" if isinstance(label, int | float) else str(label) for name, label in labels]
             yield f"{' '.join([self.words, *texts])} [{self.unit or '-'}]", index
 
@@ -107,13 +107,13 @@ class Fields:
         shared = (self.designs, *self.rows)
         variables = {
             field.name: (
-                [axis.name for axis in (*shared, *field.own)],
+                [axis.name for axis in (*shared, *field.own_axes)],
                 field.values,
                 {"units": field.unit or "1", "long_name": field.words},
             )
             for field in self.fields
         }
-        axes = {axis.name: axis for axis in (*shared, *(axis for field in self.fields for axis in field.own))}
+        axes = {axis.name: axis for axis in (*shared, *(axis for field in self.fields for axis in field.own_axes))}
         units = {name: {"units": axis.unit} if axis.unit else {} for name, axis in axes.items()}
         coords = {name: ([name], list(axis.labels), units[name]) for name, axis in axes.items()}
         return xr.Dataset(variables, coords, {"title": self.title})
@@ -144,7 +144,7 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     steps
         Number of samples over the cycle.
     """
-    check_integer("steps", steps, 1, MOST_STEPS)
+    check_integer("steps", steps, 1, MAX_STEPS)
     first = next(iter(designs.values()))
     turn = first.engine.cycle.angle
     angles = CurveAxis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")

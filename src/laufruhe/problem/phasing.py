@@ -18,7 +18,7 @@ P = TypeVar("P")
 
 SOONEST = 1e-8
 """Firing interval below which two cylinders count as firing together [rad]."""
-_MOST_PERMUTED = 7
+_MAX_PERMUTED = 7
 _EVEN_STARS = 3
 
 
@@ -303,7 +303,7 @@ def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, 
     bounds = phasing.throw_bounds or ()
     if phasing.firing_order is not None:
         orders = [phasing.firing_order]
-    elif phasing.cylinders <= _MOST_PERMUTED:
+    elif phasing.cylinders <= _MAX_PERMUTED:
         orders = [(1, *remaining) for remaining in itertools.permutations(range(2, phasing.cylinders + 1))]
     else:
         orders = []

@@ -14,17 +14,17 @@ from laufruhe.units import quantity_text
 
 FASTEST = 30.0
 """Mean piston speed [m/s]; racing engines reach 26."""
-LIGHTEST, HEAVIEST = 150.0, 20_000.0
+MIN_DENSITY, MAX_DENSITY = 150.0, 20_000.0
 """Usual range of reciprocating mass over swept volume [kg/m^3]; engines that were built have about 700 to 4000."""
 SHORTEST_ROD = 0.45
 """Largest usual ratio of crank radius to rod length."""
 FLATTEST, LONGEST = 0.25, 5.0
 """Usual range of stroke over bore."""
-MOST_UNBALANCE = 20.0
+MAX_UNBALANCE = 20.0
 """Largest usual unbalance of one rotor over that of all pistons and pins at their crank radius."""
 _PAIR = 2
 """Cylinders that may fire within one turn of two: twins with throws at 180 degrees do."""
-MOST_SAG, LEAST_SAG = 0.1, 1e-6
+MAX_SAG, MIN_SAG = 0.1, 1e-6
 """Usual range of the static sag of a block on its mounts [m]; soft mounts sag about 10 mm."""
 
 
@@ -70,7 +70,9 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
         if not part.reciprocating_mass and part.has_rod:
             rule = "makes no inertia force, so nothing of the pistons shakes the block"
             yield Complaint("reciprocating mass", quantity_text(0.0, "kg"), rule, "check it")
-        elif usual > 0.0 and part.reciprocating_mass and not LIGHTEST < part.reciprocating_mass / usual < HEAVIEST:
+        elif (
+            usual > 0.0 and part.reciprocating_mass and not MIN_DENSITY < part.reciprocating_mass / usual < MAX_DENSITY
+        ):
             # 1000 kg a cubic metre is what pistons of usual engines have
             rule = f"is that of no usual piston: one that sweeps {1e6 * usual:.4g} cm^3 has about {1e3 * usual:.2g} kg"
             yield Complaint("reciprocating mass", quantity_text(part.reciprocating_mass, "kg"), rule, "check its unit")
@@ -85,7 +87,7 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
 def _of_rotors(engine: Engine) -> Iterator[Complaint]:
     total = sum((p.reciprocating_mass + p.rotating_mass) * p.crank_radius for p in engine.slider_cranks)
     for rotor in engine.rotors:
-        if abs(rotor.unbalance) > MOST_UNBALANCE * total > 0.0:
+        if abs(rotor.unbalance) > MAX_UNBALANCE * total > 0.0:
             rule = f"is {abs(rotor.unbalance) / total:.3g} times that of all pistons and pins at their crank radius"
             yield Complaint(
                 f"unbalance of {rotor.name}", quantity_text(abs(rotor.unbalance), "kg m"), rule, "check its unit"
@@ -101,7 +103,7 @@ def _of_mounts(engine: Engine) -> Iterator[Complaint]:
     if engine.block is None or not stiffness:
         return
     sag = 9.81 * engine.block.mass / stiffness
-    if not LEAST_SAG < sag < MOST_SAG:
+    if not MIN_SAG < sag < MAX_SAG:
         rule = f"lets {quantity_text(engine.block.mass, 'kg')} sag by about {quantity_text(sag, 'm')}"
         yield Complaint("stiffness of the mounts", "", rule, "check stiffness and mass, N/mm and N/m")
 

@@ -65,7 +65,7 @@ class FileSet:
         File names that may be made.
     adds
         True if files of earlier runs stay, unless they are made again.
-    beside
+    kept_names
         Files of this command that are no results and stay where they are.
     """
 
@@ -74,7 +74,7 @@ class FileSet:
     verb: str
     names: Collection[str] = field(default_factory=result_files)
     adds: bool = False
-    beside: Collection[str] = ()
+    kept_names: Collection[str] = ()
 
     def checked(self) -> frozenset[str]:
         """Return the files that earlier runs made; raise `InputError` if foreign files are in the way."""
@@ -87,7 +87,7 @@ class FileSet:
         if not folder.exists():
             return frozenset()
         verb, made = _made(folder)
-        foreign = sorted({entry.name for entry in folder.iterdir()} - made - {MADE, *self.beside})
+        foreign = sorted({entry.name for entry in folder.iterdir()} - made - {MADE, *self.kept_names})
         if verb not in ("", self.verb):
             raise self.refused(f"holds the results of laufruhe {verb}")
         in_the_way = [name for name in foreign if not verb or name in self.names]

@@ -55,7 +55,7 @@ from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, LimitValue
 
-MOST_ROWS = 20 * STEPS
+MAX_ROWS = 20 * STEPS
 MANY = 5_000
 """Number of cells from which a forked process writes the workbook."""
 
@@ -98,7 +98,7 @@ def _measures(result: Result) -> Table:
 
 
 def _forces(result: Result) -> Table:
-    steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
+    steps = max(min(STEPS, MAX_ROWS // len(result.problem.points)), 36)
     return Table.from_fields(forces_of(designs_with_loads(result), steps))
 
 
@@ -216,8 +216,8 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
         yield [test.at, "measured", *places, intercept + slope * x, none]
     target, line = test.target, intercept + slope * test.target
     yield [test.at, "requested", *((none, RPM * target) if test.is_motored else (target, none)), none, none, line, none]
-    told = (none, RPM * target, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
-    yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
+    friction_row = (none, RPM * target, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
+    yield [test.at, "friction", *friction_row, line if test.is_motored else 0.0, friction.deviation]
 
 
 def _on_crank(result: Result) -> Table:

@@ -73,7 +73,7 @@ def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
     elif not problem.load_terms:
         blocks.append(Paragraph("The objective depends on no load, so every fidelity gives the same number."))
     blocks.append(Table(HEAD, [_cells(row) for row in trade.rows]))
-    if not trade.whole:
+    if not trade.is_complete:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
     search_note = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""

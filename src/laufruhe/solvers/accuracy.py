@@ -24,7 +24,7 @@ from laufruhe.prove.certificate import PROOF_RANK, Proof, gap_of
 from laufruhe.solvers.result import Result, Status
 
 _ROUNDS = 4
-TIMES, MOST_GAS = 4, 23040
+TIMES, MAX_GAS = 4, 23040
 """Factor by which the steps of the gas pressure grow, and their largest number per cycle."""
 
 
@@ -72,9 +72,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
         return result
     (gas_error, interpolated), steps = gas_sampling_errors(problem, result.final), fidelity.gas_steps
     while (
-        gas_error > problem.tolerance * value_of_loads(problem, result.final)
-        and steps < MOST_GAS
-        and not is_time_over()
+        gas_error > problem.tolerance * value_of_loads(problem, result.final) and steps < MAX_GAS and not is_time_over()
     ):
         steps *= TIMES
         result = solve(problem.at(replace(fidelity, gas_samples=steps)))

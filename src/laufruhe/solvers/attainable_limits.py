@@ -37,7 +37,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
-LEAST_SECONDS = 10.0
+MIN_SECONDS = 10.0
 """Time limit of all limits together [s], if the solve itself took less."""
 HALVINGS, CLOSE = 10, 1e-3
 """Largest number of bisections of a limit, and relative width at which they stop."""
@@ -83,7 +83,7 @@ def with_attainable_limits(
     is_core = not problem.extras and not problem.ranks
     solve, answers = partial(_solve_with_fine_sampling, solve, problem) if is_core else solve, []
     # a time limit of the caller replaces the default
-    seconds = None if math.isfinite(seconds_left()) else max(LEAST_SECONDS, spent)
+    seconds = None if math.isfinite(seconds_left()) else max(MIN_SECONDS, spent)
     with limit_time(seconds), search_scope(result.message or str(result.status)):
         for k, limit in enumerate(limits):
             report_progress("attainable limits", k, len(limits))

@@ -35,7 +35,7 @@ FEASIBILITY_TOL = 10.0 * FEASIBLE
 """Largest relative violation of a feasible design."""
 VIOLATION_PENALTY = 10.0
 """Penalty of a witness: its objective rises by this factor times its relative violation, since prices are unknown."""
-MOST_REFINEMENTS = 3
+MAX_REFINEMENTS = 3
 """Largest number of refinements of the samples while a lower bound exceeds the objective."""
 # prices below this share of the objective are rounding errors
 _PRICE_FLOOR = 1e-7
@@ -174,7 +174,7 @@ def refine_objective(
     prices
         Shadow prices of limits, which value violations within the tolerance.
     """
-    for _ in range(MOST_REFINEMENTS):
+    for _ in range(MAX_REFINEMENTS):
         if not is_over(bound, value, zero_level) or not any(is_sampled(term.measure) for term in problem.objective):
             break
         evaluation = with_fine_sampling(evaluation)

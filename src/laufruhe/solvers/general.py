@@ -34,7 +34,7 @@ INNER = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 """Kinds of numbers that cone programs optimise while all others are fixed."""
 ROUNDS, GAIN = 4, 1e-6
 """Largest number of rounds of cone program and local program, and relative gain below which they stop."""
-MOST_STARS = 60
+MAX_STARS = 60
 """Largest number of stars, firing orders and sets of shafts that are solved one by one."""
 
 
@@ -98,10 +98,10 @@ def _alternate_with_cones(program: LocalProgram, best: Array, decide: Decide) ->
 
 
 def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
-    """Solve each star with even firing and each set of shafts as a problem of its own, up to `MOST_STARS`."""
+    """Solve each star with even firing and each set of shafts as a problem of its own, up to `MAX_STARS`."""
     phasing = problem.phasing
     assert phasing is not None
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    return solve_every_order(problem, phasing, stars, lambda part, _: decide(replace(part, phasing=None)), MOST_STARS)
+    return solve_every_order(problem, phasing, stars, lambda part, _: decide(replace(part, phasing=None)), MAX_STARS)

@@ -23,7 +23,7 @@ INDEPENDENT, BALANCED = 1e-3, 1e-2
 _RESIDUAL_MARGIN = 1e-6
 ACTIVE = 1e-5
 """Relative distance to a limit, or to a bound of a decision, within which it is active."""
-MOST_VANISHING, _DIRECTIONS, MOST_CORNERS = 64, 8, 256
+MAX_VANISHING, _DIRECTIONS, MAX_CORNERS = 64, 8, 256
 """Largest number of zero rows of a norm, segments that approximate a disc, and largest number of rows of a hull."""
 
 
@@ -97,11 +97,11 @@ class Slopes:
 
     @property
     def corners(self) -> Array:
-        """Rows of the hull; for a large hull its extreme rows in `MOST_CORNERS` directions.
+        """Rows of the hull; for a large hull its extreme rows in `MAX_CORNERS` directions.
 
         All rows of a signal of constant length may be extreme. A circle with 256 corners has a relative error of 1e-4.
         """
-        step = -(-len(self.hull) // MOST_CORNERS)
+        step = -(-len(self.hull) // MAX_CORNERS)
         if step == 1:
             return self.hull
         directions = (self.hull - self.hull.mean(axis=0))[::step]
@@ -319,7 +319,7 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
     """Return all slopes of a norm at a design; None if unknown, or if too many rows are zero."""
     rows = norm.rows(x)
     kinks = norm.norm.subdifferential(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
-    if kinks is None or len(kinks.vanishing) > MOST_VANISHING:
+    if kinks is None or len(kinks.vanishing) > MAX_VANISHING:
         return None
     hull = np.array([norm.pullback(multiplier) for multiplier in (kinks.base, *kinks.others)])
     if len(kinks.longest):

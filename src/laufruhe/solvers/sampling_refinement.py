@@ -29,7 +29,7 @@ from laufruhe.prove.certificate import Proof, gap_of
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, violation_message
 from laufruhe.solvers.result import Result, Status
 
-ROUNDS, MOST_TIMES = 4, 16
+ROUNDS, MAX_TIMES = 4, 16
 """Largest number of refinements, and largest factor of the samples in one of them."""
 SMALL_ERROR, LARGE_ERROR = 0.1, 2.0
 """Sampling error of the objective that counts as none, and smallest sampling error that counts; in tolerances."""
@@ -44,7 +44,7 @@ def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Res
         if disagreement <= 1.0:
             return result
         # the error of a mean falls with the square of the step; the gas pressure keeps its samples
-        problem = with_more_samples(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MOST_TIMES))
+        problem = with_more_samples(problem, min(math.ceil(math.sqrt(2.0 * disagreement)), MAX_TIMES))
         result = solve(problem)
     return result if _sampling_disagreement(result) <= 1.0 else _with_fine_values(result)
 

@@ -14,7 +14,7 @@ from laufruhe.units import readable
 # height of a row, and of the margins above and below [inch]
 ROW, AROUND = 0.19, 0.9
 # panels side by side, and spread of values from which an axis is logarithmic
-MOST, SPREAD = 4, 200.0
+MAX_PANELS_OF_RANKS, SPREAD = 4, 200.0
 
 
 def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
@@ -30,7 +30,7 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
     if unit and metric not in [name for name, *_ in quantities]:
         quantities.insert(0, (metric, *readable(unit), data["objective"].values[order]))
     # rows of similar length
-    columns = -(-len(quantities) // -(-len(quantities) // MOST))
+    columns = -(-len(quantities) // -(-len(quantities) // MAX_PANELS_OF_RANKS))
     panels = [
         _panel(f"{name}\n[{unit}]" if unit else f"{name}\n", factor * values, names if k % columns == 0 else [])
         for k, (name, unit, factor, values) in enumerate(quantities)

@@ -15,7 +15,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.reader import tables_and_path
-from laufruhe.files.study_tables import MOST_POINTS, joined
+from laufruhe.files.study_tables import MAX_POINTS, joined
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
 
@@ -26,7 +26,7 @@ else:
 
 
 class StudyTable(Table):
-    """What a study consists of."""
+    """Tables of a study file."""
 
     common: dict[str, Any] = f.optional("Keys of every part that does not give its own.", {})
     parts: list[AnyPart] = Field(min_length=1)
@@ -87,12 +87,12 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
         if len(set(cases)) < len(cases):
             raise refused(f"{where}.cases", "", "has two cases of one name", "give each its own", path)
         _check_quantities(part, path, where)
-        if part.size() > MOST_POINTS:
-            rule = f"makes {part.size()} points; a study takes {MOST_POINTS}"
+        if part.size() > MAX_POINTS:
+            rule = f"makes {part.size()} points; a study takes {MAX_POINTS}"
             raise refused(where, "", rule, "ask for fewer", path)
     count = sum(part.size() for part in parts)
-    if count > MOST_POINTS:
-        rule = f"make {count} points; a study takes {MOST_POINTS}"
+    if count > MAX_POINTS:
+        rule = f"make {count} points; a study takes {MAX_POINTS}"
         raise refused("study.parts", "", rule, "make two studies of them", path)
     return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
 

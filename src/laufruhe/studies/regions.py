@@ -59,7 +59,7 @@ class Regions:
         self._values, self._done = _laid_out(root, name, template)
         self.seconds: dict[str, float] = {}
         for mark, region in regions.items():
-            seconds = self._found(mark, region)
+            seconds = self._find(mark, region)
             if seconds is not None:
                 self.seconds[mark] = seconds
 
@@ -78,7 +78,7 @@ class Regions:
         values = np.asarray(self._values[region.case, region.first : region.last])
         return {VALUES: values, COLUMNS: self._columns}
 
-    def _found(self, mark: str, region: Region) -> float | None:
+    def _find(self, mark: str, region: Region) -> float | None:
         # seconds that a piece took; None if it is not done, or damaged
         try:
             noted = bytes(np.asarray(self._done[region.case, region.first // self._chunk]))

@@ -17,8 +17,8 @@ from laufruhe.studies.regions import COLUMNS, VALUES
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.units import readable
 
-MOST_DRAWS = 1_000_000_000
-MOST_TABLED = 100_000
+MAX_DRAWS = 1_000_000_000
+MAX_TABLED = 100_000
 """Draws that are written as CSV too: more are no table any more."""
 LISTED = (5.0, 50.0, 95.0)
 CURVE = np.arange(1, 400) / 4.0
@@ -29,7 +29,7 @@ _WORDS = 4
 class Sampled(Part):
     """Cases with many draws each, all with the same random numbers."""
 
-    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = f.required("Number of draws of each case.")
+    draws: Annotated[int, Field(ge=1, le=MAX_DRAWS)] = f.required("Number of draws of each case.")
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964
     chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = f.optional("Draws in one piece of work.")
     own_chunk: ClassVar[int] = 1000
@@ -92,8 +92,8 @@ class Sampled(Part):
 
     @property
     def ends(self) -> tuple[Literal["nc", "csv", "png"], ...]:
-        """Endings of the files; a CSV file up to `MOST_TABLED` draws."""
-        return ("nc", "csv", "png") if len(self.cases) * self.draws <= MOST_TABLED else ("nc", "png")
+        """Endings of the files; a CSV file up to `MAX_TABLED` draws."""
+        return ("nc", "csv", "png") if len(self.cases) * self.draws <= MAX_TABLED else ("nc", "png")
 
 
 def in_unit(values: xr.DataArray) -> tuple[Array, str]:

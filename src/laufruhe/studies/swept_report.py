@@ -13,10 +13,10 @@ from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
 from laufruhe.present.numbers import percent
 from laufruhe.present.pictures import rows_of
-from laufruhe.studies.text import NOTHING, Text, marked_table, number
+from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
-MOST_ROWS, MOST_DOTS = 80, 40
+MAX_ROWS, MAX_DOTS = 80, 40
 NEGLIGIBLE = 1e-9
 # width of a tick's letter [inch], and letters per line
 LETTER, LETTERS = 0.078, 18
@@ -73,7 +73,7 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
     head = ["case", *named, *(with_unit(data[name]) for name in swept_names(data))]
     head += [f"{metric}, initial{in_unit}", f"final{in_unit}", f"lower bound{in_unit}", "change"]
     head += [*(["largest mount force [N]"] if data.sizes["mount"] else []), "proof"]
-    rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MOST_ROWS))]
+    rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MAX_ROWS))]
     return [marked_table(head, rows, data.sizes["point"] - len(rows))]
 
 
@@ -82,10 +82,10 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     best = without_rounding(best, initial)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != NOTHING_OPEN
-    change = percent(best / initial - 1.0) if decided and initial and best == best else NOTHING
+    change = percent(best / initial - 1.0) if decided and initial and best == best else DASH
     named = (row[name].item() for name in columns)
     cells = [number(value) if isinstance(value, float) else str(value) for value in named]
-    cells += [number(initial), number(best) if decided else NOTHING, number(bound), change]
+    cells += [number(initial), number(best) if decided else DASH, number(bound), change]
     if row.sizes["mount"]:
         cells.append(number(float(row["maximum"].max())))
     cells.append(NOTHING_OPEN if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
@@ -107,7 +107,7 @@ def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
     marks: list[p.Mark] = []
     for label, chosen, colour in groups(data, names[:-1]):
         # labels are not joined, and many dots would hide their line
-        dots = not numbers or chosen.sum() <= MOST_DOTS
+        dots = not numbers or chosen.sum() <= MAX_DOTS
         size, width = (2.5, 1.5) if numbers else (6.0, 0.0)
         y = data["objective"].values[chosen]
         marks.append(p.Line(place[chosen], y, colour, label, width, marker="o" if dots else "", size=size))

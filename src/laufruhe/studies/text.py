@@ -9,7 +9,7 @@ from typing import TypeAlias
 from laufruhe.present.numbers import trimmed
 from laufruhe.present.tables import Table
 
-NOTHING = "–"
+DASH = "–"
 
 
 Text: TypeAlias = str | Table
@@ -46,7 +46,7 @@ def marked_table(head: Sequence[str], rows: Sequence[Sequence[str]], omitted: in
 
 def number(value: float, digits: int = 5) -> str:
     """Return a number of a table; a dash for NaN."""
-    return NOTHING if value != value else trimmed(value, digits)
+    return DASH if value != value else trimmed(value, digits)
 
 
 def statement_table(verdicts: Sequence[Verdict]) -> list[Text]:

@@ -37,7 +37,7 @@ REFERENCE_STEPS = 1440
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
 KEEPS = 1e-3
 """Share by which a design may be beyond a limit at the reference and count as a decision."""
-_LEAST_TIME, _LONG, _MOST_REPEATS = 0.02, 0.1, 50
+_MIN_TIME, _LONG, _MAX_REPEATS = 0.02, 0.1, 50
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class Trade:
         Comparison in time; None for rigid mounts.
     left_out
         Sentences about parts of the problem that a trade does not include.
-    whole
+    is_complete
         True if all fidelities were measured in the given time.
     """
 
@@ -121,7 +121,7 @@ class Trade:
     flywheel: tuple[float, float] | None
     time_domain: TimeDomain | None
     left_out: tuple[str, ...] = ()
-    whole: bool = True
+    is_complete: bool = True
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
@@ -151,7 +151,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
     return Trade(
-        problem, tuple(decided.regretted(row) for row in rows), decided.given, decided.minimum, flywheel,
+        problem, tuple(decided.regretted(row) for row in rows), decided.initial_value, decided.minimum, flywheel,
         _price_of_time(problem), left_out, is_complete,
     )  # fmt: skip
 
@@ -189,7 +189,7 @@ class _Decided:
 
     Attributes
     ----------
-    given
+    initial_value
         Reference objective of the design as given.
     minimum
         Reference objective of the best design known that keeps the limits; zero of what cancels, NaN where none is.
@@ -197,7 +197,7 @@ class _Decided:
 
     def __init__(self, scale: Scale) -> None:
         self._problem = problem = scale.problem
-        self.given, self.minimum = objective_value(problem, scale.best), math.nan
+        self.initial_value, self.minimum = objective_value(problem, scale.best), math.nan
         self._known: Result | None = None
         sampled = problem.at(Fidelity(samples=REFERENCE_STEPS))
         engine = None
@@ -237,7 +237,7 @@ class _Decided:
 
 def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeRow:
     """Measure a fidelity, all but its regret."""
-    evaluation, truth = evaluate(variant), decided.given
+    evaluation, truth = evaluate(variant), decided.initial_value
     value = objective_value(variant, evaluation)
     prepared, gradient = _prepared_times(variant)
     solve_time = optimum = violation = math.nan
@@ -247,7 +247,7 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeR
         if engine is not None:
             solve_time = time.process_time() - started
             optimum, violation = decided.of(engine)
-    fresh = seconds(lambda: _from_nothing(variant))
+    fresh = seconds(lambda: _from_scratch(variant))
     return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
@@ -257,13 +257,13 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeR
         gradient=gradient,
         solve=solve_time,
         fresh=fresh,
-        memory=_memory(lambda: _from_nothing(variant)),
+        memory=_memory(lambda: _from_scratch(variant)),
         optimum=optimum,
         violation=violation,
     )
 
 
-def _from_nothing(variant: Problem) -> float:
+def _from_scratch(variant: Problem) -> float:
     forget()
     return objective_value(variant, evaluate(variant))
 
@@ -332,7 +332,7 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
 def seconds(work: Callable[[], object]) -> float:
     """Return the shortest time of a call [s]."""
     times: list[float] = []
-    while sum(times) < _LONG and (len(times) <= 3 or (sum(times) < _LEAST_TIME and len(times) <= _MOST_REPEATS)):
+    while sum(times) < _LONG and (len(times) <= 3 or (sum(times) < _MIN_TIME and len(times) <= _MAX_REPEATS)):
         started = time.perf_counter()
         work()
         times.append(time.perf_counter() - started)

@@ -154,7 +154,7 @@ def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch
     boxes = DesignBoxes(joint(780004), math.inf, lambda *_: math.inf)
     count = boxes.loads.rows * boxes.loads.columns
     for maximum, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
-        monkeypatch.setattr(design_boxes, "MOST_NUMBERS", maximum)
+        monkeypatch.setattr(design_boxes, "MAX_NUMBERS", maximum)
         monkeypatch.setattr(design_boxes, "MIN_CORNER_SHARE", few)
         assert (boxes.max_boxes > 0) is worth
 

@@ -20,7 +20,7 @@ def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
     problem = engines.problem(tmp_path, cylinders, phasing="best = 1\nmost_shafts = 1", rest=rest)
     proven = solve(problem)
     assert proven.certificate.kind is Proof.GLOBAL
-    monkeypatch.setattr(even_search, "MOST_LISTED", 0)
+    monkeypatch.setattr(even_search, "MAX_LISTED", 0)
     found = solve(problem)
     assert "exchanges of throws" in found.certificate.method
     assert sum(d.value for d in found.decisions if d.name.endswith("built")) <= 1

@@ -13,7 +13,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.even_search import MOST_LISTED
+from laufruhe.solvers.stars.even_search import MAX_LISTED
 from laufruhe.solvers.stars.families import families_of
 from phasing import engines
 from problem_files import changed
@@ -30,7 +30,7 @@ def long(folder: Path, cylinders: int, cycle: str, norm: str, seconds: float = 3
     asked = MOUNTS + engines.MOUNT_FORCE.replace("mean", norm)
     problem = engines.problem(folder, cylinders, cycle, phasing=phasing, rest=asked)
     (family,) = families_of(problem.phasing)[0]
-    assert family.size > MOST_LISTED
+    assert family.size > MAX_LISTED
     return problem, family
 
 

@@ -15,7 +15,7 @@ from laufruhe.extensions.run_ups.linear_run import NODES, Sweep
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import (
     HIGHEST,
-    MOST_STEPS,
+    MAX_STEPS,
     STEPS_PER_PERIOD,
     STRETCHES,
     missed_share,
@@ -57,7 +57,7 @@ def test_steps_follow_the_highest_order_and_miss_what_a_wave_leaves(seconds: flo
     assert sweep is not None
     assert sweep.step * sweep.count == pytest.approx(seconds)
     turned = HIGHEST * run.speed * sweep.step
-    allowed = STRETCHES * MOST_STEPS
+    allowed = STRETCHES * MAX_STEPS
     assert turned <= math.tau / STEPS_PER_PERIOD or sweep.count == allowed
     # no more than one step a stretch is spare
     assert sweep.count <= min(allowed, HIGHEST * run.speed * seconds * STEPS_PER_PERIOD / math.tau + STRETCHES)

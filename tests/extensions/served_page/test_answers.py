@@ -156,7 +156,7 @@ def test_what_a_page_asks_is_read() -> None:
     given = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
     state = PageState.from_json(given)
     assert state.edits == (Edit("set", "a", "1 kg"),)
-    assert state.held[0].value == {"throws": [0, 180]}
+    assert state.fixed[0].value == {"throws": [0, 180]}
     assert state.design == {"b": 2.0}
 
 
@@ -181,7 +181,7 @@ def test_a_given_crank_may_be_opened() -> None:
     problem = load(LANCHESTER)
     assert problem.phasing is None
     state = PageState(edits=(Edit("open crank", "crank", 1),))
-    tables = state.tables(source(LANCHESTER).tables, with_held=True)
+    tables = state.tables(source(LANCHESTER).tables, with_fixed=True)
     assert load(tables).phasing is not None
 
 

@@ -14,7 +14,7 @@ import pytest
 
 from laufruhe.extensions.served_page import transport
 from laufruhe.extensions.served_page.guard import HEADERS, TOKEN
-from laufruhe.extensions.served_page.transport import MOST_AT_ONCE, MOST_BYTES, HttpAnswer, Server
+from laufruhe.extensions.served_page.transport import MAX_AT_ONCE, MAX_BYTES, HttpAnswer, Server
 
 SECRET = "the problem"
 PATIENCE = 60.0
@@ -85,7 +85,7 @@ def test_who_has_the_token_is_answered(server: Server) -> None:
         ({"Content_Type": "text/plain"}, 415),
         ({"Content_Length": None}, 411),
         ({"Content_Length": "-1"}, 411),
-        ({"Content_Length": str(MOST_BYTES + 1)}, 413),
+        ({"Content_Length": str(MAX_BYTES + 1)}, 413),
         ({"Content_Length": "9" * 400}, 411),
         ({"Transfer_Encoding": "chunked"}, 411),
     ],
@@ -158,7 +158,7 @@ def test_nobody_beyond_this_machine_is_listened_to(server: Server) -> None:
 
 def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back(server: Server) -> None:
     # connections of other tests take room until their threads have ended
-    wait_for(lambda: server._room._value == MOST_AT_ONCE)
+    wait_for(lambda: server._room._value == MAX_AT_ONCE)
     done, started = threading.Event(), threading.Semaphore(0)
 
     def work(_: object) -> HttpAnswer:
@@ -167,7 +167,7 @@ def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back
         return HttpAnswer("{}")
 
     server.handles["/work"] = work
-    asking = [threading.Thread(target=asked, args=(server, "/work")) for _ in range(MOST_AT_ONCE)]
+    asking = [threading.Thread(target=asked, args=(server, "/work")) for _ in range(MAX_AT_ONCE)]
     try:
         for thread in asking:
             thread.start()
@@ -187,8 +187,8 @@ def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back
 def test_slow_connections_give_way_to_who_asks(server: Server, sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     # without a deadline these would stay, so that who asks is answered only if they give way
     monkeypatch.setattr(transport, "READ", 1e6)
-    wait_for(lambda: server._room._value == MOST_AT_ONCE)
-    slow = [socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) for _ in range(MOST_AT_ONCE)]
+    wait_for(lambda: server._room._value == MAX_AT_ONCE)
+    slow = [socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) for _ in range(MAX_AT_ONCE)]
     try:
         for connection in slow:
             connection.sendall(sent)

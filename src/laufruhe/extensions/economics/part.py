@@ -31,7 +31,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_alternating_loads
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
-from laufruhe.studies.text import NOTHING, Text, marked_table, number, statement_table
+from laufruhe.studies.text import DASH, Text, marked_table, number, statement_table
 
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot distinguish designs."""
@@ -55,7 +55,7 @@ _FREE = {
 
 
 class SourceClaim(Table):
-    """What a source says about a set of shafts; it is confirmed or not."""
+    """Statement of a source about a set of shafts, to be confirmed or refuted."""
 
     says: Judgement | None = None
     falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = f.optional("Share by which the force is said to fall.")
@@ -212,9 +212,9 @@ class Economics(Part):
             force, worth = float(row["optimum"]), evaluate_design.get(str(name))
             label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == MORE_CYLINDERS else str(name)
             cells = [label, str(int(row["shafts"])), fixed(float(row["optimum_mass"]), 2), number(force)]
-            change = NOTHING if force == plain else percent(force / plain - 1.0)
+            change = DASH if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
-            rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
+            rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else DASH])
         return [
             marked_table(head, rows),
             *statement_table([v for claims in verdicts(data).values() for v in claims]),

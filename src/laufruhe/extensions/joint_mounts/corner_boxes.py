@@ -25,7 +25,7 @@ from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_
 from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Pairing
 from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
-from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS
+from laufruhe.load_models.affine import FEASIBLE, MAX_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import with_default_sampling
@@ -37,9 +37,9 @@ from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
 from laufruhe.prove.witness import Witness, check_near_witness
 
-MOST_OPEN = 5
+MAX_OPEN = 5
 """Largest number n of open numbers of mounts: a box has 2^n vertices and 4^n coefficients."""
-MOST_CORNERS, ROWS = 1200, 7e6
+MAX_CORNERS, ROWS = 1200, 7e6
 """Largest number of vertices with multipliers, and of rows of all of them."""
 BOXES = 4
 """Boxes for each vertex, with up to three numbers."""
@@ -78,7 +78,7 @@ def mixes_corners(problem: Problem) -> bool:
 
     One open number, or stiffness alone, needs no vertices.
     """
-    if len(problem.decisions) < 2 or len(problem.mount_decisions) > MOST_OPEN or is_stiffness_problem(problem):
+    if len(problem.decisions) < 2 or len(problem.mount_decisions) > MAX_OPEN or is_stiffness_problem(problem):
         return False
     terms = problem.load_terms
     if named_part(problem) is not problem or problem.mount_terms or len(terms) != len(problem.objective):
@@ -125,14 +125,14 @@ class DesignBoxes:
     def max_boxes(self) -> int:
         """Box budget: as requested, or for some tens of seconds."""
         count = len(self.lower)
-        if self.max_corners < MIN_CORNER_SHARE * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
+        if self.max_corners < MIN_CORNER_SHARE * 2**count or self.loads.rows * self.loads.columns > MAX_NUMBERS:
             return 0
         return self.loads.problem.search.boxes_or(BOXES * self.max_corners // max(4 ** (count - 3), 1))
 
     @property
     def max_corners(self) -> int:
         """Largest number of vertices with multipliers."""
-        return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
+        return int(min(MAX_CORNERS, ROWS / max(self.loads.rows, 1)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes, shape (boxes,), and the index of the side of each to halve.

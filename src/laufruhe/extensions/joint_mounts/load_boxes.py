@@ -40,9 +40,9 @@ from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Witness
 
-MOST_NUMBERS = 8
+MAX_NUMBERS = 8
 """Largest number of open numbers; an unbalance of any angle has two."""
-WORK, MOST_BOXES = 8e6, 10_000
+WORK, MAX_BOXES = 8e6, 10_000
 """Work of all boxes together, and largest number of boxes."""
 ROUND_WORK = 4e4
 """Work of the boxes of one round."""
@@ -66,7 +66,7 @@ def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
     count = len(problem.mount_decisions) + sum(d.set.width for d in problem.unbalances)
     count, turns = count + (len(throws.open) if throws else 0), throws is not None
     return (
-        is_covered and count <= MOST_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
+        is_covered and count <= MAX_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
     )
 
 
@@ -185,7 +185,7 @@ class LoadBoxes:
     @property
     def max_boxes(self) -> int:
         """Box budget: as requested, or for some seconds."""
-        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)))
+        return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes, infinite without a feasible design, and the index of the side of each to halve.

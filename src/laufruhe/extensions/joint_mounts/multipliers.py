@@ -14,7 +14,7 @@ from laufruhe.prove.certificate import Bound, Multipliers, best_bound, interpola
 from laufruhe.solvers.cones.conic import restrict_rows, rows_near, solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
-ROWS, LEAST_SAMPLES = (1000, 3000), 24
+ROWS, MIN_SAMPLES = (1000, 3000), 24
 """Most rows of coarse programs in the order of trials, and fewest samples."""
 GAP = 1e-5
 """Relative gap at which multipliers are accepted."""
@@ -83,7 +83,7 @@ def _with_contradiction(
 def _times(problem: AffineProblem) -> list[int]:
     # factors of coarser sampling in the order of trials
     rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
-    divisors = [k for k in range(1, problem.samples // LEAST_SAMPLES + 1) if problem.samples % k == 0] or [1]
+    divisors = [k for k in range(1, problem.samples // MIN_SAMPLES + 1) if problem.samples % k == 0] or [1]
     factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in ROWS}
     return sorted(factors, reverse=True)
 

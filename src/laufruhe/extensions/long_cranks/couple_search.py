@@ -29,7 +29,7 @@ WORTH_SHARING = 20_000_000
 """Number of arrangements of halves from which workers share the search (fifteen throws, two seconds)."""
 LARGEST_WORK = 400_000_000
 """Largest number of arrangements of halves (sixteen throws, half a minute of one core)."""
-PIECES, MOST_AT_ONCE = 64, 16
+PIECES, MAX_AT_ONCE = 64, 16
 STARTS, BLOCK_STARS = 12, 1500
 """Number of starting stars of each kind, and of stars in groups from which the best are selected."""
 REARRANGED = (8, 8, 10, 10, 12, 12)
@@ -138,7 +138,7 @@ class _Search:
                 chosen = pieces[start : start + size]
                 batch = [_Piece(self.space, self.objective, *piece, self.best) for piece in chosen]
                 # the first pieces find values that spare the others most of their work
-                start, size = start + size, min(2 * size, MOST_AT_ONCE)
+                start, size = start + size, min(2 * size, MAX_AT_ONCE)
                 answers = sorted(
                     unordered_map(_search_piece, batch, executor, patient=True), key=lambda answer: answer[0]
                 )

@@ -37,7 +37,7 @@ from laufruhe.solvers.stars.families import Family
 from laufruhe.solvers.stars.phasing_solver import solve_phasing
 from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
 
-LEAST_GAIN = 1e-6
+MIN_GAIN = 1e-6
 """Smallest relative gain of an exchange; coarse sampling blurs less."""
 _BY_HALVES = "stars by halves that meet in a window of couples"
 
@@ -167,7 +167,7 @@ def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], ow
             ),
             default=(math.inf, star),
         )
-        if not minimum < value * (1.0 - LEAST_GAIN):
+        if not minimum < value * (1.0 - MIN_GAIN):
             break
         value, star = minimum, best
     return star

@@ -84,7 +84,8 @@ class _ConeSolver:
 
     @abstractmethod
     def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
-        """Return scaled x and z, and True if the program is bounded."""
+        # scaled x and z, and True if the program is bounded
+        raise NotImplementedError
 
 
 class DualSolver(_ConeSolver):

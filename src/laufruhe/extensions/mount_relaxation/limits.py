@@ -15,7 +15,7 @@ import numpy as np
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts
 from laufruhe.extensions.mount_relaxation.orders import (
-    MOST_ORDERS,
+    MAX_ORDERS,
     EpigraphVariable,
     MeasureOrders,
     Order,
@@ -191,5 +191,5 @@ def limits_of(
             if measure.orders is not None:
                 groups = [tuple(o for o in orders if orders_equal(o.omega / speed, h)) for h in measure.orders]
             upper = limit.maximum * (1.0 + SLACK)
-            ratios += [RatioLimit(group, upper) for group in groups if 0 < len(group) <= MOST_ORDERS]
+            ratios += [RatioLimit(group, upper) for group in groups if 0 < len(group) <= MAX_ORDERS]
     return Limits(tuple(norms), tuple(ratios))

@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import is_travel
 
 # largest share of squares in omitted orders, and most orders of one norm
-OMITTED, MOST_ORDERS = 1e-6, 12
+OMITTED, MAX_ORDERS = 1e-6, 12
 # largest loss to other orders, over the strongest order, at which the sampled bound of the order is used
 MAX_LOSS = 0.03
 # factor of a mean that its bound by the cosine of an order keeps
@@ -328,7 +328,7 @@ def _of_squares(query: MeasureOrders) -> EpigraphVariable:
     sizes = weights * np.array([np.sum(np.abs(order.signal) ** 2) for order in query.orders])
     by_size = np.argsort(-sizes, kind="stable")
     omitted = 1.0 - np.cumsum(sizes[by_size]) / max(float(sizes.sum()), 1e-300)
-    retained = by_size[: min(int(np.argmax(omitted <= OMITTED)) + 1, MOST_ORDERS)]
+    retained = by_size[: min(int(np.argmax(omitted <= OMITTED)) + 1, MAX_ORDERS)]
     orders = tuple(query.orders[k] for k in retained)
     return EpigraphVariable(orders, 1.0, math.sqrt(float(sizes.sum())) or 1.0, 0.0, True, 1.0)
 

@@ -37,7 +37,7 @@ from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 # relative gaps to prove, one after the other
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 # relaxations by default; a further level starts only while AHEAD times those spent are left
-MOST_RELAXED, AHEAD = 100, 3
+MAX_RELAXED, AHEAD = 100, 3
 # the same where odd multiples loosen the bound of a mean, so that halving gains little
 FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 40
 # first relative gap of a design that is one of many, because bounds of the others limit the total bound
@@ -113,7 +113,7 @@ def spring_bound(
             # prove the tolerance at once, unless a box bounds little of the value
             shares: tuple[float, ...]
             if relaxation.modes:
-                shares, maximum = LEVELS, MOST_RELAXED
+                shares, maximum = LEVELS, MAX_RELAXED
             elif relaxation.has_loose_mean:
                 shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
             else:

@@ -42,7 +42,7 @@ from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_problem
 
 # total work of the relaxations, each its number of moments to the power EFFORT, and the most relaxations
-WORK, EFFORT, MOST_BOXES = 6e7, 5, 100
+WORK, EFFORT, MAX_BOXES = 6e7, 5, 100
 # largest share of the missing bound that omitted orders may carry
 OMITTED = 0.3
 # share of the unbalance ranges that enters the units of products, besides the best design
@@ -192,7 +192,7 @@ class SdpRelaxation:
         """Budget of boxes: as many as take some tens of seconds."""
         parts = [order.part for variables in self._variables for variable in variables for order in variable.orders]
         cost = sum((1 + self.basis.count + 2 * self._parts[k].products) ** EFFORT for k in parts)
-        return self.problem.search.boxes_or(int(min(WORK / max(cost, 1), MOST_BOXES)))
+        return self.problem.search.boxes_or(int(min(WORK / max(cost, 1), MAX_BOXES)))
 
     def bound(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """Return the lower bound of a box [SI] by stiffness boxes or relaxation, and branching scores, shape (n,)."""

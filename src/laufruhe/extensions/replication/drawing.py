@@ -17,7 +17,7 @@ from laufruhe.present.pictures import rows_of
 if TYPE_CHECKING:
     import xarray as xr
 
-GROUP, ABOVE, LEAST_INSIDE, LEAST_SHOWN = 0.84, 0.012, 0.055, 1e-6
+GROUP, ABOVE, MIN_INSIDE, MIN_SHOWN = 0.84, 0.012, 0.055, 1e-6
 DIGITS = 3
 BAR = 0.31
 """Least width of a bar and its number [inch]."""
@@ -112,7 +112,7 @@ def _axis(axis: AxisTable, names: Names) -> Axis:
     return Axis(axis.label, ends, ticks, tuple(axis.log), grid=labels is None)  # type: ignore[arg-type]
 
 
-def _each(values_by_name: Mapping[str, Sequence[Any]], names: Names) -> Iterator[dict[str, Any]]:
+def _combinations(values_by_name: Mapping[str, Sequence[Any]], names: Names) -> Iterator[dict[str, Any]]:
     for name, values in values_by_name.items():
         yield from ({**names, name: value} for value in values)
     if not values_by_name:
@@ -120,7 +120,7 @@ def _each(values_by_name: Mapping[str, Sequence[Any]], names: Names) -> Iterator
 
 
 def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
-    for k, own_names in enumerate(_each(curve.each, names)):
+    for k, own_names in enumerate(_combinations(curve.loops, names)):
         colour = curve.colours[k % len(curve.colours)]
         y = value_of(curve.y, own_names)
         dims: tuple[str, ...] = getattr(y, "dims", ())
@@ -136,7 +136,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
 
 def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
     """Yield filled bars, their outlines, and the numbers of both."""
-    series = list(_each(bars.each, names))
+    series = list(_combinations(bars.loops, names))
     fills = [join(value_of(bars.filled, own_names)) for own_names in series]
     outlines = [join(value_of(bars.outline, own_names)) for own_names in series] if bars.outline else fills
     top, width = max(max(values) for values in outlines), GROUP / len(series)
@@ -149,7 +149,7 @@ def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
             yield Bars(places, high, 0.9 * width, colour, hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
             yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), "ink", "center", "bottom")
-            if bars.outline and inner > LEAST_INSIDE * max(top, end):
+            if bars.outline and inner > MIN_INSIDE * max(top, end):
                 number = _number(inner, top, bars.number)
                 yield Words(x, inner - ABOVE * top, number, "ink", "center", "top", inside=colour)
 
@@ -158,4 +158,4 @@ def _number(value: float, top: float, spec: str) -> str:
     if spec:
         return format(value, spec)
     figures = f"{value:#.{DIGITS}g}".rstrip(".") if abs(value) < 10.0**DIGITS else f"{value:.0f}"
-    return figures if abs(value) > LEAST_SHOWN * top else "0"
+    return figures if abs(value) > MIN_SHOWN * top else "0"

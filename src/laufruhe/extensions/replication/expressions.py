@@ -27,7 +27,7 @@ from laufruhe.files.fields import Table
 
 Place: TypeAlias = tuple[str | int, ...]
 """Position of a text in a file: keys, and indices of lists."""
-MOST_LETTERS = 2000
+MAX_LETTERS = 2000
 _ARITHMETIC: Mapping[str, Any] = {
     "Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv, "Mod": operator.mod,
     "Pow": lambda a, b: (float(a) if isinstance(a, int) else a) ** b,
@@ -55,7 +55,7 @@ def checks_in(
         Dimensions, which the `x` of a curve knows too.
     """
     if isinstance(entry, Table):
-        known_here = {**known, **getattr(entry, "each", {})}
+        known_here = {**known, **getattr(entry, "loops", {})}
         for name, field in type(entry).model_fields.items():
             at_places = dict.fromkeys(places, ()) if isinstance(entry, CurveTable) and name == "x" else {}
             where = (*at, field.alias or name)
@@ -134,7 +134,7 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
 @cache
 def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
     """Return the allowed nodes of an expression, and its compiled code."""
-    if len(text) > MOST_LETTERS:
+    if len(text) > MAX_LETTERS:
         raise ExpressionError(f"an expression of {len(text)} letters is too long; split it under define")
     try:
         # Python warns of 1[0], which has no value anyway
@@ -178,12 +178,12 @@ class _RenameCalls(ast.NodeTransformer):
 
 def _numbers_only(function: Any) -> Any:
 
-    def found(a: Any, b: Any) -> Any:
+    def agreement(a: Any, b: Any) -> Any:
         if isinstance(a, str | list) or isinstance(b, str | list):
             raise TypeError("texts and lists are no numbers")
         return function(a, b)
 
-    return found
+    return agreement
 
 
 _CALL_TABLE = {f"{name}()": function for name, function in FUNCTIONS.items()}
@@ -215,10 +215,10 @@ def _filled(text: str, names: Mapping[str, Any]) -> Any:
     parts = list(_parts(text))
     if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
         return value_of(parts[0][1], names)
-    return "".join(plain + _shown(field, spec, names) for plain, field, spec in parts)
+    return "".join(plain + _format(field, spec, names) for plain, field, spec in parts)
 
 
-def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
+def _format(field: str, spec: str, names: Mapping[str, Any]) -> str:
     if not field:
         return ""
     return format(number_of(field, names), spec) if spec else str(value_of(field, names))

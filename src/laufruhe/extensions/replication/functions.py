@@ -39,11 +39,11 @@ def at(values: xr.DataArray, **places: Any) -> Any:
 
 
 def _arg(how: str) -> Callable[..., Any]:
-    def found(values: Any, dim: str | None = None) -> Any:
+    def position(values: Any, dim: str | None = None) -> Any:
         answer = getattr(values, f"idx{how}")(dim or values.dims[0])
         return answer if answer.dims else answer.item()
 
-    return found
+    return position
 
 
 def orders(values: xr.DataArray) -> Any:

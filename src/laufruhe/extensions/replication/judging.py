@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CONFIRMED, NOT_CONFIRMED, BEYOND = "confirmed", "not confirmed", UNSTATED
-_SLACK, _NOTHING = 1e-9, 1e-9
+_SLACK, _NEGLIGIBLE = 1e-9, 1e-9
 _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
@@ -27,7 +27,7 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
     """
     if not statements:
         return {}
-    verdicts = [[_judged(statement, names) for names in readings.values()] for statement in statements]
+    verdicts = [[_verdict(statement, names) for names in readings.values()] for statement in statements]
     return {
         "by_reading": list(readings),
         "statement": (
@@ -46,7 +46,7 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
     }
 
 
-def _judged(statement: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
+def _verdict(statement: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
     value = number_of(statement.value, names)
     names_and_value = {**names, "value": value}
     return value, verdict(statement, names_and_value), fill_in(statement.why, names_and_value)
@@ -80,15 +80,15 @@ def _row(statement: xr.Dataset, readings: Sequence[str]) -> list[str]:
     unit = statement["unit"].item()
     cells = [str(statement[name].item()) for name in ("statement", "printed")]
     for value, outcome in zip(statement["ours"].values.tolist(), statement["verdict"].values.tolist(), strict=True):
-        cells += [f"{_shown(value)} {unit}".strip(), _CELLS[outcome]]
+        cells += [f"{_format(value)} {unit}".strip(), _CELLS[outcome]]
     whys = statement["why"].values.tolist()
     if len(set(whys)) > 1:
         return [*cells, "<br>".join(f"{name}: {why}" for name, why in zip(readings, whys, strict=True))]
     return [*cells, whys[0]]
 
 
-def _shown(value: float) -> str:
-    return "0" if abs(value) < _NOTHING else f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
+def _format(value: float) -> str:
+    return "0" if abs(value) < _NEGLIGIBLE else f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
 def count_confirmed(datasets: Iterable[xr.Dataset]) -> str:

@@ -12,7 +12,7 @@ from laufruhe.files.study_tables import CaseTable
 from laufruhe.present.picture import SERIES
 
 Expression: TypeAlias = int | float | str
-Each: TypeAlias = Annotated[
+Loops: TypeAlias = Annotated[
     dict[str, list[int | float | str]],
     Field(alias="for", description="Name and values: it is drawn once for every value."),
 ]
@@ -58,7 +58,7 @@ class ReplicaCase(CaseTable):
 
 
 class StatementTable(Table):
-    """What the source says, and how the same is found here."""
+    """Statement of the source, and how it is computed here."""
 
     text: Annotated[str, Field(min_length=1)]
     where: str = f.optional("Figure, page or equation.", "")
@@ -71,7 +71,7 @@ class StatementTable(Table):
     why: str = ""
 
     @model_validator(mode="after")
-    def _is_judged(self) -> StatementTable:
+    def _has_verdict(self) -> StatementTable:
         if (self.holds is None) == (self.expected is None):
             raise f.refusal("is judged by is and within, or by holds; give one of the two")
         if (self.expected is None) != (self.within is None):
@@ -96,7 +96,7 @@ class CurveTable(Table):
 
     y: Expression
     x: Expression | None = f.optional("Place along the horizontal axis; by default the dimension of y.")
-    each: Each = Field(default_factory=dict, alias="for")
+    loops: Loops = Field(default_factory=dict, alias="for")
     label: str = ""
     end: str = f.optional("Words beside the last point.", "")
     colours: list[Hue] = Field(default=list(SERIES), min_length=1)  # type: ignore[arg-type]
@@ -110,7 +110,7 @@ class BarsTable(Table):
 
     filled: str
     outline: str | None = None
-    each: Each = Field(default_factory=dict, alias="for")
+    loops: Loops = Field(default_factory=dict, alias="for")
     label: str = ""
     labels: list[str] = Field(default_factory=list)
     number: f.Format = f.optional("Format of the numbers on the bars; three figures by default.", "")
@@ -129,7 +129,7 @@ class WordsTable(Table):
 
 
 class AreaTable(Table):
-    """What lies between two values of y from one x to another."""
+    """Area between two values of y, from one x to another."""
 
     x: list[Expression] = Field(min_length=2, max_length=2)
     y: list[Expression] = Field(min_length=2, max_length=2)

@@ -40,7 +40,7 @@ from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
 
-MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
+MAX_NODES, STEPS, RANDOM = 20_000, 8, 2000
 """Most nodes, steps of each bound, and random assemblies for comparison."""
 FREE = 3
 """Cylinders without a part in the node around a known assembly."""
@@ -176,7 +176,7 @@ class _Search(BranchAndBound[Chosen]):
     def run(self) -> float:
         """Return a lower bound of the objective over all assemblies."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
-        bound = self.divide((self.bound(free), free), MOST_NODES)
+        bound = self.divide((self.bound(free), free), MAX_NODES)
         check_near_witness(self, self.best, Witness(self._mass(self.best), self.value))
         return bound
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.robust.tolerance import Tolerances, tolerances_of, with_errors
-from laufruhe.extensions.robust.worst_case import MOST_NODES, Terms, check_worst, worst_case
+from laufruhe.extensions.robust.worst_case import MAX_NODES, Terms, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.load_models.batch import feature_rows
 from laufruhe.numerics.arrays import Array
@@ -150,7 +150,7 @@ class WorstCaseAdversary:
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
         """Return the worst engines of a design by branch and bound."""
         engines = BuiltEngines(self.problem, values, self.samples)
-        columns, maximum = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
+        columns, maximum = tolerances_of(self.problem).columns, MAX_NODES if proven else QUICK
         worst = worst_case(engines.terms, columns, self.tolerance, maximum=maximum)
         if proven:
             check_worst(engines.terms, columns, worst)

@@ -351,7 +351,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
 
 
 COLUMNS = {"pistons": ("mass",), "rods": ("mass at the small end", "mass at the big end")}
-MOST_PARTS = 100
+MAX_PARTS = 100
 
 
 class AssemblyTable(Table):
@@ -377,8 +377,8 @@ def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext)
         count = len(engine.slider_cranks)
         if len(rows) < count:
             raise Refused(where, file, f"has {len(rows)} parts for {count} cylinders", "measure one for each at least")
-        if len(rows) > MOST_PARTS:
-            raise Refused(where, file, f"has {len(rows)} parts", f"at most {MOST_PARTS} can be handled")
+        if len(rows) > MAX_PARTS:
+            raise Refused(where, file, f"has {len(rows)} parts", f"at most {MAX_PARTS} can be handled")
         if min(min(row) for row in rows) <= 0.0:
             raise Refused(where, file, "has a mass that is not above zero", "correct it")
         lots.append(Lot(key[:-1], tuple((unit * row[0], unit * row[1] if len(row) > 1 else 0.0) for row in rows)))

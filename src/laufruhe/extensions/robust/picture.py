@@ -13,7 +13,7 @@ from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 
 WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
-MOST_TOLERANCES, WIDE = 8, 6.4
+MAX_TOLERANCES, WIDE = 8, 6.4
 
 
 def applies(result: Result) -> bool:
@@ -49,7 +49,7 @@ def figure(result: Result) -> Figure:
 
 
 def _bars(axes: Axes, details: RobustResult, unit: str) -> None:
-    tolerances = details.tolerances[:MOST_TOLERANCES]
+    tolerances = details.tolerances[:MAX_TOLERANCES]
     maximum = axis_end(tolerance.saving for tolerance in tolerances)
     axes.barh(
         range(len(tolerances)), [max(tolerance.saving, 0.0) for tolerance in tolerances], color=AFTER, height=0.55

@@ -41,7 +41,7 @@ from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_re
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     FEASIBLE,
-    MOST_REFINEMENTS,
+    MAX_REFINEMENTS,
     ProofData,
     evaluate_design,
     unbalance_values,
@@ -53,14 +53,14 @@ from laufruhe.solvers.result import Result, Status
 
 Solve = Callable[[Problem], Result]
 
-MOST_ROUNDS = 60
-MOST_SCENARIOS = 24
+MAX_ROUNDS = 60
+MAX_SCENARIOS = 24
 COARSER = 4
 """Factor by which the first program has fewer samples than the fidelity."""
 SAME = 1e-9
 JOIN_SHARE = 0.1
 """Share of the tolerance by which an engine must exceed all in the program to join it."""
-MOST_MARGINS, MOST_DOUBLINGS = 3, 3
+MAX_MARGINS, MAX_DOUBLINGS = 3, 3
 """Most times that limits are lowered, and that samples of the fidelity are doubled to close a gap."""
 MIN_FALL = 0.99
 """Ratio of violations in successive rounds below which errors join; above it, samples or margins are the cause."""
@@ -172,7 +172,7 @@ def _decide(
     # with symmetric errors at least half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     robust = replace(robust, bound=bound if problem.decisions else robust.worst.bound)
-    for _ in until_time_limit(range(MOST_REFINEMENTS)):
+    for _ in until_time_limit(range(MAX_REFINEMENTS)):
         if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
         sampled = replace(sampled, samples=fine_samples(robust.samples))
@@ -236,7 +236,7 @@ class _Program:
             for error_set in errors
             if all(np.abs(error_set - entries).max(initial=0.0) > SAME for entries in self.errors)
         ]
-        while self.errors and len(self.errors) + len(added) > MOST_SCENARIOS:
+        while self.errors and len(self.errors) + len(added) > MAX_SCENARIOS:
             index = int(np.argmin(self.shares)) if self.shares else 0
             for entries in (self.errors, self.models, self.shares):
                 del entries[index]
@@ -317,17 +317,17 @@ def _minimise_worst_case(
     program, values, bound = _Program(problem, zero_level), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, previous_violation, is_solved = program.angles // COARSER, 0.0, math.inf, True
-    for _ in until_time_limit(range(MOST_ROUNDS)):
+    for _ in until_time_limit(range(MAX_ROUNDS)):
         is_worse = worst.value > level * (1.0 + JOIN_SHARE * problem.tolerance)
         is_new = is_solved and (is_worse or FEASIBLE < worst.violation < MIN_FALL * previous_violation)
         if is_new and program.add(worst.errors):
             samples, previous_violation = max(samples, program.angles // COARSER), worst.violation
-        elif is_solved and worst.violation > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+        elif is_solved and worst.violation > FEASIBLE and samples >= program.angles and program.margins < MAX_MARGINS:
             # all active engines are in the program, so peaks lie between samples: lower the limits slightly
             program.lower(worst.violation)
         else:
             samples, program.margin, program.margins, previous_violation = 2 * samples, 0.0, 0, math.inf
-            if samples > program.angles << MOST_DOUBLINGS:
+            if samples > program.angles << MAX_DOUBLINGS:
                 break
             if samples > program.angles:
                 adversary = replace(adversary, samples=2 * adversary.samples)
@@ -355,7 +355,7 @@ def _minimise_worst_case(
 
 
 def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float) -> RobustDesign:
-    for _ in until_time_limit(range(MOST_REFINEMENTS)):
+    for _ in until_time_limit(range(MAX_REFINEMENTS)):
         if not is_over(best.bound, best.worst.bound, zero_level):
             break
         adversary = replace(adversary, samples=fine_samples(best.samples))
@@ -366,7 +366,7 @@ def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float
 def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) -> RobustDesign:
     """Lower limits until the proven bound of a design satisfies them, if the bound alone violates them."""
     program.margin = best.margin
-    for _ in until_time_limit(range(MOST_MARGINS)):
+    for _ in until_time_limit(range(MAX_MARGINS)):
         if not FEASIBILITY_TOL < best.worst.violation <= MAX_MARGIN:
             break
         program.lower(best.worst.violation)

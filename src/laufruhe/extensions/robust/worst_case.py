@@ -29,10 +29,10 @@ Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
 """Weights, and norms as functions of the errors."""
 
 ROUNDING = 1e-12
-MOST_NODES = 5000
+MAX_NODES = 5000
 STARTS, CLIMBS = 12, 30
 """Random starts of the local search, and most steps of each."""
-MOST_ENDS = 12
+MAX_ENDS = 12
 """Most intervals with all ends enumerated in one node."""
 MAJORANTS, BALL_STEPS = 3, 6
 """Most majorants, and fixed-point steps for the points of balls, in one node."""
@@ -65,7 +65,7 @@ def value_at(terms: Terms, errors: Array) -> float:
     return sum(weight * norm.value(errors) for weight, norm in terms)
 
 
-def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MOST_NODES) -> WorstCase:
+def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MAX_NODES) -> WorstCase:
     """Return the maximum of a weighted sum of norms N(V0 + E z) over intervals and discs.
 
     Parameters
@@ -343,7 +343,7 @@ def _over_majorants(
 ) -> tuple[float, Array]:
     """Return an upper bound of the quadratic majorants over all local numbers, and the point of it, shape (n,).
 
-    The ends of up to MOST_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
+    The ends of up to MAX_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
     bounded one by one.
     """
     numbers_of = parts[0].slices
@@ -362,7 +362,7 @@ def _over_majorants(
     ends.sort(key=lambda k: -float(np.abs(curvature[numbers_of[k]]).sum()))
     enumerated: list[int] = []
     for k in ends:
-        if len(enumerated) + numbers_of[k].stop - numbers_of[k].start <= MOST_ENDS:
+        if len(enumerated) + numbers_of[k].stop - numbers_of[k].start <= MAX_ENDS:
             enumerated += range(numbers_of[k].start, numbers_of[k].stop)
     signs = _signs(len(enumerated))
     other_blocks = [k for k in range(len(blocks)) if numbers_of[k].start not in enumerated]

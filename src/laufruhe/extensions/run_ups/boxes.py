@@ -24,7 +24,7 @@ from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 
 # fewest long steps of a run
-LEAST_STEPS = 60
+MIN_STEPS = 60
 # smallest distance of a stop beyond the limit of travel, as a share of the limit
 MARGIN = 1e-3
 
@@ -62,7 +62,7 @@ class RunBoxes:
         drag = float(np.linalg.norm(self._matrices.base.damping, 2))
         runs = []
         for sweep, wrenches in zip(self._peaks.sweeps, self._peaks.wrenches, strict=True):
-            maximum = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / LEAST_STEPS)
+            maximum = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / MIN_STEPS)
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(maximum), 1)))
         return tuple(runs)
 
@@ -110,12 +110,10 @@ def bounds_runs(problem: Problem) -> bool:
 
 
 def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
-    """Return True if no design within the limits meets a stop, so that its run-up is that without stops.
-
-    Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
-    push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
-    steps.
-    """
+    # True if no design within the limits meets a stop, so that its run-up is that without stops.
+    # Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
+    # push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
+    # steps.
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
     maximum = min((limit.maximum for limit in limits), default=math.inf)

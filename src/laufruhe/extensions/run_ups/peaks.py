@@ -29,7 +29,7 @@ from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
-STEP, LEAST_SHARE = 1e-5, 0.1
+STEP, MIN_SHARE = 1e-5, 0.1
 """Relative step of a difference, and smallest scale of it as a share of the range of a number."""
 
 
@@ -148,7 +148,7 @@ class RunPeaks:
         else:
             high = next(d.scale for d in self._domains if d.columns.start <= k - count < d.columns.stop)
             low = -high
-        step = STEP * min(high - low, max(abs(float(point[k])), LEAST_SHARE * (high - low)))
+        step = STEP * min(high - low, max(abs(float(point[k])), MIN_SHARE * (high - low)))
         ends = (point.copy(), point.copy())
         for end, value in zip(ends, (point[k] - step, point[k] + step), strict=True):
             end[k] = float(np.clip(value, low, high)) if k < count else value

@@ -29,12 +29,12 @@ HIGHEST = 12.0
 """Highest order of the loads in a run; higher ones move the block by less than the error between steps."""
 STRETCHES, FOLLOWED, RESOLVED = 60, 1e-4, 1e-6
 """Intervals of an envelope, and relative tolerances of the integrator for stiff and for other mounts."""
-MOST_SWINGS = 2e3
+MAX_SWINGS = 2e3
 """Most vibrations of a mode in a run that an explicit integrator resolves."""
 COARSEST = 4.0
 """Largest factor by which steps may be longer than usual."""
 STEPS_PER_PERIOD = 24
-LEAST_STEPS, MOST_STEPS = 16, 4000
+MIN_STEPS, MAX_STEPS = 16, 4000
 """Fewest and most steps in an interval of the envelope."""
 
 
@@ -101,7 +101,7 @@ def _cached_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run:
             if response is not None:
                 return _envelope(response, first, last)
         # modes that vibrate too often for an explicit method need a stiff integrator
-        is_stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
+        is_stiff = seconds * mounting.modes.frequencies[-1] > MAX_SWINGS
         integrator: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if is_stiff else ("DOP853", RESOLVED)
         return run_through(
             mounting, *_loads(engine_alone, point, fidelity), first, last, seconds, STRETCHES, *integrator
@@ -114,16 +114,16 @@ def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Swe
     """Return equal steps of a run, `coarser` times as long as for a final evaluation; None if they are too many."""
     fastest = max(first, last) * HIGHEST
     needed_steps = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
-    if needed_steps > COARSEST * MOST_STEPS:
+    if needed_steps > COARSEST * MAX_STEPS:
         return None
-    count = STRETCHES * max(int(min(max(needed_steps + 1.0, LEAST_STEPS), MOST_STEPS)) // coarser, LEAST_STEPS)
+    count = STRETCHES * max(int(min(max(needed_steps + 1.0, MIN_STEPS), MAX_STEPS)) // coarser, MIN_STEPS)
     return Sweep(first, (last - first) / seconds, seconds / count, count)
 
 
 def missed_share(run: Run) -> float:
     """Return the largest relative error of a maximum between steps, for orders up to the highest (E28)."""
     needed_steps = STEPS_PER_PERIOD * run.speed * HIGHEST * (max(run.up, run.down) / STRETCHES) / math.tau
-    steps = STEPS_PER_PERIOD * min(1.0, MOST_STEPS / needed_steps)
+    steps = STEPS_PER_PERIOD * min(1.0, MAX_STEPS / needed_steps)
     return 1.0 / math.cos(math.pi / steps) - 1.0 if steps > 2.0 else math.inf
 
 
@@ -194,7 +194,7 @@ def run_through(
     absolute = 1e-3 * tolerance * static_size(model, loads[0][1] * max(first, last) ** 2)
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
-        times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
+        times = np.linspace(start, end, min(max(count, MIN_STEPS), MAX_STEPS))
         states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=absolute)
         force[k], travel[k], twist[k] = _maximum(model, *np.split(states, 2))
         state = states[:, -1]

@@ -77,13 +77,13 @@ def _names_and_kinds(source: Source) -> tuple[tuple[str, ...], dict[str, Kind]]:
 
 def _held_kinds(source: Source, state: PageState) -> set[Kind]:
     _, kinds = _names_and_kinds(source)
-    return {Kind.STAR if edit.name == STAR else kinds[edit.name] for edit in state.held}
+    return {Kind.STAR if edit.name == STAR else kinds[edit.name] for edit in state.fixed}
 
 
-def _requested(source: Source, state: PageState, with_held: bool) -> tuple[dict[str, Any], Problem]:
+def _requested(source: Source, state: PageState, with_fixed: bool) -> tuple[dict[str, Any], Problem]:
     with errors_in_file(source.path.name):
         state.check(_names_and_kinds(source)[0])
-        tables = state.tables(source.tables, with_held)
+        tables = state.tables(source.tables, with_fixed)
     return tables, load_tables(tables, Path(source.path))
 
 
@@ -138,7 +138,7 @@ def _opens(source: Source) -> bool:
 def follow(source: Source, state: PageState) -> dict[str, Any]:
     """Return the optimum of the affine decisions, all others fixed, within milliseconds."""
     began, spent = time.perf_counter(), time.process_time()
-    tables, problem = _requested(source, state, with_held=True)
+    tables, problem = _requested(source, state, with_fixed=True)
     scene = scene_of(problem, tables, source.content)
     followed = scene.follower.at(problem.limits) if scene.follower else None
     design, simpler = scene.evaluated(followed), scene.simpler(_held_kinds(source, state))
@@ -166,7 +166,7 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
 @_answered
 def measure(source: Source, state: PageState) -> dict[str, Any]:
     """Evaluate the displayed design by the exact model."""
-    tables, whole_problem = _requested(source, state, with_held=True)
+    tables, whole_problem = _requested(source, state, with_fixed=True)
     problem = replace(scene_of(whole_problem, tables, source.content).problem, limits=whole_problem.limits)
     values = decided(problem, state.design)
     evaluation = evaluate(problem.fixed_at([values[decision.name] for decision in problem.decisions]))
@@ -178,7 +178,7 @@ def measure(source: Source, state: PageState) -> dict[str, Any]:
 def settle(source: Source, state: PageState, seconds: float) -> dict[str, Any]:
     """Solve and prove the whole problem as `laufruhe solve` does."""
     began = time.perf_counter()
-    tables, problem = _requested(source, state, with_held=False)
+    tables, problem = _requested(source, state, with_fixed=False)
     try:
         result = solve(replace(problem, sharply=True), time_limit=seconds)
     except SolverError as error:
@@ -218,7 +218,7 @@ def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[s
 
 
 def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simplification]:
-    tables, whole_problem = _requested(source, state, with_held=True)
+    tables, whole_problem = _requested(source, state, with_fixed=True)
     scene = scene_of(whole_problem, tables, source.content)
     problem = replace(scene.problem, limits=whole_problem.limits)
     edges = [(limit.name, limit.minimum, limit.maximum, limit.outside) for limit in problem.limits]
@@ -269,7 +269,7 @@ def front(source: Source, state: PageState, across: str, k: int) -> dict[str, An
 @_answered
 def save(source: Source, state: PageState) -> dict[str, Any]:
     """Return the state of the page as a problem file."""
-    tables, problem = _requested(source, state, with_held=True)
+    tables, problem = _requested(source, state, with_fixed=True)
     units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
     with errors_in_file(source.path.name):
         for name, value in state.design.items():

@@ -14,7 +14,7 @@ from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
 
-_FEW = 2
+_MAX_NAMES = 2
 """Broken limits that a claim names before it counts the others."""
 
 
@@ -23,13 +23,13 @@ class ClaimKind(StrEnum):
 
     PROVEN = "proven"
     """The whole problem was solved, and no design is better within the tolerance."""
-    FOUND = "found"
+    BEST = "found"
     """The whole problem was solved, and the design is the best that was found."""
     ESTIMATE = "estimate"
     """The whole problem, solved at few samples."""
-    HELD = "held"
+    SIMPLIFIED = "held"
     """A simpler problem, solved at few samples."""
-    GIVEN = "given"
+    INITIAL = "given"
     """The initial design; nothing was decided."""
     NO_DESIGN = "no design"
 
@@ -40,26 +40,26 @@ class Simplification:
 
     Attributes
     ----------
-    held
+    fixed_parts
         Phrases for fixed numbers: "these mounts".
     left_out
         Phrases for neglected requirements: "tolerances".
     """
 
-    held: tuple[str, ...] = ()
+    fixed_parts: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        return bool(self.held or self.left_out)
+        return bool(self.fixed_parts or self.left_out)
 
     @property
     def phrase(self) -> str:
         """Words that follow a number, with a blank before them."""
-        fixed = f" for {join_phrases(self.held)}" if self.held else ""
+        fixed = f" for {join_phrases(self.fixed_parts)}" if self.fixed_parts else ""
         return f"{fixed} without {join_phrases(self.left_out)}" if self.left_out else fixed
 
 
-WHOLE = Simplification()
+COMPLETE = Simplification()
 
 
 @dataclass(frozen=True)
@@ -110,9 +110,9 @@ def breaks_words(limits: Iterable[LimitValue]) -> str:
     broken = [limit for limit in limits if is_broken(limit)]
     words = [
         f"{limit.name} ({figure(limit.value, limit.unit)}, {limit.side} {figure(limit.limit, limit.unit)})"
-        for limit in broken[:_FEW]
+        for limit in broken[:_MAX_NAMES]
     ]
-    unnamed = len(broken) - _FEW
+    unnamed = len(broken) - _MAX_NAMES
     return f"breaks {', '.join(words)}{f' and {unnamed} more' if unnamed > 0 else ''}" if broken else ""
 
 
@@ -130,7 +130,7 @@ def preview_claim(
     limits
         Values of the design for all limits of the whole problem.
     """
-    kind = ClaimKind.HELD if simpler else ClaimKind.ESTIMATE
+    kind = ClaimKind.SIMPLIFIED if simpler else ClaimKind.ESTIMATE
     lead = f"Estimate {figure(value, problem.objective_unit or '')}"
     words = f"{problem.objective_name}{simpler.phrase}"
     return Claim(kind, position, lead, words, value, f"the estimate{simpler.phrase}", breaks_words(limits))
@@ -140,14 +140,14 @@ def initial_claim(position: int, problem: Problem, value: float | None, limits: 
     """Return the claim about the initial design, where nothing follows sliders."""
     if value is None or not math.isfinite(value):
         words = "No objective" if value is None else "The initial design is on a resonance"
-        return Claim(ClaimKind.GIVEN, position, "", words, breaks=breaks_words(limits))
+        return Claim(ClaimKind.INITIAL, position, "", words, breaks=breaks_words(limits))
     lead = figure(value, problem.objective_unit or "")
     words = f"{problem.objective_name} of the initial design"
-    return Claim(ClaimKind.GIVEN, position, lead, words, value, "the initial design", breaks_words(limits))
+    return Claim(ClaimKind.INITIAL, position, lead, words, value, "the initial design", breaks_words(limits))
 
 
 def conflict_claim(
-    position: int, names: Sequence[str], simpler: Simplification = WHOLE, is_last: bool = False
+    position: int, names: Sequence[str], simpler: Simplification = COMPLETE, is_last: bool = False
 ) -> Claim:
     """Return the claim that no design meets these limits together; final if `is_last`."""
     names_text = join_phrases([f"'{name}'" for name in names])
@@ -170,7 +170,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     is_drawn = not result.problem.extras
     reference = "the proven optimum" if is_proven else "the best design found"
     return Claim(
-        ClaimKind.PROVEN if is_proven else ClaimKind.FOUND,
+        ClaimKind.PROVEN if is_proven else ClaimKind.BEST,
         position,
         f"{'Optimum' if is_proven else 'Best design found'} {value}",
         f"{objective.name}, proven: {minimum}"

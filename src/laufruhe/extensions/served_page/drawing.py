@@ -16,14 +16,14 @@ from laufruhe.solvers.prices import angle_name
 
 STEPS = 72
 """Steps over one turn of the crank."""
-_MOST_PARTS = 48
+_MAX_PARTS = 48
 
 
 def drawing_of(problem: Problem) -> dict[str, Any] | None:
     """Return the front view of an engine in millimetres, y to the right and z up (C2); None for many cylinders."""
     engine = problem.engine
     parts = engine.slider_cranks
-    if not parts or len(parts) > _MOST_PARTS:
+    if not parts or len(parts) > _MAX_PARTS:
         return None
     return {
         "steps": _steps(engine.cycle.angle),

@@ -87,17 +87,17 @@ class Follower:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._model = model = AffineModel(problem)
-        self._nothing = numerical_zero(problem)
+        self._zero_level = numerical_zero(problem)
         self.samples = min(model.full_samples, FEW_ANGLES)
         self._coarse = model.at(self.samples)
         self._fine = model.at(TIMES * self.samples)
-        self._whole = model.at(TIMES * self.samples, averaged=True)
+        self._averaged = model.at(TIMES * self.samples, averaged=True)
 
     def at(self, limits: Sequence[Limit]) -> SliderOptimum:
         """Return the optimum under the given limits."""
         limit_of_measure = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
         coarse, fine, averaged = (
-            self._under(rows, limit_of_measure) for rows in (self._coarse, self._fine, self._whole)
+            self._under(rows, limit_of_measure) for rows in (self._coarse, self._fine, self._averaged)
         )
         names = [limit.name for limit in self._problem.load_limits]
         solution = solve_cones(coarse)
@@ -118,14 +118,14 @@ class Follower:
         broken = tuple(
             n for n, (maximum, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), maximum)
         )
-        idle = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
-        if set(broken) & set(idle):
-            return _conflict(tuple(n for n in broken if n in idle))
+        constant_names = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
+        if set(broken) & set(constant_names):
+            return _conflict(tuple(n for n in broken if n in constant_names))
         return SliderOptimum(
             values=tuple(domain.complex_value(x) for domain in self._model.domains),
             value=value,
             bound=bound.value,
-            gap=gap_of(value, bound.value, self._nothing),
+            gap=gap_of(value, bound.value, self._zero_level),
             standing=tuple(limit_values.get(limit.name, np.nan) for limit in limits),
             prices=tuple(price.get(limit.name, 0.0) for limit in limits),
         )

@@ -12,7 +12,7 @@ from laufruhe.files.complaints import Refused
 
 Tables: TypeAlias = Mapping[str, Any]
 
-MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
+MAX_EDITS, LONGEST, MAX_ENTRIES = 300, 100, 96
 """Largest number of edits in a request, of characters in a text, of entries in a list."""
 
 
@@ -37,7 +37,7 @@ class PageState:
     ----------
     edits
         Edits by the user.
-    held
+    fixed
         Open numbers that stay where the last whole solution had them, while what is affine follows a slider.
     design
         Numbers of the design that is shown, by name [SI].
@@ -48,7 +48,7 @@ class PageState:
     """
 
     edits: tuple[Edit, ...] = ()
-    held: tuple[Edit, ...] = ()
+    fixed: tuple[Edit, ...] = ()
     design: Mapping[str, float] = field(default_factory=dict)
     has: str = ""
     position: int = 0
@@ -59,7 +59,7 @@ class PageState:
         if not isinstance(body, dict) or not set(body) <= {"edits", "held", "design", "has", "position"}:
             raise _strange("request", "must be a table of edits, held, design, has and position")
         design, has, position = body.get("design", {}), body.get("has", ""), body.get("position", 0)
-        if not isinstance(design, dict) or len(design) > MOST_EDITS or not all(map(_is_number, design.values())):
+        if not isinstance(design, dict) or len(design) > MAX_EDITS or not all(map(_is_number, design.values())):
             raise _strange("design", "is no table of names and numbers")
         if not isinstance(has, str) or len(has) > LONGEST:
             raise _strange("has", "is no key of a model")
@@ -68,23 +68,23 @@ class PageState:
         numbers = {str(name): float(value) for name, value in design.items()}
         return cls(_edits(body.get("edits", []), "edits"), _edits(body.get("held", []), "held"), numbers, has, position)
 
-    def tables(self, tables: Tables, with_held: bool) -> dict[str, Any]:
+    def tables(self, tables: Tables, with_fixed: bool) -> dict[str, Any]:
         """Return the tables of the requested problem."""
         changed = dict(tables)
-        for edit in (*self.edits, *(self.held if with_held else ())):
+        for edit in (*self.edits, *(self.fixed if with_fixed else ())):
             changed = edit(changed)
         return changed
 
     def check(self, offered: Sequence[str]) -> None:
         """Refuse numbers that the page was not offered: a path might lead to a file name."""
-        for edit in (*self.edits, *self.held):
+        for edit in (*self.edits, *self.fixed):
             if edit.name not in offered:
                 raise _strange(edit.name, "is not offered by this page")
 
 
 def _edits(body: object, where: str) -> tuple[Edit, ...]:
-    if not isinstance(body, list) or len(body) > MOST_EDITS:
-        raise _strange(where, f"is no list of at most {MOST_EDITS} changes")
+    if not isinstance(body, list) or len(body) > MAX_EDITS:
+        raise _strange(where, f"is no list of at most {MAX_EDITS} changes")
     return tuple(_edit(entry, where) for entry in body)
 
 
@@ -104,9 +104,9 @@ def _is_number(value: object) -> bool:
 def _is_plain(value: object, deep: int = 0) -> bool:
     if isinstance(value, dict) and not deep:
         items = value.items()
-        return len(value) <= MOST_ENTRIES and all(isinstance(k, str) and _is_plain(v, deep + 1) for k, v in items)
+        return len(value) <= MAX_ENTRIES and all(isinstance(k, str) and _is_plain(v, deep + 1) for k, v in items)
     if isinstance(value, list) and deep < 2:
-        return len(value) <= MOST_ENTRIES and all(_is_plain(entry, deep + 1) for entry in value)
+        return len(value) <= MAX_ENTRIES and all(_is_plain(entry, deep + 1) for entry in value)
     return value is None or (len(value) <= LONGEST if isinstance(value, str) else _is_number(value))
 
 

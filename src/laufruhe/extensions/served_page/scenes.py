@@ -38,7 +38,7 @@ STILL: Mapping[Kind, str] = {
     Kind.LEAD: "these phases of geared shafts",
 }
 """Words for numbers that are fixed while sliders move."""
-_KEPT = 6
+_MAX_SCENES = 6
 
 
 class PageScene:
@@ -48,13 +48,13 @@ class PageScene:
     """
 
     def __init__(self, problem: Problem, key: str) -> None:
-        self.key, self.whole = key, problem
+        self.key, self.full_problem = key, problem
         self.problem = problem if can_follow(problem) else replace(
             problem, phasing=None, extras=(), decisions=problem.unbalances
         )  # fmt: skip
-        self.given = evaluate_start(self.problem)
+        self.initial = evaluate_start(self.problem)
         self.follower: Follower | None = None
-        if can_follow(self.problem) and not self.given.resonance:
+        if can_follow(self.problem) and not self.initial.resonance:
             try:
                 self.follower = Follower(self.problem)
             except ModelError:
@@ -64,7 +64,7 @@ class PageScene:
     def evaluated(self, followed: SliderOptimum | None) -> Evaluation:
         """Return the exact evaluation of the followed design; of the given one if there is none."""
         if followed is None or followed.conflict:
-            return self.given
+            return self.initial
         return evaluate(self.problem.fixed_at(followed.values))
 
     def standing(
@@ -89,12 +89,12 @@ class PageScene:
     def drawn(self, limits: tuple[Limit, ...], design: Evaluation, followed: SliderOptimum | None) -> dict[str, Any]:
         """Return the page's drawing data, or the reason for having no sliders."""
         problem = replace(self.problem, limits=limits)
-        result = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=design)
+        result = Result(problem=problem, status=Status.FEASIBLE, initial=self.initial, final=design)
         if followed is not None and not followed.conflict:
             pairs = zip(problem.decisions, followed.values, strict=True)
             entries = tuple(entry for decision, value in pairs for entry in decision_values(decision, value))
             result = replace(result, decisions=entries, limits=self.standing(limits, design, followed))
-        model = live_model(self.whole, result, is_served=True)
+        model = live_model(self.full_problem, result, is_served=True)
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
@@ -106,7 +106,7 @@ class PageScene:
         fixed_kinds
             Kinds of open numbers that the page fixes at their last solution.
         """
-        problem = self.whole
+        problem = self.full_problem
         kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
         if problem.phasing is not None:
             kinds.add(Kind.STAR)
@@ -131,7 +131,7 @@ def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageS
     """Return the scene of a problem from a small cache."""
     key = key_of(tables, content)
     if key not in _scenes:
-        while len(_scenes) >= _KEPT:
+        while len(_scenes) >= _MAX_SCENES:
             _scenes.pop(next(iter(_scenes)))
         _scenes[key] = PageScene(problem, key)
     return _scenes[key]

@@ -30,7 +30,7 @@ def answer(
     claim: Claim, limit_values: Iterable[LimitValue], problem: Problem, conflict: Sequence[str]
 ) -> dict[str, Any]:
     """Return a claim, the limit values of its design, and the names of conflicting limits."""
-    is_estimate = claim.kind in (ClaimKind.ESTIMATE, ClaimKind.HELD)
+    is_estimate = claim.kind in (ClaimKind.ESTIMATE, ClaimKind.SIMPLIFIED)
     return {"claim": asdict(claim), "limits": limits(limit_values, problem, is_estimate), "conflict": list(conflict)}
 
 

@@ -117,7 +117,7 @@ class Page:
     ) -> HttpAnswer:
         source = self.watched.source
         return HttpAnswer(
-            lines=_each(lambda k: partial(worker.ask, FOLLOWED, work, source, state, *arguments, k), maximum)
+            lines=_lines_of(lambda k: partial(worker.ask, FOLLOWED, work, source, state, *arguments, k), maximum)
         )
 
     def _front_lines(self, body: Any) -> HttpAnswer:
@@ -144,7 +144,7 @@ def _read(answer: Callable[[PageState], HttpAnswer]) -> Callable[[Any], HttpAnsw
     return answered
 
 
-def _each(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[str]:
+def _lines_of(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[str]:
     for k in range(maximum):
         text = _to_answer(work(k)).text
         yield text

@@ -16,7 +16,7 @@ from typing import Any
 
 from laufruhe.extensions.served_page.guard import HEADERS, HOST, TOKEN, Guard
 
-MOST_BYTES, MOST_HEAD, MOST_AT_ONCE = 64_000, 32_000, 32
+MAX_BYTES, MAX_HEAD, MAX_AT_ONCE = 64_000, 32_000, 32
 """Largest number of bytes of a request's body, of its head, and of simultaneous connections."""
 READ, WRITE, EVICTION = 5.0, 20.0, 2.0
 """Seconds for a request to arrive, for a client to take an answer, and for an evicted connection to end."""
@@ -49,7 +49,7 @@ class Server(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = MOST_AT_ONCE
+    request_queue_size = MAX_AT_ONCE
 
     def __init__(self, port: int, files: Mapping[str, str]) -> None:
         super().__init__((HOST, port), HttpRequest)
@@ -57,7 +57,7 @@ class Server(ThreadingHTTPServer):
         self.guard = Guard(self.port)
         self.files = {f"/{name}": text.encode() for name, text in files.items()}
         self.handles: dict[str, Handle] = {}
-        self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self._room = threading.BoundedSemaphore(MAX_AT_ONCE)
         self._readers: dict[socket.socket, None] = {}
         self._lock = threading.Lock()
 
@@ -112,7 +112,7 @@ class _Incoming(io.RawIOBase):
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
-        self._room = MOST_HEAD + MOST_BYTES
+        self._room = MAX_HEAD + MAX_BYTES
         self._until = time.monotonic() + READ
 
     def readable(self) -> bool:
@@ -188,8 +188,8 @@ class HttpRequest(BaseHTTPRequestHandler):
         length = self.headers.get("Content-Length", "")
         if self.headers.get("Transfer-Encoding") is not None or not length.isdecimal() or len(length) > 9:
             return self._refused(HTTPStatus.LENGTH_REQUIRED, "tell the length of the request")
-        if int(length) > MOST_BYTES:
-            return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MOST_BYTES} bytes are read")
+        if int(length) > MAX_BYTES:
+            return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MAX_BYTES} bytes are read")
         if self.headers.get_content_type() != _JSON:
             return self._refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send JSON")
         try:

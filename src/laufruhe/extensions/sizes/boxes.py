@@ -28,13 +28,13 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
-MOST_BOXES = 3000
+MAX_BOXES = 3000
 # relative tolerance of limits; halvings to find the end of a cut, rounds of cuts, and most tangents of a load
-SLACK, HALVINGS, ROUNDS, MOST_TANGENTS = 1e-9, 10, 3, 200
+SLACK, HALVINGS, ROUNDS, MAX_TANGENTS = 1e-9, 10, 3, 200
 # most tangents of a load if multipliers of the whole problem give better bounds
 FEW_TANGENTS = 4
 # sets of multipliers that a box inherits; smallest gain of a side to halve, as a share of the missing bound
-MOST_KNOWN, WORTH = 2, 0.1
+MAX_KNOWN, WORTH = 2, 0.1
 # relative gap below which programs have all samples
 NEAR = 2e-3
 
@@ -159,7 +159,7 @@ class SizeBoxes:
 
     def add_tangents(self, lower: Array, upper: Array) -> None:
         """Add tangents of loads at masses of a box."""
-        reach, maximum = self.reach(lower, upper), MOST_TANGENTS if self._combined is None else FEW_TANGENTS
+        reach, maximum = self.reach(lower, upper), MAX_TANGENTS if self._combined is None else FEW_TANGENTS
         (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
@@ -231,7 +231,7 @@ class SizeBoxes:
             return ()
         is_near = bool(multipliers) and self.objective(lower, upper, multipliers) >= (1.0 - NEAR) * target
         rows = self._combined.multipliers_of(lower, upper, self.reach(lower, upper), is_near)
-        return multipliers if rows is None else (rows, *multipliers[: MOST_KNOWN - 1])
+        return multipliers if rows is None else (rows, *multipliers[: MAX_KNOWN - 1])
 
     def _side(
         self, lower: Array, upper: Array, multipliers: Sequence[CombinedMultipliers], bound: float, target: float
@@ -338,7 +338,7 @@ class _Around:
 
 
 def divided_sizes(
-    boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MOST_BOXES, witness: Witness | None = None
+    boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MAX_BOXES, witness: Witness | None = None
 ) -> BoxResult:  # fmt: skip
     """Return the bound by bisection, until no design is better than `value` by more than `gap_tolerance` (Z12)."""
     bisection = _Sizes(boxes, value, gap_tolerance, witness)

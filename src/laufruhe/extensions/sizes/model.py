@@ -28,7 +28,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
-MASSES, MOST_KEPT = 4, 4096
+MASSES, MAX_KEPT = 4, 4096
 FINE = 1440
 """Fewest samples at which the means of bounds are averaged."""
 BETWEEN, MARGIN, SAME = 7, 0.02, 1e-9
@@ -99,7 +99,7 @@ class SizeModel:
         """Return the engine with sizes `x`, shape (sizes,)."""
         key = x.tobytes()
         if key not in self._engines:
-            if len(self._engines) > MOST_KEPT:
+            if len(self._engines) > MAX_KEPT:
                 self._engines.clear()
             self._engines[key] = resized(self.problem.engine, self._sizes(x))
         return self._engines[key]
@@ -113,7 +113,7 @@ class SizeModel:
         if gear is None or gear.density is None:
             return np.zeros(MASSES)
         if key not in self._masses:
-            if len(self._masses) > MOST_KEPT:
+            if len(self._masses) > MAX_KEPT:
                 self._masses.clear()
             resized_cylinder = self._one_cylinder.resized(self._sizes(x))
             self._masses[key] = np.array(

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.sizes.boxes import MOST_BOXES, SizeBoxes, divided_sizes
+from laufruhe.extensions.sizes.boxes import MAX_BOXES, SizeBoxes, divided_sizes
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, Mask
@@ -34,7 +34,7 @@ from laufruhe.solvers.smooth.local_programs import (
     spread_starts,
 )
 
-MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
+MAX_WITH_ROD, MAX_PROGRAMS = 300, 400
 """Most boxes if the rod length is open, which takes ten times as long, and if each box has cone programs."""
 STARTS = 3
 # fewest samples of the programs of boxes: rough, and for a small gap
@@ -108,7 +108,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         boxes = SizeBoxes(model, solve_cone_program)
 
     def bounded(value: float, gap_tolerance: float, design: Design) -> BoxResult:
-        default_budget = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
+        default_budget = MAX_WITH_ROD if model.moves_rod else MAX_PROGRAMS if model.domains else MAX_BOXES
         maximum = problem.search.boxes_or(default_budget)
         if boxes is None:
             return BoxResult(0.0, 0)

@@ -17,7 +17,7 @@ from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
-MOST_STARS = 60
+MAX_STARS = 60
 """Most stars that are solved one by one."""
 
 
@@ -36,8 +36,8 @@ def solve_star_sizes(problem: Problem) -> Result:
     if phasing.continuous or phasing.throw_bounds is not None:
         rule = "open sizes need even firing or fixed throws"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
-    if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MOST_STARS:
-        many = f"more than {MOST_STARS} stars are open together with sizes"
+    if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MAX_STARS:
+        many = f"more than {MAX_STARS} stars are open together with sizes"
         raise ModelError(f"{many}; fix the firing order or the sizes")
     stars = even_stars(phasing)
     if not stars:

@@ -35,8 +35,8 @@ from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, Sides, d
 from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
-LEAST_SHARE = 1e-10
-MOST_CORNERS = 16
+MIN_SHARE = 1e-10
+MAX_CORNERS = 16
 _SAME = 1e-9
 
 
@@ -177,7 +177,7 @@ class TwistBoxes:
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
         middle = 0.5 * (coordinates.lower + coordinates.upper)
         corners = itertools.islice(
-            itertools.product(*zip(coordinates.lower, coordinates.upper, strict=True)), MOST_CORNERS
+            itertools.product(*zip(coordinates.lower, coordinates.upper, strict=True)), MAX_CORNERS
         )
         counted = np.zeros(len(torques.orders), dtype=bool)
         for x in (middle, *map(np.array, corners)):
@@ -188,7 +188,7 @@ class TwistBoxes:
                 counted[:] = True
                 continue
             size = (np.abs(np.einsum("hsd,hd->hs", flexible, torques.coefficients)) ** 2).sum(axis=1)
-            counted |= size > LEAST_SHARE * size.sum()
+            counted |= size > MIN_SHARE * size.sum()
         counted[0] = False
         # an order with two samples a wave is read anywhere between nothing and its peak
         counted[2 * np.arange(len(counted)) >= self._samples] = False

@@ -25,7 +25,7 @@ from laufruhe.problem.problem import Problem
 T = TypeVar("T")
 
 # that a response over speed takes seconds for
-MOST_DISCS = 60
+MAX_DISCS = 60
 # share by which the inertia of discs may differ from what is given of all that turns: numbers are written rounded
 _ROUNDED = 0.01
 Inertias: TypeAlias = Annotated[list[float], ListOrSingle(Annotated[float, Number("kg m^2", minimum=0.0)])]
@@ -123,9 +123,9 @@ class _OpenNumbers:
         return number.start
 
 
-def _read(table: TorsionTable, problem: Problem, given: ExtensionContext) -> Problem:
-    chain, decisions = _chain(table, problem.engine.slider_cranks, given.throws)
-    _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if given.file.flywheel is None else "flywheel")
+def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> Problem:
+    chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
+    _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if context.file.flywheel is None else "flywheel")
     return replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
 
 
@@ -137,8 +137,8 @@ def _chain(
         if part.shaft != CRANKSHAFT:
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
-    if len(table.discs) > MOST_DISCS:
-        rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be given beside the throws"
+    if len(table.discs) > MAX_DISCS:
+        rule = f"has {len(table.discs)} discs, and at most {MAX_DISCS} may be given beside the throws"
         raise Refused("torsion.discs", None, rule, "join those that turn together")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)

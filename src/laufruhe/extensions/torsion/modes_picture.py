@@ -20,7 +20,7 @@ from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
-MOST_MODES, MOST_NAMES, LARGEST = 3, 16, 11.0
+MAX_MODES, MAX_NAMES, LARGEST = 3, 16, 11.0
 COLOURS = (AFTER, ORANGE, GREEN)
 applies = is_twisted
 
@@ -35,7 +35,7 @@ def figure(result: Result) -> Figure:
     names = [disc.name for disc in chain_of(result.final.engine).discs]
     _shapes(shapes, facts, names)
     _speeds(speeds, result, facts, high)
-    count = min(MOST_MODES, len(facts.modes.frequencies))
+    count = min(MAX_MODES, len(facts.modes.frequencies))
     legend: list[Artist] = [
         entry(f"mode {m + 1}, {number(float(facts.modes.frequencies[m]))} Hz", color=COLOURS[m], linewidth=2.0)
         for m in range(count)
@@ -50,16 +50,16 @@ def figure(result: Result) -> Figure:
 def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
     places = range(len(names))
     axes.axhline(0.0, color=FAINT, linewidth=0.7)
-    for m in range(min(MOST_MODES, facts.modes.shapes.shape[1])):
+    for m in range(min(MAX_MODES, facts.modes.shapes.shape[1])):
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
     axes.set(ylim=(-1.1, 1.1), ylabel="angle, scaled to 1")
-    step = -(-len(names) // MOST_NAMES)
+    step = -(-len(names) // MAX_NAMES)
     labels = [fit_line(name, 1.1) if k % step == 0 else "" for k, name in enumerate(names)]
     axes.set_xticks(list(places), labels, rotation=60, ha="right", rotation_mode="anchor")
 
 
 def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> None:
-    frequencies = [float(f) for f in facts.modes.frequencies[:MOST_MODES]]
+    frequencies = [float(f) for f in facts.modes.frequencies[:MAX_MODES]]
     bands = [limit.outside for limit in limits_on(result, TORSIONAL_FREQUENCIES) if limit.outside is not None]
     reach = 1.12 * max(
         [frequencies[0], *(f for f in frequencies if f <= max(facts.orders) * high / math.tau), *sum(bands, ())]

@@ -17,7 +17,7 @@ from laufruhe.solvers.result import Result
 
 applies = is_twisted
 # heights beyond this many times the median peak are cut off: resonances that hardly anything damps
-MOST = 40.0
+MAX_FACTOR = 40.0
 
 
 @styled()
@@ -46,7 +46,7 @@ def figure(result: Result) -> Figure:
     legend += [Patch(facecolor=LIMIT, alpha=0.13, label="speeds barred by a limit")] if bars else []
     envelope = np.concatenate([torque.max(axis=1) for torque in torques])
     finite = envelope[np.isfinite(envelope)]
-    top = min(float(finite.max(initial=1.0)), MOST * float(np.median(finite)) if len(finite) else 1.0)
+    top = min(float(finite.max(initial=1.0)), MAX_FACTOR * float(np.median(finite)) if len(finite) else 1.0)
     axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
              ylabel="alternating torque [N m]")  # fmt: skip
     mark_points(axes, result)

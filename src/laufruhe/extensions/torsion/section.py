@@ -26,7 +26,7 @@ from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import FINAL, INITIAL, Result
 
-MOST_MODES, MOST_CRITICALS = 4, 8
+MAX_MODES, MAX_CRITICALS = 4, 8
 
 
 def _tables(result: Result) -> list[Table]:
@@ -38,7 +38,7 @@ def _tables(result: Result) -> list[Table]:
 
 def _modes(result: Result, facts: TorsionFacts) -> Table:
     names = [disc.name for disc in chain_of(result.final.engine).discs]
-    modes = range(min(MOST_MODES, len(facts.modes.frequencies)))
+    modes = range(min(MAX_MODES, len(facts.modes.frequencies)))
     swings = [[fixed(swing, 3, "+") for swing in shape] for shape in facts.modes.shapes.T]
     rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in modes)
     omitted = len(facts.modes.frequencies) - len(modes)
@@ -53,7 +53,7 @@ def _criticals(facts: TorsionFacts, design: str) -> Table:
     rows = tuple(
         (number(entry.speed * RPM), f"{entry.order:g}" + (" main" if entry.is_main else ""), f"{entry.mode}",
          number(entry.vector_sum, 3, 1.0), DASH if entry.torque is None else number(entry.torque))
-        for entry in facts.criticals[:MOST_CRITICALS]
+        for entry in facts.criticals[:MAX_CRITICALS]
     )  # fmt: skip
     main = ", ".join(f"{order:g}" for order in facts.main)
     note = (

@@ -28,7 +28,7 @@ from laufruhe.solvers.smooth.local_programs import (
 )
 
 # open numbers that are divided, and boxes that this may take
-MOST_OPEN, MOST_BOXES = 3, 3000
+MAX_OPEN, MAX_BOXES = 3, 3000
 
 
 def solve_torsion(problem: Problem) -> Result:
@@ -43,7 +43,7 @@ def solve_torsion(problem: Problem) -> Result:
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
     boxes = TwistBoxes(problem, initial)
     known = boxes.coordinates.is_exact and boxes.is_sampled_fully
-    maximum = problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0) if known else 0
+    maximum = problem.search.boxes_or(MAX_BOXES if len(problem.decisions) <= MAX_OPEN else 0) if known else 0
 
     def bounded(value: float, room: float, design: Design) -> BoxResult:
         if not maximum or (value < math.inf and not boxes.has_terms):

@@ -20,7 +20,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 
 # squares of numbers between these neither overflow nor lose digits
-_LEAST, _MOST = 1e-140, 1e150
+_SMALLEST, _LARGEST = 1e-140, 1e150
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Grid:
 
 LONGEST_TOL, ZERO_TOL, DUAL_TOL = 1e-5, 1e-6, 1e-4
 """Relative tolerances: rows as long as the longest; rows that count as zero; dual rows that are in use."""
-MOST_KINKS = 64
+MAX_KINKS = 64
 """Largest number of dual rows of which mixtures are formed."""
 
 
@@ -326,11 +326,11 @@ def between(z: Array, steps: int, times: int) -> Array:
 def lengths(rows: Array) -> Array:
     """Return the Euclidean length of each row, shape (..., d) to (...), safe from overflow and underflow."""
     # BLAS warns of nothing
-    if not np.vdot(rows, rows) < _MOST**2:
+    if not np.vdot(rows, rows) < _LARGEST**2:
         return _scaled_lengths(rows)
     size = np.sqrt((rows * rows) @ _ones(rows.shape[-1]))
-    if np.minimum.reduce(size, axis=None, initial=_MOST) < _LEAST:
-        small = size < _LEAST
+    if np.minimum.reduce(size, axis=None, initial=_LARGEST) < _SMALLEST:
+        small = size < _SMALLEST
         if (short := rows[small]).any():
             size[small] = _scaled_lengths(short)
     return np.asarray(size)

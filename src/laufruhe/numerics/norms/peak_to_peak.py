@@ -19,7 +19,7 @@ from laufruhe.numerics.enclosing_ball import enclosing_balls
 from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (  # fmt: skip
     LONGEST_TOL,
-    MOST_KINKS,
+    MAX_KINKS,
     Cones,
     EpigraphProgram,
     Grid,
@@ -76,7 +76,7 @@ class PeakToPeak(Norm):
             directions = (rows[first : first + grid.steps] - balls.centres[k]) / balls.radii[k]
             peaks = _peaks(lengths(directions))
             count = int(np.linalg.matrix_rank(_balance(directions[peaks]), tol=SAME_WAY)) if len(peaks) else 0
-            if math.comb(len(peaks), count) > MOST_KINKS:
+            if math.comb(len(peaks), count) > MAX_KINKS:
                 return None
             for subset in combinations(peaks.tolist(), count):
                 shares = _shares_of(directions[[*subset]])
@@ -86,7 +86,7 @@ class PeakToPeak(Norm):
                     subgradients.append(subgradient)
         return (
             Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
-            if 0 < len(subgradients) <= MOST_KINKS
+            if 0 < len(subgradients) <= MAX_KINKS
             else None
         )
 

@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import (
     LONGEST_TOL,
-    MOST_KINKS,
+    MAX_KINKS,
     Cones,
     EpigraphProgram,
     Grid,
@@ -61,7 +61,7 @@ class WorstMean(Norm):
             subgradients.append(base)
         return (
             Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
-            if 0 < len(subgradients) <= MOST_KINKS
+            if 0 < len(subgradients) <= MAX_KINKS
             else None
         )
 

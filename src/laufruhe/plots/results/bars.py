@@ -18,7 +18,7 @@ from laufruhe.present.pictures import rows_of
 from laufruhe.problem.evaluation import Evaluation, place_measures
 from laufruhe.solvers.result import Result
 
-MOST_POINTS, MOST_GROUPS = 4, 7
+MAX_POINTS, MAX_GROUPS = 4, 7
 GROUP, WIDTH = 1.22, 0.42
 """Width of a group of bars [inch], and of a bar over it."""
 applies = has_mount_forces
@@ -28,9 +28,9 @@ applies = has_mount_forces
 def figure(result: Result) -> Figure:
     """Draw a group of bars per mount and one for all mounts; a row per operating point, and for many mounts."""
     several = range(len(result.problem.points))
-    points = list(several) if len(several) <= MOST_POINTS else [hardest_point(result)]
+    points = list(several) if len(several) <= MAX_POINTS else [hardest_point(result)]
     names = [*result.initial.mount_names, "all mounts"]
-    parts, side = rows_of(len(names), MOST_GROUPS)
+    parts, side = rows_of(len(names), MAX_GROUPS)
     rows = [(k, part) for k in points for part in parts]
     high = 3.2 if len(rows) == 1 else 2.1
     drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(points) > 1 else 0.0)
@@ -51,8 +51,8 @@ def figure(result: Result) -> Figure:
 
 
 def _measures(design: Evaluation, k: int) -> Array:
-    each = place_measures(design, k)
-    mean, maximum = np.array([m.mean for m in each]), np.array([m.max for m in each])
+    measures = place_measures(design, k)
+    mean, maximum = np.array([m.mean for m in measures]), np.array([m.max for m in measures])
     return np.array([[*mean, mean.mean()], [*maximum, maximum.max()]])
 
 

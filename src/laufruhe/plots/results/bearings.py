@@ -29,7 +29,7 @@ from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, e
 from laufruhe.present.pictures import rows_of
 from laufruhe.solvers.result import Result
 
-MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
+MAX_BEARINGS, MAX_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # fractions of a panel: radius and thickness of the wear ring, extent of the paths
 RING, THICK, FILLED = 0.86, 0.12, 0.80
 Plane = NDArray[np.complex128]
@@ -46,11 +46,11 @@ def figure(result: Result) -> Figure:
     planes = [bearing_paths(item.design, k) for item in series]
     names = BEARINGS.channel.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
-    chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
+    chosen = sorted(np.argsort(-sizes, kind="stable")[:MAX_BEARINGS].tolist())
     largest = axis_end(float(np.abs(plane[:, chosen]).max()) for plane in planes)
     factor, unit = in_thousands(largest, "N")
     turned = as_crank_turns(result.final, len(planes[0]))
-    rows, side = rows_of(len(chosen), MOST_COLUMNS)
+    rows, side = rows_of(len(chosen), MAX_COLUMNS)
     chunks = [[chosen[k] for k in row] for row in rows]
     drawn = page(2 * len(chunks), side, (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
     for r, (chunk, on_crank) in enumerate((chunk, on_crank) for chunk in chunks for on_crank in (False, True)):

@@ -32,9 +32,9 @@ from laufruhe.present.measures import firing_words, hardest_point, has_loads
 from laufruhe.problem.evaluation import with_common_base
 from laufruhe.solvers.result import Result
 
-STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
+STEPS, MAX_POINTS, MAX_MOUNTS = 1440, 3, 6
 # width of one panel and of several side by side, height, gaps [inch]
-ALONE, BESIDE, NARROW, HIGH, GAP, ACROSS = 6.8, 4.0, 2.7, 1.1, 0.2, 0.25
+ALONE, PAIRED, NARROW, HIGH, GAP, ACROSS = 6.8, 4.0, 2.7, 1.1, 0.2, 0.25
 # a wide line stays visible under an equal decided one
 WIDTHS = (2.4, 1.4)
 # distance between two numbers [inch]
@@ -72,7 +72,7 @@ class Row:
 def figure(result: Result) -> Figure:
     """Draw a column per operating point; rows for shaking force, roll moment, rocking couple and every mount."""
     points, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
-    width = {1: ALONE, 2: BESIDE}.get(len(points), NARROW)
+    width = {1: ALONE, 2: PAIRED}.get(len(points), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
     columns = [list(_rows(series, k, mounts)) for k in points]
     all_rows = list(zip(*columns, strict=True))
@@ -124,7 +124,7 @@ def _draw_row(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colour
 
 def _points(result: Result) -> list[int]:
     points = result.problem.points
-    if len(points) <= MOST_POINTS:
+    if len(points) <= MAX_POINTS:
         return list(range(len(points)))
     first, *others, last = sorted(range(len(points)), key=lambda k: points[k].speed)
     hardest = hardest_point(result)
@@ -136,7 +136,7 @@ def _mounts(result: Result) -> list[int]:
     if forces is None:
         return []
     size = np.abs(forces.coefficients).sum(axis=(0, 2))
-    return sorted(np.argsort(-size, kind="stable")[:MOST_MOUNTS].tolist())
+    return sorted(np.argsort(-size, kind="stable")[:MAX_MOUNTS].tolist())
 
 
 def _left_out(result: Result, indices: Sequence[int], mounts: Sequence[int]) -> str:
@@ -186,7 +186,7 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
     low, high = (factor * end for end in row.ends)
     room = 0.06 * (high - low) or 1.0
     axes.set(xlim=(0.0, degrees[-1]), ylim=(low - room if low else 0.0, high + room))
-    axes.xaxis.set_major_locator(MultipleLocator(90.0 if axes.bbox.width > BESIDE * axes.figure.dpi else 180.0))
+    axes.xaxis.set_major_locator(MultipleLocator(90.0 if axes.bbox.width > PAIRED * axes.figure.dpi else 180.0))
     round_ticks(axes.yaxis, 4)
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     if not row.curves:

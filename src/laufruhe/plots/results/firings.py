@@ -16,7 +16,7 @@ from laufruhe.present.measures import has_firing, has_ranking, ranking_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult, RankedOrder
 
-SHOWN = 6
+MAX_ORDERS = 6
 # two shades distinguish neighbouring firings
 BEST, NEXT = (AFTER, PALE), (BEFORE, "#d4d4d4")
 applies = has_ranking
@@ -47,12 +47,12 @@ def figure(result: Result) -> Figure:
 
 
 def _selected(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
-    best = [(0, order) for order in phasing.ranking[0].firing_orders][: SHOWN // 2 + 1]
+    best = [(0, order) for order in phasing.ranking[0].firing_orders][: MAX_ORDERS // 2 + 1]
     next_best = [
         (k, order) for k, star in enumerate(phasing.ranking) for order in star.firing_orders
         if k and order == star.firing_orders[0]
     ]  # fmt: skip
-    return (best + next_best)[:SHOWN]
+    return (best + next_best)[:MAX_ORDERS]
 
 
 def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[str, str]) -> None:

@@ -16,7 +16,7 @@ from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.curves import indicator_of, points_with_chambers
 from laufruhe.solvers.result import Result
 
-STEPS, MOST_ROWS = 1440, 6
+STEPS, MAX_ROWS = 1440, 6
 WIDE, HIGH = 3.6, 2.2
 COLOURS = (ORANGE, BLUE, GREEN, PURPLE, VERMILION, SKY)
 BAR, KILO = 1e-5, 1e-3
@@ -31,7 +31,7 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """Draw the indicator diagrams of a cylinder on the left and the force on its rod on the right."""
     point, gas = points_with_chambers(result)[0]
-    parts = [part for part in result.final.engine.slider_cranks if gas.of(part)][:MOST_ROWS]
+    parts = [part for part in result.final.engine.slider_cranks if gas.of(part)][:MAX_ROWS]
     # names of chambers stand above their diagram, two a row
     lead = 0.12 + 0.17 * max(-(-len(gas.of(part)) // 2) for part in parts)
     drawn = page(len(parts), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)

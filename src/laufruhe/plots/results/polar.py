@@ -24,7 +24,7 @@ from laufruhe.present.pictures import rows_of
 from laufruhe.problem.evaluation import channel_samples
 from laufruhe.solvers.result import Result
 
-MOST_PANELS, MOST_COLUMNS = 12, 4
+MAX_PANELS, MAX_COLUMNS = 12, 4
 POINTS = 1440
 PANEL, GAP, LEAD = 2.0, 0.42, 0.42
 # magnifications of the smaller direction
@@ -75,8 +75,8 @@ def figure(result: Result) -> Figure:
     """Draw one panel per mount, to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
     paths, steady = _moving([_closed(channel_samples(item.design, k)) for item in series])
-    mounts = result.problem.engine.mounts[:MOST_PANELS]
-    frame, columns = Frame.from_paths(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
+    mounts = result.problem.engine.mounts[:MAX_PANELS]
+    frame, columns = Frame.from_paths(paths, len(mounts)), rows_of(len(mounts), MAX_COLUMNS)[1]
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
@@ -170,7 +170,7 @@ def _left_out(paths: list[Array], frame: Frame) -> str:
     along = max(float(np.abs(path[..., 0]).max(initial=0.0)) for path in paths)
     count = paths[0].shape[1]
     forces = "Longitudinal forces are not shown. " if along > 0.01 * frame.size else ""
-    return forces + (f"The first {MOST_PANELS} of {count} mounts. " if count > MOST_PANELS else "")
+    return forces + (f"The first {MAX_PANELS} of {count} mounts. " if count > MAX_PANELS else "")
 
 
 def _legend(series: list[Series], frame: Frame, first: str) -> list[Artist]:

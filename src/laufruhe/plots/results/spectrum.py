@@ -23,7 +23,7 @@ Panel = tuple[str, str, Callable[[PointLoads], Array]]
 SHARE = 0.005
 LAST_ORDER = 24.0
 SHORTEST = 6.0
-NOTHING = 1e-9
+NEGLIGIBLE = 1e-9
 applies = has_loads
 
 
@@ -81,7 +81,7 @@ def _visible(series: list[Array], base: float) -> list[Array]:
 
 def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> None:
     table = np.stack(series)
-    drawn = np.flatnonzero(table.max(axis=0) > NOTHING * float(table.max(initial=0.0)))
+    drawn = np.flatnonzero(table.max(axis=0) > NEGLIGIBLE * float(table.max(initial=0.0)))
     step = float(np.diff(drawn).min(initial=2)) * base
     width = 0.8 * min(1.0, step) / len(series)
     for k, (values, colour) in enumerate(zip(series, colours, strict=True)):

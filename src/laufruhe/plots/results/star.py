@@ -18,7 +18,7 @@ from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
 
-SHOWN = 3
+MAX_STARS = 3
 SAME = math.radians(1.0)
 applies = has_ranking
 
@@ -27,7 +27,7 @@ applies = has_ranking
 def figure(result: Result) -> Figure:
     """Draw the best stars: end view from the front, side view with every throw at its height."""
     phasing = ranking_of(result)
-    stars = phasing.ranking[:SHOWN]
+    stars = phasing.ranking[:MAX_STARS]
     side = min(max(4.0, 0.5 * len(phasing.places)), 4.7)
     drawn = page(len(stars), 2, (side, 2.1), lead=0.3, gap=0.1)
     for k, star in enumerate(stars):

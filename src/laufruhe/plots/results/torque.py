@@ -21,11 +21,11 @@ from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
 Unit: TypeAlias = tuple[float, str]
-STEPS, MOST_ORDERS = 1440, 12
+STEPS, MAX_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
 COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
 # smallest drawn part, and smallest drawn order, relative to the largest
-LEAST_PART, LEAST_ORDER = 1e-3, 1e-2
+MIN_PART, MIN_ORDER = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
 
 
@@ -44,7 +44,7 @@ def figure(result: Result) -> Figure:
     k = max(fired or range(len(facts)), key=lambda j: facts[j].excursion)
     parts = torque_parts(engine, points[k], fidelity)
     largest = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
-    visible = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > LEAST_PART * largest}
+    visible = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > MIN_PART * largest}
     degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
@@ -125,12 +125,12 @@ def _orders(axes: Axes, parts: Mapping[str, Spectrum], unit: Unit) -> None:
     factor, total = unit[0], parts.get("all", next(iter(parts.values())))
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))
-    chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > LEAST_ORDER * top)
+    chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MAX_ORDERS].tolist() if sizes[k] > MIN_ORDER * top)
     # drop parts without a visible bar
     parts = {
         name: part
         for name, part in parts.items()
-        if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > LEAST_ORDER * top
+        if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > MIN_ORDER * top
     }
     width = 0.8 / max(len(parts), 1)
     for j, (name, part) in enumerate(parts.items()):

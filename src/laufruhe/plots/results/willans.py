@@ -12,7 +12,7 @@ from laufruhe.plots.words import INK
 from laufruhe.present.numbers import RPM
 from laufruhe.solvers.result import Result
 
-BAR, MOST = 1e-5, 4
+BAR, MAX_LINES = 1e-5, 4
 
 
 def applies(result: Result) -> bool:
@@ -23,7 +23,7 @@ def applies(result: Result) -> bool:
 @styled()
 def figure(result: Result) -> Figure:
     """Draw a panel per operating point."""
-    tests = result.problem.friction[:MOST]
+    tests = result.problem.friction[:MAX_LINES]
     drawn = page(len(tests), 1, (6.4, 2.3), gap=0.75)
     for axes, test in zip(drawn.panels, tests, strict=True):
         (_motored if test.is_motored else _fuelled)(axes, test)

@@ -19,7 +19,7 @@ from laufruhe.numerics.witness import EXCESS
 from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
 from laufruhe.prove.witness import Witness, check_near_witness, thin_box
 
-MOST_BOXES = 4000
+MAX_BOXES = 4000
 # bisections of a side that is cut
 CUTS = 10
 
@@ -125,7 +125,7 @@ class _Around:
 
 
 def bisect_monotone(
-    problem: MonotoneProblem, value: float, gap_tolerance: float, max_boxes: int = MOST_BOXES,
+    problem: MonotoneProblem, value: float, gap_tolerance: float, max_boxes: int = MAX_BOXES,
     witness: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
     """Halve boxes until none can hold a design better than `value` by more than the gap tolerance (T9).

@@ -21,7 +21,7 @@ from laufruhe.prove.witness import Witness
 
 EARLY = 0.2
 """Share of the boxes of stiffness before other provers have their turn."""
-LEAST_SECONDS = 0.5
+MIN_SECONDS = 0.5
 """Time of the first bound after the end of the time budget [s]."""
 
 
@@ -126,7 +126,7 @@ def run_provers(question: Question) -> BoxResult:
         for bounds in tuple(running):
             if is_over():
                 break
-            with minimum_time(LEAST_SECONDS) if not results else nullcontext():
+            with minimum_time(MIN_SECONDS) if not results else nullcontext():
                 result = next(bounds, None)
             if result is None:
                 running.remove(bounds)

@@ -35,9 +35,9 @@ from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Witness
 
 # open numbers up to which boxes are the default, and work of all boxes together
-MOST_OPEN = 6
+MAX_OPEN = 6
 WORK = 2e7
-MOST_BOXES = 60_000
+MAX_BOXES = 60_000
 # numbers in memory at a time
 MEMORY = 3e6
 # numbers of a simulation that cost as much as one number of an order
@@ -173,8 +173,8 @@ class StiffnessBoxes:
     @property
     def max_boxes(self) -> int:
         """Box budget: as requested, or for a few seconds."""
-        is_tractable = len(self.problem.mount_decisions) <= MOST_OPEN
-        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if is_tractable else 0)
+        is_tractable = len(self.problem.mount_decisions) <= MAX_OPEN
+        return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)) if is_tractable else 0)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes, infinite without a feasible design, and the sides to halve.

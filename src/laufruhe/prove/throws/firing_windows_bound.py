@@ -23,7 +23,7 @@ from laufruhe.problem.phasing import Intervals
 from laufruhe.problem.problem import Phasing, Problem
 
 POINTS = 97
-MOST_STARS = 50_000
+MAX_STARS = 50_000
 BATCH = 32
 """Number of directions that bound all remaining stars at a time."""
 
@@ -47,9 +47,9 @@ def uneven_bound(
     Returns
     -------
     float
-        Lower bound; zero, which is always valid, if there are more than `MOST_STARS` stars.
+        Lower bound; zero, which is always valid, if there are more than `MAX_STARS` stars.
     """
-    if phasing.bank is not None or space.size > MOST_STARS:
+    if phasing.bank is not None or space.size > MAX_STARS:
         return 0.0
     costs = throw_costs(phasing, space, objective, intervals)
     images = StarSpace(space.phases, space.patterns, space.places, mirror=True, reflect=True)

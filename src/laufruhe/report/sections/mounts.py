@@ -44,9 +44,9 @@ def _table(result: Result, places: Places) -> Table:
     return Table(head, rows, title=f"{places.title}{at} [{unit}]", note=note, left=len(first))
 
 
-def _cells(each: list[CycleMeasures], scale: float) -> list[str]:
-    a, b = each[0], each[-1]
-    if len(each) == 1:
+def _cells(measures: list[CycleMeasures], scale: float) -> list[str]:
+    a, b = measures[0], measures[-1]
+    if len(measures) == 1:
         return [number(value, scale=scale) for value in (b.mean, b.max, b.rms)]
     change = percent(b.mean / a.mean - 1.0) if a.mean > 1e-9 * scale else DASH
     means, maximum = ([number(value, scale=scale) for value in pair] for pair in ((a.mean, b.mean), (a.max, b.max)))

@@ -20,7 +20,7 @@ from laufruhe.present.tables import Table
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
-SHOWN = 8
+MAX_ORDERS = 8
 SHARE = 0.005
 
 
@@ -37,14 +37,14 @@ def tables(result: Result) -> list[Table]:
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
     weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
     present = np.flatnonzero(weight > SHARE)
-    largest = sorted(sorted(present, key=lambda j: -weight[j])[:SHOWN])
+    largest = sorted(sorted(present, key=lambda j: -weight[j])[:MAX_ORDERS])
     base = float(result.initial.loads[k].wrench.base)
     cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
     rows = tuple((f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True))
     names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     sides = ("",) if len(designs) == 1 else (", initial", ", final")
     head = ("order", *(f"{name}{side}" for name in names for side in sides))
-    selection = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "all orders"
+    selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
     note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
     return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
 

@@ -30,9 +30,9 @@ from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.result import Result
 
-MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
+MAX_BOXES, MAX_PROGRAMS = 20_000, 2_000
 """Largest number of boxes without and with cone programs."""
-GRID, MOST_STARTS, MOST_STEPS = 24, 600, 300
+GRID, MAX_STARTS, MAX_STEPS = 24, 600, 300
 """Points of the start grid along a lead and in all, and iterations of a simplex search."""
 COARSE, NEAR = 4, 10.0
 """Factor of coarser sampling in cone programs, and the multiple of the tolerance within which programs use all samples.
@@ -49,8 +49,8 @@ def solve_leads(problem: Problem) -> Result:
     search.check_acts()
     root, first = search.box(search.model.lower, search.model.upper), search.first()
     if search.model.domains:
-        return search.solve(root, first, problem.search.boxes_or(MOST_PROGRAMS), "leads", "second-order cones over")
-    return search.solve(root, first, problem.search.boxes_or(MOST_BOXES), "leads", "local searches; lower bound on")
+        return search.solve(root, first, problem.search.boxes_or(MAX_PROGRAMS), "leads", "second-order cones over")
+    return search.solve(root, first, problem.search.boxes_or(MAX_BOXES), "leads", "local searches; lower bound on")
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +191,7 @@ class LeadSearch(RebalancedSearch[_Box]):
                 self.rebalance_at(0.5 * (self.model.lower + self.model.upper)),
             ]
         else:
-            ends = search_from_grid(self._penalised, self.model.lower, self.model.upper, GRID, MOST_STARTS, MOST_STEPS)
+            ends = search_from_grid(self._penalised, self.model.lower, self.model.upper, GRID, MAX_STARTS, MAX_STEPS)
             designs += [RebalancedDesign(evaluate_design(self.problem, end.tolist())) for end in ends]
         return min(designs, key=lambda design: design.rank)
 

@@ -30,7 +30,7 @@ from laufruhe.solvers.result import Result, Status
 
 Solve: TypeAlias = Callable[[Problem], Result]
 Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
-MOST_BOXES, MOST_OTHERS = 300, 500
+MAX_BOXES, MAX_OTHERS = 300, 500
 """Largest number of boxes of positions, and of boxes of the method for the other decisions."""
 OTHER_SHARE = 0.5
 """Share of the tolerance for the method for the other decisions."""
@@ -43,7 +43,7 @@ DISTANCE_TOLERANCE, MARGIN = 1e-9, 1e-7
 # bisections to shrink each side of a box
 HALVINGS = 10
 # corners of a box from which local searches for feasible positions start
-MOST_CORNERS = 16
+MAX_CORNERS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +82,7 @@ def solve_places(problem: Problem) -> Result:
     search = PlaceSearch(problem)
     root = search.box(*search.bounds)
     first = None if isinstance(root, FathomedPart) else search.rebalance_at(root.middle)
-    return search.solve(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
+    return search.solve(root, first, problem.search.boxes_or(MAX_BOXES), "places", "second-order cones over")
 
 
 def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Propose) -> Result:
@@ -97,7 +97,7 @@ def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Prop
     propose
         Local search from start values of all decisions.
     """
-    started, maximum = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
+    started, maximum = time.perf_counter(), problem.search.boxes_or(MAX_OTHERS)
 
     def prove_roughly(relaxed: Problem) -> Result:
         search = replace(relaxed.search, boxes=maximum)
@@ -248,7 +248,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         def slope(places: Array) -> Array:
             return np.asarray(2.0 * (places - middle) / width**2)
 
-        corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
+        corners = [np.array(corner) for corner in islice(product(*sides), MAX_CORNERS)]
         feasible = []
         for start in (middle, *corners):
             end = minimize(distance, start, jac=slope, method="SLSQP", bounds=sides, constraints=[limits])

@@ -29,8 +29,8 @@ from laufruhe.solvers.conclusion import (
 )
 from laufruhe.solvers.result import Result
 
-MOST_BOXES = 20_000
-GRID, MOST_STARTS, MOST_STEPS = 48, 400, 80
+MAX_BOXES = 20_000
+GRID, MAX_STARTS, MAX_STEPS = 48, 400, 80
 """Points of the start grid along a lead and in all, and iterations of a simplex search."""
 SHARE = 0.5
 """Share of the tolerance at which the branch and bound search ends."""
@@ -46,7 +46,7 @@ def solve_shared_leads(problem: Problem) -> Result:
         value = best.value
         gap_tolerance = SHARE * problem.tolerance * max(value, numerical_zero(problem))
         witness = witness_of(best, np.array([float(x.real) for x in best.values]))
-    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MOST_BOXES), witness)
+    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MAX_BOXES), witness)
     timing = {"solve": time.perf_counter() - started}
     if best is None or (witness is None and math.isinf(division.bound)):
         return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
@@ -67,7 +67,7 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
         candidate = design(leads)
         return math.inf if candidate is None else candidate.value * (1.0 + 1e3 * max(candidate.violation, 0.0))
 
-    ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
+    ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MAX_STARTS, MAX_STEPS))
     best = design(np.array([d.real_start for d in problem.decisions]))
     for end in ends:
         best = best if end is None else better_design(end, best)

@@ -25,7 +25,7 @@ from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionRange
 
-MOST_OPEN = 16
+MAX_OPEN = 16
 """Largest number of decisions; each takes two cone programs, or more if its angle is open."""
 DIRECTIONS = 8
 """Directions in which the largest size of an unbalance with open angle is computed."""
@@ -63,7 +63,7 @@ def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     limits = [x for x in (*problem.limits, limit) if depends(x.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(limits))
     has_numbers = any(_has_no_cones(x.measure) for x in limits)
-    if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or is_time_over():
+    if not affine or len(affine) < len(problem.decisions) or len(affine) > MAX_OPEN or has_numbers or is_time_over():
         return ()
     model = AffineModel(problem)
     x = decision_vector(model.domains, unbalance_values(result.problem, result))
@@ -97,7 +97,7 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
     problem = replace(result.problem, phasing=None)
     is_plain = not problem.extras and not problem.ranks and not any(map(_has_no_cones, problem.measures))
     is_affine = all(decision.is_affine for decision in problem.decisions)
-    if not (is_plain and is_affine and 0 < len(problem.decisions) <= MOST_OPEN) or is_time_over():
+    if not (is_plain and is_affine and 0 < len(problem.decisions) <= MAX_OPEN) or is_time_over():
         return None
     model = AffineModel(problem)
     x = projected_vector(model.domains, unbalance_values(problem, result))

@@ -18,7 +18,7 @@ from laufruhe.solvers.cones.cone_program import project_on_sets
 
 SAME = 1e-10
 """Relative size under which singular values, and the residual of contradicting equations, count as zero."""
-MOST_PROJECTIONS = 40
+MAX_PROJECTIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Equations:
 
     def project(self, problem: AffineProblem, x: Array) -> Array:
         """Project x, shape (n,), on the equations and on the sets of the decisions, alternately."""
-        for _ in range(MOST_PROJECTIONS):
+        for _ in range(MAX_PROJECTIONS):
             residual = self.right - self.matrix @ x
             x = x + self.units**2 * (residual @ self.matrix)
             projection = project_on_sets(problem, x.copy())

@@ -19,7 +19,7 @@ from laufruhe.solvers.cones.conic import solve_quadratic
 TARGET_GAP = 1e-6
 REFINEMENT = 16
 """Factor of samples over the cone program."""
-MOST_STEPS = 5
+MAX_STEPS = 5
 DAMPING = (1e-10, 1e-7, 1e-4)
 """Shares of the trace of the curvature on its diagonal; x stays in directions that do not change the objective."""
 CONVERGED = 1e-5
@@ -27,7 +27,7 @@ CONVERGED = 1e-5
 NO_STEP = 1e-9
 """Step relative to a decision's scale that counts as zero if the decision is zero."""
 FEW_ROWS = 64
-MOST_NUMBERS = 8_000_000
+MAX_NUMBERS = 8_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +90,7 @@ def polish(model: AffineModel, coarse: Optimum) -> Optimum:
 def _is_smooth(problem: AffineProblem) -> bool:
     if problem.groups or not problem.terms:
         return False
-    if REFINEMENT // 2 * sum(norm.slope.size for _, norm in problem.terms) > MOST_NUMBERS:
+    if REFINEMENT // 2 * sum(norm.slope.size for _, norm in problem.terms) > MAX_NUMBERS:
         return False
     has_curvature = all(norm.norm.second_derivative(norm.grid, norm.constant) is not None for _, norm in problem.terms)
     return has_curvature and all(len(norm.grid.weights) <= FEW_ROWS for _, norm in problem.limits)
@@ -99,7 +99,7 @@ def _is_smooth(problem: AffineProblem) -> bool:
 def _newton_steps(problem: AffineProblem, x: Array) -> tuple[Array, tuple[Array, ...]] | None:
     """Return the end of Newton steps from x and the dual rows of its limits; None if the first step is no better."""
     end, is_zero = None, x == 0.0
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         gradient, curvature = derivatives(problem, x)
         maximum = problem.objective(x) * (1.0 + ROUNDING)
         steps = (solve_quadratic(problem, gradient, curvature, x, damping) for damping in DAMPING)

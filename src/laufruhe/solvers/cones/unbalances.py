@@ -38,10 +38,10 @@ from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
 
-MOST_DOUBLINGS = 4
-MOST_MARGINS = 3
+MAX_DOUBLINGS = 4
+MAX_MARGINS = 3
 MANY_ROWS = 2000
-MOST_ROWS = 60_000
+MAX_ROWS = 60_000
 
 
 def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
@@ -158,7 +158,7 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     first = half if model.full_samples % 2 == 0 and has_many_rows else model.full_samples
     samples, best = max(first, start_samples), None
     # a limit close to the smallest possible mean needs many samples
-    maximum = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
+    maximum = max(MAX_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in until_time_limit(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
@@ -184,9 +184,9 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
         best = optimum
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         is_close = best.gap <= problem.tolerance or not problem.search.proves
-        is_allowed = best.violation <= (FEASIBLE if k < MOST_DOUBLINGS else FEASIBILITY_TOL)
-        is_fathomed = is_allowed and (is_close or k >= MOST_DOUBLINGS)
-        if rows > MOST_ROWS or (is_fathomed and _keeps_limits_with_fine_sampling(problem, optimum)):
+        is_allowed = best.violation <= (FEASIBLE if k < MAX_DOUBLINGS else FEASIBILITY_TOL)
+        is_fathomed = is_allowed and (is_close or k >= MAX_DOUBLINGS)
+        if rows > MAX_ROWS or (is_fathomed and _keeps_limits_with_fine_sampling(problem, optimum)):
             break
         samples *= 2
     return best, samples
@@ -216,7 +216,7 @@ def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_lev
     """
     optimum = _attempt(problem, model, samples, zero_level, 0.0)
     margin = 0.0
-    for _ in until_time_limit(range(MOST_MARGINS)):
+    for _ in until_time_limit(range(MAX_MARGINS)):
         if optimum is None or optimum.violation <= FEASIBLE:
             break
         margin += 1.05 * optimum.violation

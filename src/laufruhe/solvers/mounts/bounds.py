@@ -23,7 +23,7 @@ from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
-MOST_DIVISIONS = 3
+MAX_DIVISIONS = 3
 # share of the problem's largest number of boxes for a test of one set of limits
 CONFLICT_SHARE = 0.1
 
@@ -49,7 +49,7 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
     division = BoxResult(0.0, 0)
     if search.moves is not None or not problem.search.proves or (defer_bounds and not is_stiffness_problem(problem)):
         return division
-    for _ in until_time_limit(range(MOST_DIVISIONS)):
+    for _ in until_time_limit(range(MAX_DIVISIONS)):
         design = search.best_or_initial.design if search.best_or_initial is not None else None
         value, witness = math.inf, None
         if design is not None and design.violation <= FEASIBILITY_TOL:

@@ -29,18 +29,18 @@ from laufruhe.solvers.smooth.program import SmoothProgram
 SLACK = 1e-5
 # relative difference of objectives that counts as none
 SAME = 1e-6
-MOST_MARGINS = 6
+MAX_MARGINS = 6
 # violation of a limit that a peak between samples may cause
 NEAR = 0.05
 ITERATIONS = 100
-MOST_AROUND = 3
+MAX_AROUND = 3
 # local optima of a search that are refined with exact simulations
-MOST_REFINED = 1
+MAX_REFINED = 1
 # iterations of a search that simulates in every step
 SIMULATED_ITERATIONS = 60
 # share of the objective's unit below which a search is repeated in a smaller unit, and number of repetitions
 SMALL = 1e-2
-MOST_SIZES = 3
+MAX_SIZES = 3
 SPREAD = 0.4
 # starts at which limits are checked
 CHECKED_STARTS = 6
@@ -133,7 +133,7 @@ class MountSearch:
             return
         zero_level = numerical_zero(self.problem)
         self._repeat_with_active_limits(lambda: self._search(self._points))
-        for _ in timed_rounds(MOST_SIZES):
+        for _ in timed_rounds(MAX_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= zero_level:
                 break
             # the solver's tolerance is relative to the unit of the objective
@@ -146,8 +146,8 @@ class MountSearch:
         """Search again from the best local optima, with the time step of the final evaluation."""
         optima = distinct_optima(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
         optima = optima or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
-        starts = [_split(self.joint, optimum.x) for optimum in optima[:MOST_REFINED]]
-        if self.best is not None and self.best.optimum not in optima[:MOST_REFINED]:
+        starts = [_split(self.joint, optimum.x) for optimum in optima[:MAX_REFINED]]
+        if self.best is not None and self.best.optimum not in optima[:MAX_REFINED]:
             starts.append(_start_of(self.best))
         self._coarser = 1
         self.joint = self._program()
@@ -203,7 +203,7 @@ class MountSearch:
             for k, (mounts, columns) in enumerate(points)
         ]
         optima = self._solve(starts, self._is_explored)
-        centres = distinct_optima(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
+        centres = distinct_optima(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MAX_AROUND]
         if centres and len(points) > 1 and not self._is_explored(optima) and not is_time_over():
             low, high = real_bounds(problem.mount_decisions)
             starts = []
@@ -313,14 +313,14 @@ class MountSearch:
             result for k, result in enumerate(by_value)
             if k == 0 or abs(values[k] - values[k - 1]) > 1e-3 * abs(values[k - 1])
         ]  # fmt: skip
-        for result in distinct_results[:MOST_AROUND]:
+        for result in distinct_results[:MAX_AROUND]:
             best = self.best
             if best is None or best.design.violation > FEASIBLE or result.design.value < best.design.value:
                 self._search_with_margin(result)
 
     def _search_with_margin(self, result: SearchResult) -> None:
         margin = 0.0
-        for _ in timed_rounds(MOST_MARGINS):
+        for _ in timed_rounds(MAX_MARGINS):
             if result.optimum is None or not FEASIBLE < result.design.violation <= NEAR:
                 break
             margin += 1.001 * result.design.violation

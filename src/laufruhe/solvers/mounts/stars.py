@@ -37,13 +37,13 @@ from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 from laufruhe.solvers.stars.cut_search import search_designs
-from laufruhe.solvers.stars.even_search import MOST_LISTED
+from laufruhe.solvers.stars.even_search import MAX_LISTED
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
-MOST_SEARCHED = 3
+MAX_SEARCHED = 3
 # starts of a star, in addition to the mounts of the first star of the ranking
 FEW_STARTS = 2
 
@@ -106,8 +106,8 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     # firing orders of shared throws are enumerated later
     by_firing = problem.depends_on_firing_order and not phasing.shares_throws
     families, _ = families_of(phasing, by_firing)
-    if sum(family.size for family in families) > MOST_LISTED:
-        raise ModelError(f"more than {MOST_LISTED} stars cannot be open together with mounts; fix the firing order")
+    if sum(family.size for family in families) > MAX_LISTED:
+        raise ModelError(f"more than {MAX_LISTED} stars cannot be open together with mounts; fix the firing order")
     on_initial = replace(phasing, realise=lambda candidate: _on_initial_mounts(phasing.realise(candidate)))
     lists_all = phasing.method is Method.ENUMERATION
     scored: list[tuple[float, Star]] = []
@@ -171,12 +171,12 @@ def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarD
     """Solve the best few stars again from all starts."""
     improved = list(designs)
     starts = problem.search.starts
-    for k, design in enumerate(() if is_time_over() else designs[:MOST_SEARCHED]):
+    for k, design in enumerate(() if is_time_over() else designs[:MAX_SEARCHED]):
         star_problem = design.result.problem
         # a star proven no better than the best needs no more starts
         if star_problem.search.starts >= starts or design.bound >= designs[0].value * (1.0 - problem.tolerance):
             continue
-        total = min(len(designs), MOST_SEARCHED)
+        total = min(len(designs), MAX_SEARCHED)
         report_progress("best stars once more", k, total, value=_minimum_value(improved))
         with_all_starts = replace(star_problem, search=replace(star_problem.search, starts=starts))
         with search_scope(f"best star {k + 1} of {total}"):
@@ -209,9 +209,9 @@ def _with_bound(piece: tuple[int, Result], value: float, cutoff: float) -> tuple
 def _solve_moved_throws(problem: Problem, phasing: Phasing, designs: list[StarDesign]) -> list[StarDesign]:
     """Return designs with throws moved from the best stars, or from the middle of their bounds (E36)."""
     starts: list[tuple[Candidate, Result | None]] = [
-        (design.candidate, design.result) for design in designs[:MOST_SEARCHED] if not _rank(design)[0]
+        (design.candidate, design.result) for design in designs[:MAX_SEARCHED] if not _rank(design)[0]
     ]
-    starts = starts or [(start, None) for start in start_candidates(phasing, None)[:MOST_SEARCHED]]
+    starts = starts or [(start, None) for start in start_candidates(phasing, None)[:MAX_SEARCHED]]
     moved_designs: list[StarDesign] = []
     for k, (candidate, even_result) in enumerate(() if designs and is_time_over() else starts):
         best = _minimum_value([*designs, *moved_designs])

@@ -305,10 +305,8 @@ def _run_stage(task: Task, program: _Program, y: Array, stage: Sequence[float]) 
 
 
 def _is_worse_than_start(task: Task, program: _Program, start: Array, stage_end: _End, stage: Sequence[float]) -> bool:
-    """Return True if a feasible start has a lower objective than the end point, because of the barrier.
-
-    Programs with an external model are not checked, because its evaluation is slow.
-    """
+    # True if a feasible start has a lower objective than the end point, because of the barrier.
+    # Programs with an external model are not checked, because its evaluation is slow.
     if task.external_model is not None or is_time_over():
         return False
     end_value, start_value, g, *_ = program.value(stage_end.y, stage), *program.slopes(start, stage)

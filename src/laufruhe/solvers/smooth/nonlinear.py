@@ -52,7 +52,7 @@ WORTH_EXPANDING = 3
 # number of starts in one round
 ROUND = 6
 # two ends are equal within this relative difference of the objective, of its scale, and of every variable
-SAME_END, LEAST_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
+SAME_END, MIN_SCALE, SAME_PLACE = 1e-7, 1e-3, 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -258,7 +258,7 @@ def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimu
 
 
 def _is_same(optimum: LocalOptimum, other: LocalOptimum, task: Task) -> bool:
-    value_tolerance = SAME_END * max(abs(other.value), LEAST_SCALE * task.objective_scale)
+    value_tolerance = SAME_END * max(abs(other.value), MIN_SCALE * task.objective_scale)
     is_apart = (
         np.abs(optimum.x - other.x)[: task.leading_variables] > SAME_PLACE * task.scales[: task.leading_variables]
     )

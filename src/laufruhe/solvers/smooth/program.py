@@ -54,7 +54,7 @@ SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # a stiffness whose bounds have a larger ratio is replaced by its logarithm
 WIDE = 100.0
 # number of orders in an error message
-MOST_NAMED = 6
+MAX_NAMED = 6
 SIDES = ("at least", "at most")
 # a typical deviation of a throw [rad]
 TURN = 0.1
@@ -275,7 +275,7 @@ class SmoothProgram:
         pairs = transmitted_squares(self._points, quantity)
         if not pairs:
             orders = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
-            names = ", ".join(f"{order:g}" for order in orders[:MOST_NAMED]) or "none"
+            names = ", ".join(f"{order:g}" for order in orders[:MAX_NAMED]) or "none"
             raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {names}")
         ratios = [ca.sqrt(force / rigid) for force, rigid in pairs]
         largest = self._constraints.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))

@@ -15,7 +15,7 @@ from laufruhe.physics.crank_stars import Stars, StarSpace
 
 SLACK = 1e-9
 """Relative difference of objectives that counts as none."""
-MOST_SLOTS = 13
+MAX_SLOTS = 13
 """Largest number of cylinders whose firing orders are enumerated; their number grows as the factorial."""
 _BLOCK = 1 << 17
 

@@ -16,11 +16,11 @@ from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.stars.cut_search import search_designs
-from laufruhe.solvers.stars.enumeration import MOST_SLOTS, StarSearchResult, enumerate_orders, enumerate_stars
+from laufruhe.solvers.stars.enumeration import MAX_SLOTS, StarSearchResult, enumerate_orders, enumerate_stars
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 
-MOST_LISTED = 1_000_000
+MAX_LISTED = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +120,7 @@ class EvenStarResult:
 
 def can_list(problem: Problem, families: Sequence[Family]) -> bool:
     """Return True if the even stars of a problem, or its firing orders, are few enough to enumerate."""
-    return sum(family.size for family in families) <= MOST_LISTED or _differ_by_squares(problem, families)
+    return sum(family.size for family in families) <= MAX_LISTED or _differ_by_squares(problem, families)
 
 
 def is_long(problem: Problem) -> bool:
@@ -139,7 +139,7 @@ def refuse_long(problem: Problem) -> None:
 
 def _too_many() -> ModelError:
     rule, remedy = missing_extension("long_cranks")
-    return ModelError(f"a crank of more than {MOST_LISTED} even stars {rule}; {remedy}")
+    return ModelError(f"a crank of more than {MAX_LISTED} even stars {rule}; {remedy}")
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
@@ -159,9 +159,9 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         raise _too_many()
     if _differ_by_squares(problem, families):
         (family,) = families
-        if phasing.cylinders > MOST_SLOTS:
+        if phasing.cylinders > MAX_SLOTS:
             raise ModelError(
-                f"firing orders of more than {MOST_SLOTS} cylinders are too many to evaluate; fix the throws"
+                f"firing orders of more than {MAX_SLOTS} cylinders are too many to evaluate; fix the throws"
             )
         model = family.model(phasing)
         pairs = PairObjective.from_problem(model.at(model.samples))

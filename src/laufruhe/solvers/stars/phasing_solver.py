@@ -13,7 +13,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
-from laufruhe.machine.firing import MOST_ORDERS
+from laufruhe.machine.firing import MAX_ORDERS
 from laufruhe.numerics.budget import is_time_over, limit_time
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -31,7 +31,7 @@ from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
-MOST_TIMES, ROUNDS = 16, 2
+MAX_TIMES, ROUNDS = 16, 2
 """Largest factor of samples for a search that cannot prove its best star, and number of such searches."""
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 """A star, and its steps if it fires evenly."""
@@ -129,7 +129,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
         if gap <= problem.tolerance or is_time_over():
             break
         # the error of sample averages is proportional to the square of the step
-        factor = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MOST_TIMES)
+        factor = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MAX_TIMES)
         fidelity = problem.fidelity
         # keep the steps of the gas, so that designs keep their objectives
         problem = problem.at(replace(fidelity, samples=factor * fidelity.samples, gas_samples=fidelity.gas_steps))
@@ -228,10 +228,8 @@ def solve_every_order(
     star_orders = [
         (star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)
     ]
-    if maximum is None and len(star_orders) * len(sets) >= MOST_ORDERS:
-        rule = (
-            f"{MOST_ORDERS} or more combinations of firing orders and sets of shafts are too many to solve one by one"
-        )
+    if maximum is None and len(star_orders) * len(sets) >= MAX_ORDERS:
+        rule = f"{MAX_ORDERS} or more combinations of firing orders and sets of shafts are too many to solve one by one"
         raise ModelError(f"{rule}; fix the firing order, or the throws")
     designs = [
         replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in star_orders

@@ -178,7 +178,7 @@ def ranked_orders(
     else:
         orders = firing.lap_orders(phasing.cycle, layout, throws)
     entries = []
-    for order in itertools.islice(orders, firing.MOST_ORDERS):
+    for order in itertools.islice(orders, firing.MAX_ORDERS):
         turns = firing.firing_turns(layout, throws, order)
         intervals = firing.intervals_of(phasing.cycle, turns)
         if phasing.intervals.holds(intervals, 1e-6):

@@ -22,7 +22,7 @@ from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
-MOST_STARTS, MOST_SEARCHES = 4, 4
+MAX_STARTS, MAX_SEARCHES = 4, 4
 """Largest number of start cranks, and number of starts of the search from each."""
 CRANK, BANK, SPLIT = "crank", "bank angle", "split pin angle"
 
@@ -74,14 +74,14 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
     search
         Local search over the numbers of a problem.
     """
-    starts = start_candidates(phasing, None, problem.depends_on_gas)[:MOST_STARTS]
+    starts = start_candidates(phasing, None, problem.depends_on_gas)[:MAX_STARTS]
     if not starts:
         return no_star(problem, why_none_fires(phasing)[0])
     results: list[tuple[Candidate, Result]] = []
     for start in until_time_limit(with_progress("cranks that throws leave", starts)):
         crank, realised = _MovedCrank(phasing, start), phasing.realise(start)
         angles = tuple(_angle_decisions(phasing, start))
-        options = replace(realised.search, starts=min(realised.search.starts, MOST_SEARCHES))
+        options = replace(realised.search, starts=min(realised.search.starts, MAX_SEARCHES))
         decisions = (*realised.decisions, *angles)
         open_problem = replace(realised, phasing=None, rebuild=crank, decisions=decisions, search=options)
         with search_scope("a crank that throws leave"):

@@ -16,7 +16,7 @@ from itertools import product
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.affine import MOST_NUMBERS, AffineNorm, AffineProblem
+from laufruhe.load_models.affine import MAX_NUMBERS, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import compress_rows
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
@@ -35,7 +35,7 @@ _ROUNDS, _SHRINKAGE = 6, 0.8
 # width of a side that is not divided any more [rad]
 NARROWEST = 1e-9
 # number of multipliers to try on other boxes
-_MOST_PROOFS = 8
+_MAX_PROOFS = 8
 # number of angles of an arc in a mixture: smallest; largest for shared angles and for throws, by the number of shared
 # angles; and the largest phase between two angles in the highest order that counts [rad]
 _MIN_STEPS, _MAX_SHARED_STEPS, _MAX_STEPS, _STEP = 3, (1, 5, 3), (12, 6, 5), 0.6
@@ -136,7 +136,7 @@ class ThrowPrograms:
         ]
         norms = [norm for _, norm in (*self._terms, *self._limits)]
         count = 2 * sum(norm.waves[0].size * waves.throws for norm in norms)
-        if count > MOST_NUMBERS:
+        if count > MAX_NUMBERS:
             raise ModelError(f"the program has {1e-6 * count:.0f} million numbers, too many for memory")
         if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in norms):
             raise ModelError("a load on an undamped resonance has no finite response")
@@ -348,7 +348,7 @@ class ThrowPrograms:
         return True
 
     def _store_proof(self, multipliers: Multipliers) -> None:
-        self._proofs = [multipliers, *(proof for proof in self._proofs if proof is not multipliers)][:_MOST_PROOFS]
+        self._proofs = [multipliers, *(proof for proof in self._proofs if proof is not multipliers)][:_MAX_PROOFS]
 
 
 def compress(norm: WaveNorm) -> WaveNorm:

@@ -46,22 +46,22 @@ from laufruhe.solvers.throws.throw_windows import (
 Improve = Callable[[Candidate, bool], StarDesign | None]
 """Function that returns the local optimum from a candidate (True) or the design at it (False); None if infeasible."""
 
-MOST_BOXES = 1500
+MAX_BOXES = 1500
 # share of the tolerance by which a design must improve on the incumbent
 SHARE = 0.5
-FEWEST_SAMPLES, MOST_SAMPLES = 96, 384
+FEWEST_SAMPLES, MAX_SAMPLES = 96, 384
 # largest sampling error of bounds, relative to the best objective
 STEPS_COST = 1e-3
 # with one open angle, boxes are few, so samples may be many
-MOST_OF_ONE_ANGLE, COST_OF_ONE_ANGLE = 6144, 2e-5
+MAX_OF_ONE_ANGLE, COST_OF_ONE_ANGLE = 6144, 2e-5
 # factor of the sampling error within which a bound uses more samples
 _FINER_FACTOR = 1.5
 # windows to try for a crank that the model can evaluate
-_MOST_REALISED = 50
+_MAX_REALISED = 50
 # boxes whose middle starts a local search: the first few, then every hundredth, and their largest number
-_SEARCHED_FIRST, _SEARCHED_EVERY, _MOST_SEARCHED = 2, 100, 5
+_SEARCHED_FIRST, _SEARCHED_EVERY, _MAX_SEARCHED = 2, 100, 5
 # spread up to which the middle of a box is evaluated as a design, and the largest number of such designs
-_SMALL_SPREAD, _MOST_EVALUATED = 1e-5, 12
+_SMALL_SPREAD, _MAX_EVALUATED = 1e-5, 12
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Stage:
 
     def __init__(
         self, build: Callable[[int], ThrowPrograms], samples: int, loss: Callable[[int], float], value: float,
-        truncation: Callable[[int], float], maximum: int = MOST_SAMPLES, target: float = STEPS_COST,
+        truncation: Callable[[int], float], maximum: int = MAX_SAMPLES, target: float = STEPS_COST,
     ) -> None:  # fmt: skip
         self._build, self._samples, self._loss, self._value, self._truncation = build, samples, loss, value, truncation
         self._maximum, self._target = maximum, target
@@ -246,7 +246,7 @@ def search_throws(
             _ = stage.programs
     except ModelError:
         return None
-    maximum = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
+    maximum = len(search.roots) + problem.search.boxes_or(MAX_BOXES)
     incumbent, bound, boxes = divide_boxes(
         search, _Part(floor), _Best(best), zero_level, search.gap_target, maximum, search.what
     )
@@ -266,7 +266,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         self.what = "boxes of throws" + (" and angles" if any(phasing.is_geometry_open) else "")
         throws = phasing.layout(*phasing.minimum_geometry).throw_positions
         is_one_angle = sum(phasing.is_geometry_open) == 1 and len(throws) == 1 and phasing.throw_bounds is None
-        self._most_samples = MOST_OF_ONE_ANGLE if is_one_angle else MOST_SAMPLES
+        self._most_samples = MAX_OF_ONE_ANGLE if is_one_angle else MAX_SAMPLES
         target = COST_OF_ONE_ANGLE if is_one_angle else STEPS_COST
         self._finest: Stage | None = None
         self.roots: list[tuple[Stage, FiringWindow, tuple[str, ...]]] = []
@@ -326,7 +326,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
     def _first_crank(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> tuple[Candidate, Problem]:
         # the model cannot evaluate a crank with nearly simultaneous firings
-        first_windows = windows[:_MOST_REALISED]
+        first_windows = windows[:_MAX_REALISED]
         for k, window in enumerate(first_windows):
             candidate = replace(self.candidate(window, middle_throws(window)), left_out=left_out)
             try:
@@ -425,10 +425,10 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         if isinstance(box, FathomedPart):
             return box, None
         self._box_count += 1
-        uses_search = self._search_count < _MOST_SEARCHED and (
+        uses_search = self._search_count < _MAX_SEARCHED and (
             self._box_count <= _SEARCHED_FIRST or self._box_count % _SEARCHED_EVERY == 0
         )
-        evaluates_middle = self._evaluation_count < _MOST_EVALUATED and float(box.spread.max()) < _SMALL_SPREAD
+        evaluates_middle = self._evaluation_count < _MAX_EVALUATED and float(box.spread.max()) < _SMALL_SPREAD
         if uses_search or evaluates_middle:
             self._search_count += uses_search
             self._evaluation_count += not uses_search

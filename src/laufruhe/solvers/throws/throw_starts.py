@@ -28,8 +28,8 @@ from laufruhe.solvers.stars.ranking import candidates_of, interval_range, ranked
 
 ORDERS_WITH_GAS = 2
 # largest number of cranks to compare by amplitudes of orders, and by the exact model
-_MOST_CRANKS = 200_000
-_MOST_EVALUATED = 300
+_MAX_CRANKS = 200_000
+_MAX_EVALUATED = 300
 _FEWEST = 8
 # random throws within bounds, if neither their middle nor even stars have a firing order
 _RANDOM_STARS = 4
@@ -146,7 +146,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     layout, count = phasing.layout(bank, split), len(pattern.members)
     zero_crank = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
     objective = amplitude_objective(replace(phasing.realise(zero_crank), limits=()), phasing, layout)
-    orders = _throw_orders(phasing, count, (_MOST_CRANKS if objective else _MOST_EVALUATED) // number**2)
+    orders = _throw_orders(phasing, count, (_MAX_CRANKS if objective else _MAX_EVALUATED) // number**2)
     # a throw lags by the crank angle at which its first cylinder fires (C5)
     firsts = np.array([pattern.moments[members[0]] for members in pattern.members])[orders]
     throws = angle_of(layout.dead_centre_turn(0)) + firsts[:, :1] - firsts

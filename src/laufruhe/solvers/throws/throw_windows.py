@@ -23,7 +23,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Sector
 from laufruhe.prove.witness import thin_box
 
-MOST_WINDOWS = 6_000
+MAX_WINDOWS = 6_000
 
 
 def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
@@ -36,8 +36,8 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
         return [firing.anywhere]
     # one of four mirror images suffices
     images = 4 if _has_mirror_images(problem, phasing) else 1
-    windows = list(itertools.islice(firing.windows(), images * MOST_WINDOWS + 1))
-    if images > 1 and len(windows) <= images * MOST_WINDOWS:
+    windows = list(itertools.islice(firing.windows(), images * MAX_WINDOWS + 1))
+    if images > 1 and len(windows) <= images * MAX_WINDOWS:
         last = len(layout.positions) + 1
         windows = [
             window
@@ -49,7 +49,7 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
                 for order in (numbers, numbers[::-1])
             )
         ]
-    if len(windows) > MOST_WINDOWS:
+    if len(windows) > MAX_WINDOWS:
         return [firing.anywhere] if phasing.throw_bounds is not None and not problem.depends_on_gas else None
     return windows
 

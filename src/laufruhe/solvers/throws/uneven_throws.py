@@ -56,7 +56,7 @@ SAME = 1e-6
 # smallest difference of angles between two cranks of a ranking [rad]
 SAME_ANGLE = 1e-4
 # searches with tighter limits, margin relative to the violation, and largest violation that a margin may remove
-_ATTEMPTS, _TIGHTENED, _MOST_TIGHTENED = 3, 1.2, 0.2
+_ATTEMPTS, _TIGHTENED, _MAX_TIGHTENED = 3, 1.2, 0.2
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
@@ -239,7 +239,7 @@ def local_optimum(
             elif prices is None and design.value < best.value * (1.0 + SAME):
                 prices = smooth.prices(optimum)
         # the program has fewer samples of a peak than the exact model, and work in place of a degree of irregularity
-        if not FEASIBLE < minimum_violation < _MOST_TIGHTENED:
+        if not FEASIBLE < minimum_violation < _MAX_TIGHTENED:
             break
         margin += _TIGHTENED * minimum_violation
     if best is None:

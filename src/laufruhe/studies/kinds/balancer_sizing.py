@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 import xarray as xr
 
-from laufruhe.files.study_tables import MOST_POINTS
+from laufruhe.files.study_tables import MAX_POINTS
 from laufruhe.present.picture import Picture
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
@@ -20,7 +20,7 @@ from laufruhe.studies.swept import SweptPart, solve_scene
 from laufruhe.studies.swept_report import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
 
-MOST_GROUPS = 6
+MAX_GROUPS = 6
 
 
 def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
@@ -51,12 +51,12 @@ class BalancerSizing(SweptPart):
             if not groups:
                 raise scenes.refused(case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
             scenes.refuse_open_phasing(problem, case)
-            if len(groups) > MOST_GROUPS:
+            if len(groups) > MAX_GROUPS:
                 rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
-                raise scenes.refused(case, "balancer_shafts", rule, f"study {MOST_GROUPS} or fewer")
+                raise scenes.refused(case, "balancer_shafts", rule, f"study {MAX_GROUPS} or fewer")
             count = 2 ** len(groups) * self.size()
-            if count > MOST_POINTS:
-                rule = f"makes {count} points; a study takes {MOST_POINTS}"
+            if count > MAX_POINTS:
+                rule = f"makes {count} points; a study takes {MAX_POINTS}"
                 raise scenes.refused(case, "balancer_shafts", rule, "ask for fewer")
             sets = [chosen for k in range(len(groups) + 1) for chosen in itertools.combinations(groups, k)]
             for changes in self.combinations():

@@ -24,13 +24,13 @@ from laufruhe.studies.part import Record
 from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, solve_scene
-from laufruhe.studies.swept_report import MOST_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
-from laufruhe.studies.text import NOTHING, Text, marked_table, number
+from laufruhe.studies.swept_report import MAX_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
+from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
 EQUAL = "equal cylinders"
-_SAME, _NOTHING, _FIGURES = 1e-9, 1e-7, 1e-5
-_LEAST_FLYWHEEL = "least flywheel"
+_SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5
+_MIN_FLYWHEEL = "least flywheel"
 
 
 class LayoutComparison(SweptPart):
@@ -84,7 +84,7 @@ class LayoutComparison(SweptPart):
         problem = scenes.problem(point)
         further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
         if self.flywheel_for is not None:
-            further[_LEAST_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
+            further[_MIN_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
         return solve_scene(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
@@ -115,13 +115,13 @@ class LayoutComparison(SweptPart):
         why = [[record["why_none"][name] for name in names] for record in records]
         about = {"long_name": "further quantity of the final design, in quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
-        units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
+        units = ["kg m^2" if name == _MIN_FLYWHEEL else MEASURES[name][0].unit for name in names]
         dims = ("point", "quantity")
         return data.assign(
             further=(dims, values, about),
             why_none=(dims, why, {"long_name": "reason for a missing value"}),
         ).assign_coords(
-            quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
+            quantity=[wheel if name == _MIN_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
 
     @staticmethod
@@ -159,7 +159,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     for k, name in enumerate(data["quantity"].values.tolist()):
         values = data["further"].values[:, k]
         # loads that cancel leave a rounding
-        zero_level = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        zero_level = _NEGLIGIBLE * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
         values = np.where(np.abs(values) < zero_level, 0.0, values)
         columns.append((name, str(data["quantity_unit"].values[k]), values, data["why_none"].values[:, k].tolist()))
     swept, rows = swept_names(data), []
@@ -167,12 +167,12 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     for k in sorted(range(points), key=lambda k: (math.isnan(best[k]), best[k])):
         row = [str(data["case"].values[k]), *(str(data[name].values[k]) for name in swept)]
         rows.append(row + [
-            f"{number(factor * values[k])} ({places[k]})" if places[k] else f"{NOTHING} {why[k]}".strip()
+            f"{number(factor * values[k])} ({places[k]})" if places[k] else f"{DASH} {why[k]}".strip()
             for _, _, factor, values, places, why in scaled
         ])  # fmt: skip
     head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
     words = "Ranked by the first quantity; ranks by each quantity in parentheses. After a dash: why a value is missing."
-    return [words, marked_table(head, rows[:MOST_ROWS], len(rows[MOST_ROWS:]))]
+    return [words, marked_table(head, rows[:MAX_ROWS], len(rows[MAX_ROWS:]))]
 
 
 def _places(values: np.ndarray) -> list[int]:

@@ -29,14 +29,14 @@ from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import FAILED, decide_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
-from laufruhe.studies.text import NOTHING, Text, marked_table, number
+from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
 
 DesignName = Annotated[
     Literal["initial", "final"], BeforeValidator(lambda name: present_name(name) if isinstance(name, str) else name)
 ]
 RPM, PER_RAD = readable("rad/s")
-MOST_SPEEDS, MOST_ORDERS, PRESENT = 20_000, 8, 0.01
+MAX_SPEEDS, MAX_ORDERS, PRESENT = 20_000, 8, 0.01
 
 
 class SpeedsTable(f.Table):
@@ -44,7 +44,7 @@ class SpeedsTable(f.Table):
 
     first: f.Speed = Field(alias="from")
     last: f.Speed = Field(alias="to")
-    points: Annotated[int, Field(ge=2, le=MOST_SPEEDS)] | None = None
+    points: Annotated[int, Field(ge=2, le=MAX_SPEEDS)] | None = None
     step: f.Speed | None = None
 
     @model_validator(mode="after")
@@ -53,7 +53,7 @@ class SpeedsTable(f.Table):
             raise f.refusal("do not ascend; write the lower speed as from and the higher as to")
         if (self.points is None) == (self.step is None):
             raise f.refusal("need either points or step; give one of them")
-        if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MOST_SPEEDS:
+        if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MAX_SPEEDS:
             raise f.refusal("have a step that does not fit between their ends; give another")
         return self
 
@@ -178,7 +178,7 @@ class SpeedMapStudy(Part):
                 cells = _row_of(*(values[what].values for what in ("speed", "value", "limit")))
                 # a case lists only its own measures
                 if cells is not None or proof in ("infeasible", FAILED):
-                    rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
+                    rows.append([case, design, label, *(cells or [DASH] * 5), proof])
         return [marked_table([*head, "proof"], rows)]
 
     @staticmethod
@@ -209,7 +209,7 @@ def _row_of(speeds: Array, values: Array, limits: Array) -> list[str] | None:
     cells = [number(np.nanmin(values)), number(values[maximum]), f"{speeds[maximum]:.4g}"]
     over = speeds[values > limits * (1.0 + 1e-6)]
     where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
-    return [*cells, number(finite[0]), where] if len(finite) else [*cells, NOTHING, NOTHING]
+    return [*cells, number(finite[0]), where] if len(finite) else [*cells, DASH, DASH]
 
 
 def _speed_curves(
@@ -237,7 +237,7 @@ def _speed_curves(
             amplitudes = order_amplitude(signal.coefficients).max(axis=1)
             for order, size in zip(signal.orders, amplitudes, strict=True):
                 sizes.setdefault(float(order), np.zeros(len(speeds)))[k] = size
-    largest = sorted((order for order in sizes if order), key=lambda order: -sizes[order].max())[:MOST_ORDERS]
+    largest = sorted((order for order in sizes if order), key=lambda order: -sizes[order].max())[:MAX_ORDERS]
     present = sorted(order for order in largest if sizes[order].max() > PRESENT * sizes[largest[0]].max())
     modes = mounting_in(engine).modes.frequencies.tolist() if engine.block is not None else []
     return {"values": values.tolist(), "orders": present, "sizes": [sizes[h].tolist() for h in present], "modes": modes}
