@@ -30,7 +30,6 @@ PRO_WORDS = frozenset(
         "least",
         "most",
         "few",
-        "whole",
         "nothing",
         "among",
         "enough",
