@@ -217,4 +217,4 @@ def test_the_picture_names_the_cranks_of_parallel_twins_alone() -> None:
 def test_the_picture_says_of_no_steam_engine_that_it_fires() -> None:
     words = _words("steam-two-crank")
     assert "iring" not in words
-    assert "Dead centres at the head end, and what turns" in words
+    assert "Dead centres at the head end, and forward and backward loads" in words

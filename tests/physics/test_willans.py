@@ -127,7 +127,7 @@ def test_scenarios_of_the_ready_problem(solved: laufruhe.solvers.Result) -> None
     assert loads[2] - loads[1] == pytest.approx(loads[1] - loads[0])
     assert solved.certificate.kind is Proof.GLOBAL
     means = [
-        float(np.mean([mount.mean for mount in laufruhe.problem.evaluation.measured(solved.final, k)]))
+        float(np.mean([mount.mean for mount in laufruhe.problem.evaluation.place_measures(solved.final, k)]))
         for k in range(6)
     ]
     assert solved.objective.value == pytest.approx(max(means), rel=1e-6)

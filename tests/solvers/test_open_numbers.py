@@ -151,10 +151,10 @@ def test_limits_are_kept_by_what_is_searched() -> None:
         ("throws = [0]", "throws = [0]\ncylinders = { between = [1, 2] }", "it is a count"),
         ('name = "rated"', 'name = { between = ["a", "b"] }', "a name or a choice"),
         ('"rms mount force"', '"rms mount force"\ndirection_weights = [1, 1, { between = [0, 1] }]',
-         "it says what is asked of a design"),
-        ("[objective]", "[search]\nseed = { between = [1, 2] }\n[objective]", "it says how a search goes"),
+         "it defines the objective or a limit"),
+        ("[objective]", "[search]\nseed = { between = [1, 2] }\n[objective]", "it is a setting of the search"),
         ("[objective]", '[[balancer_shafts]]\nname = "s"\nratio = { between = [1, 2] }\nposition = ["0 m", "0 m"]\n'
-         '[[balancer_shafts.unbalances]]\nx = "0 m"\nunbalance = "0 kg m"\n[objective]', "it is a ratio of gears"),
+         '[[balancer_shafts.unbalances]]\nx = "0 m"\nunbalance = "0 kg m"\n[objective]', "it is a gear ratio"),
         ('name = "rated"\nspeed = "3000 rpm"', 'speed = { between = ["2000 rpm", "3000 rpm"] }',
          "give each operating point a name"),
         ('speed = "3000 rpm"', 'speed = "3000 rpm"\ngas = false\n[gas]\nmodel = "seiliger"\nimep = "8 bar"\n'

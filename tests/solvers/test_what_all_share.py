@@ -124,5 +124,5 @@ def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
 def test_nothing_minimised_is_refused(what: str, tmp_path: Path) -> None:
     """Whatever is open, in one line."""
     problem = loaded(tmp_path, BLOCK.format(sag="5 mm", force="5000 N", **OPEN[what]))
-    with pytest.raises(ModelError, match="open and nothing is minimised"):
+    with pytest.raises(ModelError, match="is open, but there is no objective"):
         solve(problem.changed(objective=(), limits=()))

@@ -59,7 +59,7 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
     assert float(data["optimum"].sel(build="five cylinders")) == pytest.approx(0.6 * 515.0, rel=1e-3)
     assert not worths(data)[0].worth
     report = (out / "report.md").read_text(encoding="utf-8")
-    assert "| first order: beside plain (Fig. 17) | noticeable | -15.2 % of the force | yes |" in report
+    assert "| first order: against plain (Fig. 17) | noticeable | -15.2 % of the force | yes |" in report
     assert "five cylinders, no shafts, equal power" in report
     assert len((out / "three.csv").read_text(encoding="utf-8").splitlines()) == 1 + 3 * 2
     told = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))

@@ -20,7 +20,7 @@ RUN = Need(
 )
 
 
-def _missed(engine: Engine) -> float:
+def _peak_error(engine: Engine) -> float:
     run = engine.extra(Run)
     return 0.0 if run is None else missed_share(run)
 
@@ -38,7 +38,7 @@ class RunChannel(NumberChannel):
     needs: Need = RUN
     depends_on_loads: bool = False
     simulation: str = "laufruhe.extensions.run_ups.simulation"
-    missed: Callable[[Engine], float] = _missed
+    peak_error: Callable[[Engine], float] = _peak_error
     part: Callable[[RunResponse], Array] = field(kw_only=True)
 
 
