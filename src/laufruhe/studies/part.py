@@ -47,7 +47,7 @@ class Template:
 
 
 class Part(Table):
-    """One dataset of a study, its cases, and words about it.
+    """Dataset of a study, its cases, and words about it.
 
     A kind is a subclass in a module of `laufruhe.studies.kinds` with its name as `kind: Literal[...]`;
     it is found there. Its fields are its keys in the study file.

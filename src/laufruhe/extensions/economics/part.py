@@ -74,7 +74,7 @@ _SERIES: tuple[p.Colour, ...] = ("blue", "vermilion", "green", "purple", "orange
 
 
 class BuildTable(Table):
-    """One set of shafts."""
+    """Set of shafts."""
 
     name: Name
     case: Name | None = f.optional("Case that has these shafts; the first by default.")

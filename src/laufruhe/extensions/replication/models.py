@@ -50,7 +50,7 @@ class GridTable(Table):
 
 
 class ReplicaCase(CaseTable):
-    """One case, its numbers in place of those of the part."""
+    """Case whose numbers replace those of the part."""
 
     problem: str = f.required("A name under problems, or a problem file.")
     numbers: dict[str, Any] = f.optional("Numbers in place of those of the part.", {})
@@ -80,7 +80,7 @@ class StatementTable(Table):
 
 
 class AxisTable(Table):
-    """One axis of a panel."""
+    """Axis of a panel."""
 
     label: str = ""
     ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)

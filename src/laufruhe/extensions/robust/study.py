@@ -49,7 +49,7 @@ _TOP, _STEP = -0.55, 0.3
 
 
 class StudyTolerancesTable(Table):
-    """How far a built engine may differ from its drawing."""
+    """Tolerances of a built engine against its drawing."""
 
     reciprocating_mass: f.Mass = f.optional("Tolerance of the reciprocating mass of each cylinder, either way.", 0.0)
     unbalance: f.Unbalance = f.optional("Unbalance left on each balancing plane, at any angle.", 0.0)
@@ -183,7 +183,7 @@ _RANDOM = {
 
 
 class ToleranceCase(CaseTable):
-    """One engine, and what the source says of finer balancing for it."""
+    """Engine, and the statement of the source about finer balancing of it."""
 
     claim: Literal["promises nothing", "matters"] | None = f.optional("What the source says of finer balancing.")
 

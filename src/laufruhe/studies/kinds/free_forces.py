@@ -92,7 +92,7 @@ class LiteratureTable(Table):
 
 
 class FreeForcesCase(CaseTable):
-    """One layout, and what tables print of it."""
+    """Layout, and its printed values in tables."""
 
     literature: LiteratureTable = LiteratureTable()
 
