@@ -65,7 +65,9 @@ PARTS = frozenset(
     ]
 )
 """Words that no part of the name of a function, class or module may be."""
-RIDDLES = frozenset(["Of", "What", "Whether", "Where", "As", "With", "Those", "Such", "That", "Which"])
+RIDDLES = frozenset(
+    "Of What Whether Where As With By From That Those How Under At None One All Every If Unless Such Who Whose Which".split()
+)
 SHORT = 10
 """Lines of a private function from which it may have a docstring."""
 
