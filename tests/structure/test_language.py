@@ -10,64 +10,21 @@ import pytest
 import laufruhe
 
 SOURCE = Path(laufruhe.__file__).parent
-PRO_WORDS = frozenset(
-    [
-        "found",
-        "own",
-        "told",
-        "tell",
-        "tells",
-        "given",
-        "asked",
-        "asks",
-        "kept",
-        "held",
-        "shown",
-        "felt",
-        "each",
-        "beside",
-        "apart",
-        "least",
-        "most",
-        "few",
-        "nothing",
-        "among",
-        "enough",
-        "judged",
-        "concluded",
-        "reachable",
-        "lone",
-        "finely",
-        "foresight",
-        "looks",
-        "withheld",
-        "opened",
-        "lightest",
-    ]
-)
+PRO_WORDS = {
+    "found", "own", "told", "tell", "tells", "given", "asked", "asks", "kept", "held", "shown", "felt", "each",
+    "beside", "apart", "least", "most", "few", "nothing", "among", "enough", "judged", "concluded", "reachable",
+    "lone", "finely", "foresight", "looks", "withheld", "opened", "lightest",
+}  # fmt: skip
 """Pronouns, participles and adverbs that say nothing of what a name holds."""
-PARTS = frozenset(
-    [
-        "told",
-        "tell",
-        "tells",
-        "asked",
-        "asks",
-        "felt",
-        "judged",
-        "concluded",
-        "finely",
-        "beside",
-        "apart",
-        "nothing",
-        "foresight",
-        "lone",
-    ]
-)
+PARTS = {
+    "told", "tell", "tells", "asked", "asks", "felt", "judged", "concluded", "finely", "beside", "apart",
+    "nothing", "foresight", "lone",
+}  # fmt: skip
 """Words that no part of the name of a function, class or module may be."""
-RIDDLES = frozenset(
-    "Of What Whether Where As With By From That Those How Under At None One All Every If Unless Such Who Whose Which".split()
-)
+RIDDLES = {
+    "Of", "What", "Whether", "Where", "As", "With", "By", "From", "That", "Those", "How", "Under", "At", "None",
+    "One", "All", "Every", "If", "Unless", "Such", "Who", "Whose", "Which",
+}  # fmt: skip
 SHORT = 10
 """Lines of a private function from which it may have a docstring."""
 
