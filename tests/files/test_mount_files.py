@@ -72,7 +72,7 @@ REFUSED = {
                            r"mounts.places\[1\].stiffness\[1\] = .*: must be at least 0"),
     "wrong unit": (MOUNTS.replace('"120 N/mm", "120 N/mm"', '"120 mm", "120 N/mm"', 1), BLOCK, SAG,
                    r"'mm' is not a unit of a stiffness"),
-    "no block": (MOUNTS, "", SAG, "block: is missing, and elastic mounts carry it"),
+    "no block": (MOUNTS, "", SAG, "block: is missing, but elastic mounts need the mass and inertia of the block"),
     "block on rigid": (RIGID, BLOCK, "", "block: needs elastic mounts"),
     "free mode": ('[mounts]\nkind = "elastic"\n[[mounts.places]]\nname = "a"\nposition = ["0 m", "0 m", "0.12 m"]\n'
                   'stiffness = ["1 N/mm", "1 N/mm", "1 N/mm"]\n', BLOCK, "",

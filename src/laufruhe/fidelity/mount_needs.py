@@ -72,7 +72,10 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """Yield parts of block and mounts, each with the problem in which it is removed or increased."""
+    """Yield names of properties of block and mounts, each with a copy of the problem in which it is changed.
+
+    Stiffness, mass and inertia are scaled by `MORE`; loss and damping are set to zero.
+    """
     if problem.engine.block is None:
         return
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts

@@ -361,7 +361,10 @@ class Table(BaseModel):
     def __get_pydantic_json_schema__(
         cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Return the schema, without open numbers for a closed table."""
+        """Return the JSON schema of the table.
+
+        If `closed` gives a reason, no number may be open, and the schema does not offer bounds in place of a number.
+        """
         reference = handler(schema)
         if cls.closed:
             resolved = handler.resolve_ref_schema(reference)

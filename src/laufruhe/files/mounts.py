@@ -191,7 +191,12 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
             raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
         return MountsInput(_rigid(table)) if table else MountsInput()
     if block is None:
-        raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
+        raise Refused(
+            "block",
+            None,
+            "is missing, but elastic mounts need the mass and inertia of the block",
+            "add [block] with mass and inertia",
+        )
     (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
     x, y, z = block.centre_of_gravity
     with errors_at_key("block"):

@@ -253,7 +253,9 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         rule = "allows even firing alone, and throws between bounds fire unevenly"
-        raise Refused("phasing.intervals", None, rule, 'allow more, leave it out, or write throws = "open"')
+        raise Refused(
+            "phasing.intervals", None, rule, 'allow uneven intervals, leave the key out, or write throws = "open"'
+        )
     if phasing.intervals.minimum > phasing.intervals.maximum:
         raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
 

@@ -152,7 +152,7 @@ def has_ranking(result: Result) -> bool:
 def ranking_of(result: Result) -> PhasingResult:
     """Return the ranking of stars; `ValueError` without phasing."""
     if result.phasing is None:
-        raise ValueError("a result without phasing has no star")
+        raise ValueError("the result ranks no crank stars, because neither throws nor firing order were open")
     return result.phasing
 
 

@@ -143,5 +143,5 @@ def _content(path: Path) -> dict[str, Any]:
         raise refused("file", "", "is no JSON", "name a result.json of laufruhe solve or evaluate", path) from None
     if not isinstance(record, dict) or not {"problem", "status"} <= record.keys():
         rule = "is no result of laufruhe solve or evaluate"
-        raise refused("file", "", rule, "name their result.json, or a folder that holds it", path)
+        raise refused("file", "", rule, "give a result.json of one of these commands, or its folder", path)
     return record

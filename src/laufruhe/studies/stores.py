@@ -38,9 +38,10 @@ class Store(Protocol):
 def stores_of(
     study: StudyFile, scenes: Scenes, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
-    """Yield each store with the fingerprints of the points assigned to it, finished or not.
+    """Yield each store of results with the fingerprints of the points that it stores, finished or not.
 
-    Random draws of a part go to regions of an array, all other points to one file.
+    A range of random draws is a region of an array on disk (`Regions`). The record of any other point is a line of the
+    file `finished` (`FinishedPoints`).
     """
     marks, root = set(tasks), regions_in(finished.parent)
     templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]

@@ -243,9 +243,14 @@ class SweptPart(Part):
         return by_point(data)
 
     def checked(self, scenes: Scenes) -> list[Problem]:
-        """Return the first scene of every case, after building both ends of every sweep.
+        """Return the problem of every case at the first values of all sweeps.
 
-        `InputError` where one cannot be made, tells a number twice, or has a metric of another dimension.
+        The last value of every sweep is built too, so that errors are found before the run.
+
+        Raises
+        ------
+        InputError
+            If a problem cannot be built, a number is swept and set or swept twice, or the metrics differ in unit.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}

@@ -65,7 +65,7 @@ class SourceClaim(Table):
     @model_validator(mode="after")
     def _says_something(self) -> SourceClaim:
         if self.says is None and self.falls_by is None:
-            raise f.refusal("has no claim; give says, falls_by, or both")
+            raise f.refusal("has no claim of the source; give a judgement as says, a reduction as falls_by, or both")
         return self
 
 

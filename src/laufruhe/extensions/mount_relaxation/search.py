@@ -129,7 +129,10 @@ class SdpRelaxation:
         self._last_box = self.lower, self.upper, self._roots[0]
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
-        """Return the mounts of a box for all motions, then for each symmetry of the motions if there is one (E57)."""
+        """Return the model of the mounts in a box for all motions of the block (E57).
+
+        If the mounts are symmetric, models for symmetric and for antisymmetric motions follow.
+        """
         count = len(self.problem.mount_decisions)
         boxes = {key: np.column_stack([lower[sides], upper[sides]]) for key, sides in self._plane_sides()}
         mounts = open_mounts(self.problem, lower[:count], upper[:count], PlaneFrames(self._frames, boxes))

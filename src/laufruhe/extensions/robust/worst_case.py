@@ -113,7 +113,7 @@ class _Around:
     what: str = "errors that no engine exceeds"
 
     def around(self, errors: Array) -> tuple[Array, list[ErrorBlock]]:
-        """Return the centre and thin blocks of a node that contains the errors."""
+        """Return the centre and the blocks of a search node of half-width `THIN` that contains the errors."""
         return (1.0 - THIN) * errors, [
             ErrorBlock(error_columns, THIN * np.eye(error_columns.stop - error_columns.start))
             for error_columns in self.columns

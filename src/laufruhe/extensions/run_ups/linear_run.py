@@ -45,9 +45,9 @@ class Sweep:
     count: int
 
     def wrenches(self, loads: Loads) -> Array:
-        """Return the wrenches at the Gauss points of each step, shape (6 points, steps).
+        """Return the wrenches at the `NODES` Gauss points of each step, shape (6 NODES, steps).
 
-        The six components of the first point come before those of the second. They are independent of the mounts.
+        Rows are ordered by point, then by component. Wrenches are independent of the mounts.
         """
         wrenches = np.zeros((NODES, 6, self.count))
         for k in range(0, self.count, _AT_ONCE):

@@ -221,7 +221,9 @@ class Riders:
         return BoxColumns(domains_of(decisions), matrix, limits, tuple(shared))
 
     def spread(self, columns: BoxColumns, y: Array, middle: Array) -> list[tuple[int, int, float]]:
-        """Return for every rider its throw, its column of the model, and its distance from a design [kg m].
+        """Return throw, column of the model and distance [kg m] of every weight that turns with a throw.
+
+        The distance is between its relaxed unbalance and its unbalance at the throw angles `middle`.
 
         Parameters
         ----------
