@@ -81,7 +81,10 @@ def _without(key: str) -> Callable[[dict[str, Any]], Any]:
 @pytest.mark.parametrize(
     ("damaged", "said"),
     [
-        (lambda _: [1, 2], "file: is no result of laufruhe solve or evaluate; give a result.json of one of these commands"),
+        (
+            lambda _: [1, 2],
+            "file: is no result of laufruhe solve or evaluate; give a result.json of one of these commands",
+        ),
         (lambda _: {"problem": "a", "rows": []}, "file: is no result of laufruhe solve or evaluate"),
         (_without("certificate"), "certificate: is missing"),
         (lambda r: r | {"status": "fine"}, "status"),
