@@ -104,9 +104,9 @@ def test_limits_that_are_not_followed_stand_with_the_value_of_the_design_decided
 def test_sliders_have_the_units_of_the_file():
     in_grams = EVERY_NORM.replace('["0 kg", "2 kg"]', '["0 g", "2000 g"]')
     web, left = model_of(load(in_grams)).sliders
-    assert (web.unit_text, web.unit, web.upper) == ("g", "kg", 2.0)
+    assert (web.shown, web.unit, web.upper) == ("g", "kg", 2.0)
     assert web.factor == pytest.approx(1000.0)
-    assert (left.unit_text, left.factor) == ("kg m", 1.0)
+    assert (left.shown, left.factor) == ("kg m", 1.0)
 
 
 def test_a_page_too_large_says_so(every, monkeypatch):
@@ -148,7 +148,7 @@ def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
     assert saved.phasing is None
     assert objective_value(saved, evaluate(saved)) == pytest.approx(result.objective.value, rel=1e-9)
     # as the file has them
-    assert {slider.unit_text for slider in model.sliders} == {"kg m"}
+    assert {slider.shown for slider in model.sliders} == {"kg m"}
 
 
 def test_norms_that_a_page_follows_are_those_of_its_script():

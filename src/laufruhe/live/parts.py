@@ -36,7 +36,7 @@ class Slider:
         Bounds of the angle [rad], where that is open.
     angle
         Name of the angle in results.
-    unit_text, factor
+    shown, factor
         The unit of the file, and its factor on an SI value.
     """
 
@@ -48,7 +48,7 @@ class Slider:
     upper: float
     angles: tuple[float, float]
     angle: str
-    unit_text: str
+    shown: str
     factor: float
 
 

@@ -166,7 +166,7 @@ def test_a_crank_is_ranked_held_and_chosen() -> None:
     assert len(found["ranking"]) == 5
     assert found["claim"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
     held = tuple(Edit(*edit) for edit in found["holds"])
-    following = follow(VEE, held=held)["claim"]
+    following = follow(VEE, fixed=held)["claim"]
     assert following["kind"] == "held"
     assert "for this crank" in following["words"]
     assert found["claim"]["value"] <= following["value"] * (1 + 1e-6)
