@@ -188,7 +188,7 @@ class FiringBounds:
 
     @cached_property
     def angles(self) -> CylinderAngles:
-        """Own angles of all cylinders."""
+        """Distinct own angles of the cylinders: throw angle plus shares of the open bank and pin angles."""
         shares = np.array([share for _, share in self._named])
         return CylinderAngles(
             np.array([pin for pin, _ in self._named]), np.tile(shares[:, None], len(self.open_angles))

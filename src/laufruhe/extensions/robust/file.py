@@ -336,7 +336,7 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
             raise Refused("tolerances.rotor_mass", None, "needs a grade, not an unbalance", "leave it out")
     elif table.rotor_mass is None:
         rule = "is missing, and a grade needs the mass of the rotor"
-        raise Refused("tolerances.rotor_mass", None, rule, "add that of crankshaft, flywheel and clutch")
+        raise Refused("tolerances.rotor_mass", None, rule, "add the mass of crankshaft, flywheel and clutch")
     else:
         permitted = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
     if permitted < 0.0:

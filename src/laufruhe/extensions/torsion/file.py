@@ -237,7 +237,12 @@ def _section(
 def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
     diameter = Open.from_value(piece.diameter)
     if diameter.is_open and count > 1:
-        raise Refused(f"{where}.diameter", None, "is open, and its shaft has other pieces", "fix it, or give one piece")
+        raise Refused(
+            f"{where}.diameter",
+            None,
+            "is open, and its shaft has other pieces",
+            "fix the diameter, or give a single piece",
+        )
     if piece.bore >= diameter.lower:
         raise Refused(
             f"{where}.bore", units.quantity_text(piece.bore, "m"), "is as wide as its shaft", "give it a wall"
