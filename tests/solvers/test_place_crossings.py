@@ -78,6 +78,17 @@ def test_no_design_of_a_box_goes_under_its_bound(kind: str, width: float, seed: 
     assert min(found) >= bound * (1.0 - READING)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["bearings", "sizes"])
+def test_places_in_narrow_bounds_have_a_tight_bound(kind: str, tmp_path: Path) -> None:
+    """A place that hardly moves leaves the relaxation nothing to relax: its bound is the optimum."""
+    table, _ = _drawn(kind, 1, 1e-5)
+    found = laufruhe.solve(_loaded({**table, "search": {"boxes": 100, "starts": 2}}, tmp_path))
+    assert found.objective is not None
+    assert found.certificate is not None
+    assert 0.999 <= found.certificate.lower_bound / found.objective.value <= 1.0 + 1e-9
+
+
 def _carried(x: Any, mass: Any) -> dict[str, Any]:
     """Return one cylinder on three bearings whose crank carries a weight."""
     return {

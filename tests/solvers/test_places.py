@@ -171,6 +171,7 @@ def test_no_search_finds_better(case: str, load: str, tmp_path: Path) -> None:
     result = laufruhe.solve(problem)
     assert result.certificate is not None
     assert result.objective is not None
+    assert result.certificate.kind is Proof.GLOBAL
     searched = _searched(problem, seed, result.final.samples, 2)
     assert result.certificate.lower_bound <= searched * (1.0 + 1e-6) + 1e-9
     assert result.objective.value <= searched * (1.0 + 2e-3) + 1e-6 * result.objective.initial
