@@ -10,8 +10,6 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 project = "Laufruhe"
 author = "Laufruhe developers"
 version = release = version_of("laufruhe")
-from drawn import scraper  # noqa: E402
-
 extensions = [
     "labels",
     "mathml",
@@ -34,7 +32,6 @@ exclude_patterns = [
 ]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
-suppress_warnings = ["config.cache"]
 
 autodoc_typehints = "none"
 
@@ -56,7 +53,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "remove_config_comments": True,
     "within_subsection_order": "ExampleTitleSortKey",
-    "image_scrapers": (scraper,),
+    "image_scrapers": ("drawn",),
 }
 
 html_math_renderer = "mathml"
@@ -68,8 +65,8 @@ html_title = "Laufruhe"
 html_theme_options = {"navigation_with_keys": True}
 
 
-def for_readers_aloud(app, page, template, context, doctree):
-    """Headings of the navigation say their level; blocks that scroll can be reached by keys."""
+def add_accessible_markup(app, page, template, context, doctree):
+    """Give headings of the navigation their level, and let keys reach blocks that scroll."""
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
     body = context.get("body", "").replace("<pre>", '<pre tabindex="0">')
@@ -105,8 +102,9 @@ def lead_within_the_site(app, *given):
 
 
 def setup(app):
-    """After the theme has made its navigation."""
+    """Connect the functions of this file to the events of the build."""
     app.connect("config-inited", write_measured_pages)
     app.connect("source-read", lead_within_the_site)
     app.connect("include-read", lead_within_the_site)
-    app.connect("html-page-context", for_readers_aloud, priority=900)
+    # the theme makes its navigation at priority 500
+    app.connect("html-page-context", add_accessible_markup, priority=900)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeAlias
 
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
+
+ImageScraper: TypeAlias = Callable[[tuple[str, str, int], Mapping[str, Any], Mapping[str, Any]], str]
 
 
 def scraper(block: tuple[str, str, int], block_vars: Mapping[str, Any], gallery_conf: Mapping[str, Any]) -> str:
@@ -19,3 +21,7 @@ def scraper(block: tuple[str, str, int], block_vars: Mapping[str, Any], gallery_
             value.savefig(path, dpi=90)
             paths.append(path)
     return figure_rst(paths, gallery_conf["src_dir"])
+
+
+def _get_sg_image_scraper() -> ImageScraper:
+    return scraper
