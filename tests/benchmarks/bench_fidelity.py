@@ -24,10 +24,9 @@ from pages import PAGES, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
 from laufruhe.fidelity.automatic import automatic, choose  # noqa: E402
-from laufruhe.load_models.batch import Designs, prepare  # noqa: E402
+from laufruhe.load_models.batch import BatchNorm, Designs, prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
-from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
 from laufruhe.numerics.norms import NORMS, Grid  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
@@ -65,12 +64,13 @@ def four_cylinder() -> list[str]:
         [seconds(work(p, engine), 200) for p in (exact, auto)] for work in (_other_rods, _other_pistons, _other_rotors)
     )
     x = np.concatenate([[1.0], *(d.columns_of(u) for d, u in zip(cheap.model.domains, values[0], strict=True))])
-    one_whole, one = (seconds(lambda d=d: d.objective_of_one(x), 2000) for d in (whole, cheap))
+    one_whole, one = (seconds(lambda d=d: d.objective_from_features(x[None]), 2000) for d in (whole, cheap))
     empty = _one_row(cheap)
-    floor = seconds(lambda: empty.objective_of_one(x), 2000)
+    floor = seconds(lambda: empty.objective_from_features(x[None]), 2000)
     many_whole, many = (seconds(lambda d=d: d.objective(values), 12) for d in (whole, cheap))
     choosing = seconds(lambda: (forget(), choose(problem, 1e-3)), 3)
     rate = product_rate()
+    operations = sum(2 * norm.rows.size for _, norm in cheap.terms)
     both = seconds(lambda: cheap.objective(values, threads=2), 12)
     error = float(np.abs(cheap.objective(values[:2000]) / whole.objective(values[:2000]) - 1.0).max())
 
@@ -102,8 +102,8 @@ def four_cylinder() -> list[str]:
         f"Largest disagreement over 2000 random designs {error:.1e}.",
         "",
         f"Batch throughput on one core: {DESIGNS / many / 1e6:.2f} million designs a second, "
-        f"{cheap.operations * DESIGNS / many / 1e9:.1f} billion operations of its matrix products a second, "
-        f"{cheap.operations * DESIGNS / many / rate:.2f} of this machine's large matrix product "
+        f"{operations * DESIGNS / many / 1e9:.1f} billion operations of its matrix products a second, "
+        f"{operations * DESIGNS / many / rate:.2f} of this machine's large matrix product "
         f"({rate / 1e9:.1f} billion). "
         f"Squares, roots and sums of the norm are not counted as work. Two threads: {many / both:.2f} times as fast.",
         "",

@@ -11,6 +11,7 @@ import pytest
 from laufruhe.errors import ModelError
 from laufruhe.fidelity.automatic import automatic
 from laufruhe.files.reader import load
+from laufruhe.load_models import batch
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import Evaluation, evaluate
@@ -31,7 +32,7 @@ def test_designs_agree_with_evaluations(path: Path) -> None:
         designs = prepare(problem, prune)
         assert designs.objective(values) == pytest.approx(single, rel=1e-11)
         features = np.concatenate([np.ones((COUNT, 1)), _columns(designs, values)], axis=1)
-        assert [designs.objective_of_one(x) for x in features] == pytest.approx(single, rel=1e-11)
+        assert designs.objective_from_features(features) == pytest.approx(single, rel=1e-11)
 
 
 def _at_steps(problem: Problem, found: Evaluation) -> float:
@@ -54,10 +55,12 @@ def test_threads_change_nothing() -> None:
         assert np.array_equal(designs.objective(values, threads), one)
 
 
-def test_memory_limit_changes_a_rounding_only() -> None:
+def test_memory_limit_changes_a_rounding_only(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = load(READY[0])
     designs, values = prepare(problem), random_decisions(problem, 500)
-    assert designs.objective(values, cache_bytes=1) == pytest.approx(designs.objective(values), rel=1e-14)
+    usual = designs.objective(values)
+    monkeypatch.setattr(batch, "CACHE_BYTES", 1)
+    assert designs.objective(values) == pytest.approx(usual, rel=1e-14)
 
 
 def test_automatic_holds_over_the_bounds() -> None:

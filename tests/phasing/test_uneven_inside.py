@@ -96,7 +96,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     own = replace(phasing.realise(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
-    model = OpenCrankLoads(own, moves, UnevenModel(own, moves.layout, rotor_throws_of(phasing, start)), turns, columns)
+    model = OpenCrankLoads(moves, UnevenModel(own, moves.layout, rotor_throws_of(phasing, start)), turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
     moved = replace(phasing.realise(moves.candidate(x)), phasing=None)

@@ -11,6 +11,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, Kind, column_scales, decision_vector, domains_of
-from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -43,14 +44,10 @@ class AffineNorm:
 
     Attributes
     ----------
-    norm
-        Norm N.
     constant
         Rows V0 of the design with every decision at zero, shape (k, d).
     slope
         Derivative B of the rows, shape (k, d, n).
-    grid
-        Weights and order of the rows.
     """
 
     norm: Norm
@@ -90,12 +87,8 @@ class AffineProblem:
 
     Attributes
     ----------
-    terms
-        Pairs (weight, norm) of the objective.
-    limits
-        Pairs (maximum, norm).
-    domains
-        Sets of the decisions, and their columns in the decision vector.
+    terms, limits
+        Pairs (weight, norm) of the objective, and (maximum, norm).
     samples
         Number of samples over the common period of the loads.
     groups
@@ -136,13 +129,12 @@ class AffineProblem:
         units = []
         for domain in self.domains:
             slopes = [math.sqrt(float(square[domain.columns].sum())) for square in squares]
-            balancing = [constant / slope for constant, slope in zip(constants, slopes, strict=True) if slope > 0.0]
+            sizes = [constant / slope for constant, slope in zip(constants, slopes, strict=True) if slope > 0.0]
+            balancing = max(sizes, default=0.0)
             # a size that is a rounding error of the bound counts as none
-            unit = max(UNIT_MARGIN * max(balancing, default=0.0), MIN_UNIT * domain.scale)
-            units.append(
-                np.full(domain.width, min(domain.scale, unit) if max(balancing, default=0.0) else domain.scale)
-            )
-        return np.concatenate(units) if units else np.zeros(0)
+            unit = max(UNIT_MARGIN * balancing, MIN_UNIT * domain.scale) if balancing else domain.scale
+            units += [min(domain.scale, unit)] * domain.width
+        return np.array(units)
 
     def objective(self, x: Array) -> float:
         """Return the weighted sum of the terms at x, or the largest of several sums."""
@@ -150,12 +142,9 @@ class AffineProblem:
         return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
 
     def with_weighted_groups(self, shares: Array) -> AffineProblem:
-        """Return the problem with a weighted mean of the sums as objective, in place of the largest sum.
+        """Return the problem with the mean of the sums by weights `shares`, shape (groups,), as objective.
 
-        Parameters
-        ----------
-        shares
-            Weight of every sum, shape (groups,). Weights that add up to one give a lower bound of the objective.
+        Weights that add up to one give a lower bound of the largest sum.
         """
         used = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
         terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in used)
@@ -205,23 +194,26 @@ class AffineModel:
         # rows that repeat within the common period are needed once, unless models are to be added up
         self._once = not keep_all and not whole_cycle
         self.domains = domains_of(problem.unbalances)
-        bare = evaluate(problem, problem.design([0.0] * len(problem.unbalances), problem.unbalances))
+        self.bare = evaluate(problem, problem.design([0.0] * len(problem.unbalances), problem.unbalances))
         if problem.fidelity.mounts == "time" and problem.engine.block is not None:
             raise ModelError(NO_MAP)
         mounting = mounting_of(problem.engine, problem.fidelity)
-        changes = [_change(problem, d.decision, direction) for d in self.domains for direction in d.set.directions]
-        self.bare, self._changes = bare, changes
-        orders = [as_order(abs(r.shaft.ratio)) for change in changes for r in change.rotors]
+        self._changes = [
+            _change(problem, domain.decision, direction)
+            for domain in self.domains
+            for direction in domain.set.directions
+        ]
         # loads of one unit of every column, at every operating point
-        columns = [(_only_changed(problem.engine, change), change.shares) for change in changes]
+        columns = [(_only_changed(problem.engine, change), change.shares) for change in self._changes]
         self._slopes = [[_loads(*column, point, problem, mounting) for column in columns] for point in problem.points]
-        self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
-
-    def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
-        # loads inside the crankcase may repeat less often than the wrench on the block
-        inside = {measure.load for measure in self.problem.measures if measure.is_inside}
-        signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
-        return common_base([signal.repeat_order(tuple(orders)) for signal in signals] or [Fraction(1)])
+        self.base = problem.engine.cycle.base_order
+        if not whole_cycle:
+            orders = tuple(as_order(abs(rotor.shaft.ratio)) for change in self._changes for rotor in change.rotors)
+            # loads inside the crankcase may repeat less often than the wrench on the block
+            inside = {measure.load for measure in problem.measures if measure.is_inside}
+            signals = [loads.wrench for loads in self.bare.loads]
+            signals += [signal for channel in inside for signal in self.bare.signals(channel)]
+            self.base = common_base([signal.repeat_order(orders) for signal in signals] or [Fraction(1)])
 
     @property
     def full_samples(self) -> int:
@@ -234,8 +226,6 @@ class AffineModel:
 
         Parameters
         ----------
-        samples
-            Number of samples.
         averaged
             Whether rows of means are averages over the step about each sample. A lower bound of their mean is a lower
             bound of the mean over the whole cycle (P7).
@@ -296,52 +286,46 @@ class AffineModel:
             return _stacked(rows, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
             engine = self.bare.engine
-            bare = mass_rows(measure, engine.rotors, engine.slider_cranks)
-            slopes = [
-                mass_rows(
-                    measure, _only_rotors(engine, change.rotors), _only_changed(engine, change).slider_cranks
-                ).vectors
-                for change in self._changes
-            ]
+            bare, slopes = mass_rows(measure, engine.rotors, engine.slider_cranks), []
+            for change in self._changes:
+                changed = {rotor.name: rotor.unbalance for rotor in change.rotors}
+                rotors = [replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors]
+                slopes.append(mass_rows(measure, rotors, _only_changed(engine, change).slider_cranks).vectors)
             return _stacked(bare, slopes, self._keep_all)
         parts = peaks if averaged and not measure.norm.averages else int(averaged)
         pairs = self.spectra(channel)
         bare_signals = [bare for bare, _ in pairs]
         column_signals = [[columns[k] for _, columns in pairs] for k in range(len(self._changes))]
-        base = self._base_of([*bare_signals, *(signal for column in column_signals for signal in column)], samples)
+        base = self.base
+        if self._once:
+            signals = [*bare_signals, *(signal for column in column_signals for signal in column)]
+            base = common_base([signal.repeat_order() for signal in signals])
+            # shortest period that whole numbers of samples divide
+            if any((steps * self.base / base).denominator > 1 for steps in (samples, self.full_samples)):
+                base = self.base
         samples = int(samples * self.base / base)
         # decisions add no kinks, but their rows stand at the same angles
         kinked = bare_signals if self.kink_model is None else self.kink_model.bare.signals(channel)
         kinks = kinks_of(measure, [signal.with_base(base) for signal in kinked], self.problem.engine)
-        bare = self._rows(measure, bare_signals, base, samples, parts, kinks)
+
+        def rows(signals: Sequence[Spectrum]) -> Rows:
+            period = [signal.with_base(base) for signal in signals]
+            if parts:
+                period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
+            return load_rows(measure, self.problem.points, period, self.problem.engine, samples, kinks)
+
+        bare = rows(bare_signals)
         if bare.vectors.size * len(self._changes) > MAX_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        slopes = [self._rows(measure, column, base, samples, parts, kinks).vectors for column in column_signals]
-        return _stacked(bare, slopes, self._keep_all)
-
-    def _base_of(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
-        # shortest period of signals that whole numbers of samples divide
-        base = common_base([signal.repeat_order() for signal in signals]) if self._once else self.base
-        is_whole = all((steps * self.base / base).denominator == 1 for steps in (samples, self.full_samples))
-        return base if is_whole else self.base
-
-    def _rows(
-        self, measure: Measure, signals: Sequence[Spectrum], base: Fraction, samples: int, parts: int,
-        kinks: Sequence[Array],
-    ) -> Rows:  # fmt: skip
-        period = [signal.with_base(base) for signal in signals]
-        if parts:
-            period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
-        return load_rows(measure, self.problem.points, period, self.problem.engine, samples, kinks)
+        return _stacked(bare, [rows(column).vectors for column in column_signals], self._keep_all)
 
 
-@dataclass(frozen=True)
-class _Change:
+class _Change(NamedTuple):
     # one unit of a column: rotors by their unbalance, pistons by one kilogram, geared shafts by all their inertia
     rotors: tuple[Rotor, ...]
     pistons: tuple[tuple[str, str], ...]
-    shares: tuple[str, ...] = ()
+    shares: tuple[str, ...]
 
 
 def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
@@ -351,11 +335,6 @@ def _change(problem: Problem, decision: Decision, direction: complex) -> _Change
         rule = "reciprocating masses are decided for a crank that turns evenly"
         raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
     return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE))
-
-
-def _only_rotors(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    changed = {rotor.name: rotor.unbalance for rotor in rotors}
-    return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 
 
 def _only_changed(engine: Engine, change: _Change) -> Engine:

@@ -1,58 +1,114 @@
-"""Evaluate the objective of many designs of one problem in one call (F12)."""
+"""Evaluate the objective of many designs of one problem in one call (F12).
+
+The features of a design are 1 and its decision vector, side by side, and the rows of all norms are linear in them. The
+work is one matrix product and two passes over its result. Designs are processed in blocks that fit in the cache. The
+size of a block depends on the shapes only, so results do not depend on the number of threads.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm
-from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.batch_norms import CACHE_BYTES, BatchNorm
-from laufruhe.numerics.norms import Grid
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.problem.problem import Problem
+
+CACHE_BYTES = 1 << 19
+"""Size of the block of rows that one thread works on [bytes]."""
+_MIN_BLOCK = 16
+_PARTS_OF_COMPLEX = 2
+
+
+@dataclass(frozen=True, eq=False)
+class BatchNorm:
+    """Norm of the rows f . R of many designs.
+
+    Attributes
+    ----------
+    rows
+        Matrix R, shape (components, features, k); the features f of a design have the shape (features,).
+    grid
+        Weights and grouping of the k rows.
+    """
+
+    norm: Norm
+    rows: Array
+    grid: Grid
+
+    def values(self, features: Array, threads: int = 1) -> Array:
+        """Return the norm of each design, shape (designs,), from features, shape (designs, features)."""
+        components, _, k = self.rows.shape
+        block = max(CACHE_BYTES // (8 * (components + 1) * max(k, 1)), _MIN_BLOCK)
+        norms = np.empty(len(features))
+        starts = range(0, len(features), block)
+        if not self.norm.is_monotone_in_lengths:
+            for start in starts:
+                part = slice(start, start + block)
+                norms[part] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[part]))
+            return norms
+
+        def work(block_starts: Sequence[int]) -> None:
+            product, lengths = np.empty((block, components * k)), np.empty((block, k))
+            for start in block_starts:
+                part = features[start : start + block]
+                products = np.matmul(part, self._matrix, out=product[: len(part)])
+                size = self._lengths(products, lengths[: len(part)])
+                norms[start : start + block] = self.norm.norm_from_lengths(size, self.grid.weights)
+
+        if threads <= 1 or len(starts) <= 1:
+            work(starts)
+        else:
+            with ThreadPoolExecutor(threads) as pool:
+                list(pool.map(work, (starts[k::threads] for k in range(threads))))
+        return norms
+
+    @cached_property
+    def _matrix(self) -> Array:
+        components, features, k = self.rows.shape
+        order = (1, 2, 0) if components == _PARTS_OF_COMPLEX else (1, 0, 2)
+        return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
+
+    def _lengths(self, product: Array, output: Array) -> Array:
+        """Return the row lengths of every design, shape (designs, k); overwrites the products."""
+        components, _, k = self.rows.shape
+        if components == 1:
+            return np.absolute(product, out=output)
+        if components == _PARTS_OF_COMPLEX:
+            # one pass over the numbers, not four
+            return np.absolute(product.view(np.complex128), out=output)
+        np.multiply(product, product, out=product)
+        total = np.add(product[:, :k], product[:, k : 2 * k], out=output)
+        for j in range(2, components):
+            np.add(total, product[:, j * k : (j + 1) * k], out=total)
+        return np.sqrt(total, out=total)
 
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """Problem prepared for the evaluation of many designs.
-
-    The features of a design are 1 and its decision vector, side by side.
+    """Problem prepared for the evaluation of many designs: pairs (weight, norm) of terms and (maximum, norm) of limits.
 
     Attributes
     ----------
-    problem
-        Problem with open unbalances.
     model
         Loads of the problem, affine in the decision vector.
-    terms
-        Pairs (weight, norm) of the objective.
-    limits
-        Pairs (maximum, norm).
     """
 
-    problem: Problem
     model: AffineModel
     terms: tuple[tuple[float, BatchNorm], ...]
     limits: tuple[tuple[float, BatchNorm], ...] = ()
 
-    def objective(self, values: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """Return the objective of every design, shape (designs,) (C4).
+    def objective(self, values: Array, threads: int = 1) -> Array:
+        """Return the objective of every design, shape (designs,), from complex decisions (designs, decisions) (C4)."""
+        return self.objective_from_features(self._features(values), threads)
 
-        Parameters
-        ----------
-        values
-            Decisions of every design, complex, shape (designs, decisions).
-        threads
-            Number of threads.
-        cache_bytes
-            Memory for one block of designs.
-        """
-        return self.objective_from_features(self._features(values), threads, cache_bytes)
-
-    def are_feasible(self, values: Array) -> NDArray[np.bool_]:
+    def are_feasible(self, values: Array) -> Mask:
         """Return which designs keep the limits on loads and masses within `FEASIBLE`, shape (designs,)."""
         features, feasible = self._features(values), np.ones(len(values), dtype=bool)
         for maximum, norm in self.limits:
@@ -67,26 +123,17 @@ class Designs:
         ]
         return np.stack([np.ones(len(values)), *columns], axis=1)
 
-    def objective_from_features(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
+    def objective_from_features(self, features: Array, threads: int = 1) -> Array:
         """Return the objective of every design from its features, shape (designs, 1 + columns)."""
         total = np.zeros(len(features))
         for weight, norm in self.terms:
-            total += weight * norm.values(features, threads, cache_bytes)
+            total += weight * norm.values(features, threads)
         return total
-
-    def objective_of_one(self, features: Array) -> float:
-        """Return the objective of one design from its features, shape (1 + columns,)."""
-        return sum(weight * norm.value(features) for weight, norm in self.terms)
 
     @property
     def columns(self) -> int:
         """Length of the decision vector."""
         return sum(domain.width for domain in self.model.domains)
-
-    @property
-    def operations(self) -> int:
-        """Number of floating-point operations in the matrix products of one design."""
-        return sum(norm.operations for _, norm in self.terms)
 
 
 def prepare(problem: Problem, prune: bool = True) -> Designs:
@@ -110,23 +157,23 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
         raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(nonlinear)}")
     model = AffineModel(problem, whole_cycle=not prune)
     affine = model.at(model.full_samples if prune else problem.fidelity.samples)
+
+    def batched(norm: AffineNorm) -> BatchNorm:
+        rows, grid = feature_rows(norm), norm.grid
+        if prune and norm.norm.is_monotone_in_lengths:
+            rows, weights = _merged(rows, grid.weights)
+            grid = Grid(weights, len(weights))
+        return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)
+
     terms, limits = (
-        tuple((number, _batched(norm, prune)) for number, norm in pairs) for pairs in (affine.terms, affine.limits)
+        tuple((number, batched(norm)) for number, norm in pairs) for pairs in (affine.terms, affine.limits)
     )
-    return Designs(problem, model, terms, limits)
+    return Designs(model, terms, limits)
 
 
 def feature_rows(norm: AffineNorm) -> Array:
     """Return V0 and the columns of B in the layout of `BatchNorm`, shape (d, 1 + n, k)."""
     return np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-
-
-def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
-    rows, grid = feature_rows(norm), norm.grid
-    if prune and norm.norm.is_monotone_in_lengths:
-        rows, weights = _merged(rows, grid.weights)
-        grid = Grid(weights, len(weights))
-    return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)
 
 
 def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:

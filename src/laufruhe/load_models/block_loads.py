@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import casadi as ca
@@ -13,12 +12,11 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
-from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.spectrum import common_base
+from laufruhe.numerics.spectrum import stacked_coefficients
+from laufruhe.problem.decision import column_scales
 from laufruhe.problem.measure import Measure
-from laufruhe.problem.problem import Problem
 
 # relative size below which an order is left out
 MIN_SHARE = 1e-4
@@ -27,53 +25,36 @@ PROBES = 6
 
 
 class FixedCrankLoads:
-    """Loads of a fixed crank, affine in the unbalances.
+    """Loads of a fixed crank, affine in the unbalances; `unbalances` are CasADi symbols of the decision vector."""
 
-    Parameters
-    ----------
-    problem
-        Problem with open unbalances.
-    model
-        Loads of the problem, affine in the decision vector.
-    unbalances
-        CasADi symbols of the decision vector, shape (n,).
-    """
-
-    def __init__(self, problem: Problem, model: AffineModel, unbalances: Any) -> None:
-        self._problem, self._model, self._u = problem, model, unbalances
-        self._bounds = np.concatenate([np.full(d.width, d.scale) for d in model.domains] or [np.zeros(0)])
+    def __init__(self, model: AffineModel, unbalances: Any) -> None:
+        self._model, self._unbalances = model, unbalances
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
         """Return the relevant orders of the wrench at every operating point, times a matrix of shape (6, 6)."""
-        return [self._wrench(bare, slopes, transform) for bare, slopes in self._model.wrenches()]
-
-    def _wrench(self, bare: Any, slopes: Sequence[Any], transform: Array) -> SymbolicSpectrum:
-        base = common_base([bare.base, *(slope.base for slope in slopes)])
-        spectra = [spectrum.with_finer_base(base).coefficients for spectrum in (bare, *slopes)]
-        longest = max(len(c) for c in spectra)
-        loads = np.array([np.pad(c, ((0, longest - len(c)), (0, 0))) for c in spectra]) @ transform.T
-        size = np.abs(loads[0]).max(axis=1, initial=0.0)
-        size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * self._bounds[:, None]).sum(axis=0)
-        relevant = _relevant_orders(size, np.arange(longest, dtype=float))
-        real, imaginary = (self._expression(part[:, relevant]) for part in (loads.real, loads.imag))
-        return SymbolicSpectrum(np.asarray(relevant, dtype=float) * float(base), real, imaginary)
-
-    def _expression(self, loads: Array) -> Any:
-        count = loads.shape[1]
-        total = ca.MX(ca.DM(loads[0].T.copy()))
-        if len(self._bounds):
-            flat = loads[1:].transpose(1, 2, 0).reshape(6 * count, -1)
-            total += ca.reshape(ca.DM(flat) @ self._u, 6, count)
-        return total
+        wrenches, bounds = [], column_scales(self._model.domains)
+        for bare, slopes in self._model.wrenches():
+            base, spectra = stacked_coefficients([bare, *slopes])
+            loads = spectra @ transform.T
+            size = np.abs(loads[0]).max(axis=1, initial=0.0)
+            size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * bounds[:, None]).sum(axis=0)
+            relevant = _relevant_orders(size, np.arange(len(size), dtype=float))
+            parts = loads[:, relevant].transpose(0, 2, 1)
+            real, imaginary = (self._affine(part[0], part[1:]) for part in (parts.real, parts.imag))
+            wrenches.append(SymbolicSpectrum(np.asarray(relevant, dtype=float) * float(base), real, imaginary))
+        return wrenches
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
         """Return the rows of a measure that is not one of mounts, shape (k, d), and their grid (P1)."""
-        affine = self._model.norm(measure, self._model.full_samples)
-        k, d = affine.constant.shape
-        rows = ca.MX(ca.DM(affine.constant))
-        if len(self._bounds):
-            rows += ca.reshape(ca.DM(affine.slope.transpose(1, 0, 2).reshape(k * d, -1)) @ self._u, k, d)
-        return rows, affine.grid
+        norm = self._model.norm(measure, self._model.full_samples)
+        return self._affine(norm.constant, np.moveaxis(norm.slope, -1, 0)), norm.grid
+
+    def _affine(self, constant: Array, slopes: Array) -> Any:
+        # matrix of shape (k, d) from its derivatives by every column, shape (n, k, d)
+        total, (n, k, d) = ca.MX(ca.DM(constant.copy())), slopes.shape
+        if n:
+            total += ca.reshape(ca.DM(slopes.transpose(2, 1, 0).reshape(k * d, n)) @ self._unbalances, k, d)
+        return total
 
 
 class OpenCrankLoads:
@@ -81,8 +62,6 @@ class OpenCrankLoads:
 
     Parameters
     ----------
-    problem
-        Problem of the star from which angles are counted.
     moves
         Open angles and their bounds.
     model
@@ -91,34 +70,29 @@ class OpenCrankLoads:
         CasADi symbols of the open angles [rad], and of the decision vector of the unbalances.
     """
 
-    def __init__(
-        self, problem: Problem, moves: ThrowMoves, model: UnevenModel, deviations: Any, unbalances: Any
-    ) -> None:
-        self._problem, self._moves, self._model = problem, moves, model
-        self._deviations, self._u = deviations, unbalances
+    def __init__(self, moves: ThrowMoves, model: UnevenModel, deviations: Any, unbalances: Any) -> None:
+        self._moves, self._model = moves, model
+        self._deviations, self._unbalances = deviations, unbalances
         self._symbols = UnevenSymbols(*moves.angles(deviations), unbalances)
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
         """Return the orders of the wrench that matter at any of `PROBES` designs, times a matrix of shape (6, 6)."""
-        return [self._wrench(point, transform) for point in self._problem.points]
-
-    def _wrench(self, point: OperatingPoint, transform: Array) -> SymbolicSpectrum:
-        wrench = self._model.wrench(point, self._symbols).mapped(transform)
-        return wrench.select(_relevant_orders(self._sizes([wrench.real, wrench.imaginary]), wrench.orders))
-
-    def _sizes(self, parts: Sequence[Any]) -> Array:
-        function = ca.Function("sizes", [self._deviations, self._u], list(parts))
-        generator = np.random.default_rng(0)
-        bounds = np.concatenate([np.full(d.width, d.scale) for d in self._model.domains] or [np.zeros(0)])
-        designs = [
-            (
-                generator.uniform(self._moves.lower, self._moves.upper),
-                bounds * generator.uniform(-1.0, 1.0, len(bounds)),
-            )
-            for _ in range(PROBES)
-        ]
-        values = [np.abs(np.array(part, dtype=float)) for design in designs for part in function(*design)]
-        return np.asarray(np.max(values, axis=(0, 1)))
+        relevant, bounds = [], column_scales(self._model.domains)
+        variables = [self._deviations, self._unbalances]
+        for point in self._model.problem.points:
+            wrench = self._model.wrench(point, self._symbols).mapped(transform)
+            function = ca.Function("sizes", variables, [wrench.real, wrench.imaginary])
+            generator = np.random.default_rng(0)
+            designs = [
+                (
+                    generator.uniform(self._moves.lower, self._moves.upper),
+                    bounds * generator.uniform(-1.0, 1.0, len(bounds)),
+                )
+                for _ in range(PROBES)
+            ]
+            values = [np.abs(np.array(part, dtype=float)) for design in designs for part in function(*design)]
+            relevant.append(wrench.select(_relevant_orders(np.max(values, axis=(0, 1)), wrench.orders)))
+        return relevant
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
         """Return the rows of a measure and their grid, as `UnevenModel.rows` does."""

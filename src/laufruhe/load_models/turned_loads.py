@@ -30,7 +30,7 @@ from laufruhe.load_models.isolated_cylinders import (
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum, sum_spectra
 from laufruhe.machine import Engine, Rotor
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
@@ -58,16 +58,11 @@ class OrderSelection:
     gain: Callable[[float], float] = lambda _: 1.0
 
 
-@dataclass(frozen=True, eq=False)
-class _BankCoefficients:
-    # factors of cos b, of sin b and of 1 in the bank angle b, shape (orders, components)
-    cosine: ComplexArray
-    sine: ComplexArray
-    constant: ComplexArray
-
-
-class TurnedLoads:
-    """Load at one operating point, for throws and banks at any angles.
+def turned_loads(
+    problem: Problem, point: int, signal: Callable[[PointLoads], Spectrum], selections: Sequence[OrderSelection],
+    keep_places: bool, angles: Sequence[tuple[Any, Any]], banks_are_open: bool, unbalance: Callable[[Rotor], Any],
+) -> list[SymbolicSpectrum]:  # fmt: skip
+    """Return a load at one operating point at every place, for throws and banks at any angles.
 
     Parameters
     ----------
@@ -77,104 +72,71 @@ class TurnedLoads:
         Index of the operating point.
     signal
         Function from the loads of an engine to the spectrum of interest, shape (n, places, d).
-    banks
-        Whether bank angles are open.
     selections
         Rules for the orders; an order is kept if any rule selects it.
     keep_places
         Whether idle cylinders keep their places, because the load has places at every cylinder.
-
-    Attributes
-    ----------
-    places
-        Number of places of the load.
+    angles
+        Angles s and b of every cylinder [rad].
+    banks_are_open
+        Whether loads follow the bank angles b.
+    unbalance
+        Function from a rotor to the real and imaginary parts of its unbalance [kg m].
     """
+    engine, at_point = problem.engine, replace(problem, points=(problem.points[point],))
+    base = engine.cycle.base_order
 
-    def __init__(
-        self, problem: Problem, point: int, signal: Callable[[PointLoads], Spectrum], banks: bool,
-        selections: Sequence[OrderSelection], keep_places: bool,
-    ) -> None:  # fmt: skip
-        self._problem, self._signal, self._banks, self._keep_places = problem, signal, banks, keep_places
-        self._point = replace(problem, points=(problem.points[point],))
-        parts = problem.engine.slider_cranks
-        cylinders = [[self._load_of_cylinder(k, bank) for bank in (BANK_SAMPLES if banks else (part.bank,))]
-                     for k, part in enumerate(parts)]  # fmt: skip
-        units = [self._loads_of_units(rotor) for rotor in problem.engine.rotors]
-        self._base = problem.engine.cycle.base_order
-        first = next(spectrum for spectra in (*cylinders, *units) for spectrum in spectra)
-        self.places, self._width = first.coefficients.shape[1:]
-        self._units = [[self._rows(spectrum) for spectrum in spectra] for spectra in units]
-        rows = [[self._rows(spectrum) for spectrum in spectra] for spectra in cylinders]
-        longest = max(len(by_order) for banked in rows for by_order in banked)
-        padded = [[_padded(by_order, longest) for by_order in banked] for banked in rows]
-        orders: Array = np.arange(longest, dtype=np.float64) * float(self._base)
-        squares = np.sum([np.square(np.abs(by_order)) for banked in padded for by_order in banked], axis=0)
-        masks = [_selected(squares[:, selection.rows].sum(axis=1), orders, selection) for selection in selections]
-        selected = np.flatnonzero(np.any(masks, axis=0))
-        self._orders: Array = orders[selected]
-        self._cylinders = [_bank_coefficients([by_order[selected] for by_order in banked]) for banked in padded]
+    def load(of: Problem, parts: Engine) -> Spectrum:
+        wrench = shaking_loads(parts, of.points[0], of.fidelity)
+        return signal(PointLoads(of.points[0], wrench, None, moving=parts, fidelity=of.fidelity)).series
 
-    def spectra(
-        self, stars: Sequence[Any], banks: Sequence[Any], unbalance: Callable[[Rotor], Any]
-    ) -> list[SymbolicSpectrum]:
-        """Return the load at every place as spectra.
-
-        Parameters
-        ----------
-        stars, banks
-            Angles s and b of every cylinder [rad].
-        unbalance
-            Function from a rotor to the real and imaginary parts of its unbalance [kg m].
-        """
-        parts = [
-            self._turned(coefficients, s, b) for coefficients, s, b in zip(self._cylinders, stars, banks, strict=True)
-        ]
-        for rotor, (real_unit, imaginary_unit) in zip(self._problem.engine.rotors, self._units, strict=True):
-            indices = np.flatnonzero(np.abs(real_unit).max(axis=1) + np.abs(imaginary_unit).max(axis=1))
-            if len(indices):
-                u, pair = unbalance(rotor), (real_unit[indices].T, imaginary_unit[indices].T)
-                real, imaginary = (_dm(a) * u[0] + _dm(b) * u[1] for a, b in (tuple(p.real for p in pair),
-                                                                              tuple(p.imag for p in pair)))  # fmt: skip
-                orders = np.asarray(indices * float(self._base), dtype=np.float64)
-                parts.append(SymbolicSpectrum(orders, real, imaginary))
-        total = sum_spectra(parts)
-        d = self._width
-        rows = [slice(k * d, (k + 1) * d) for k in range(self.places)]
-        return [SymbolicSpectrum(total.orders, total.real[place, :], total.imaginary[place, :]) for place in rows]
-
-    def _turned(self, coefficients: _BankCoefficients, star: Any, bank: Any) -> SymbolicSpectrum:
-        count = coefficients.constant.shape[1]
-        phases = ca.DM(self._orders).T * star
-        cosine, sine = (ca.repmat(wave(phases), count, 1) for wave in (ca.cos, ca.sin))
-        real, imaginary = _dm(coefficients.constant.real.T), _dm(coefficients.constant.imag.T)
-        if self._banks:
-            c, s = ca.cos(bank), ca.sin(bank)
-            real = real + _dm(coefficients.cosine.real.T) * c + _dm(coefficients.sine.real.T) * s
-            imaginary = imaginary + _dm(coefficients.cosine.imag.T) * c + _dm(coefficients.sine.imag.T) * s
-        return SymbolicSpectrum(self._orders, real * cosine - imaginary * sine, real * sine + imaginary * cosine)
-
-    def _load_of_cylinder(self, k: int, bank: float) -> Spectrum:
-        engine = self._problem.engine
+    def load_of_cylinder(k: int, bank: float) -> Spectrum:
         part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
-        return self._loaded(only_gas_of(self._point, part.name), isolate_cylinder(engine, k, self._keep_places, part))
+        return load(only_gas_of(at_point, part.name), isolate_cylinder(engine, k, keep_places, part))
 
-    def _loads_of_units(self, rotor: Rotor) -> list[Spectrum]:
-        engine = self._problem.engine
-        units = (isolate_rotors(engine, [replace(rotor, unbalance=u)], self._keep_places) for u in (1.0, 1.0j))
-        return [self._loaded(motored(self._point), unit) for unit in units]
+    cylinders = [
+        [load_of_cylinder(k, bank) for bank in (BANK_SAMPLES if banks_are_open else (part.bank,))]
+        for k, part in enumerate(engine.slider_cranks)
+    ]
+    units = [
+        [
+            load(motored(at_point), isolate_rotors(engine, [replace(rotor, unbalance=u)], keep_places))
+            for u in (1.0, 1.0j)
+        ]
+        for rotor in engine.rotors
+    ]
+    places, d = next(spectrum for spectra in (*cylinders, *units) for spectrum in spectra).coefficients.shape[1:]
+    base, stacked = stacked_coefficients([spectrum for spectra in cylinders for spectrum in spectra], base)
+    # shape (cylinders, banks, orders, components)
+    rows = stacked.reshape(len(cylinders), -1, stacked.shape[1], places * d)
+    orders: Array = np.arange(rows.shape[2], dtype=np.float64) * float(base)
+    squares = np.sum([np.square(np.abs(by_order)) for banked in rows for by_order in banked], axis=0)
+    masks = [_selected(squares[:, selection.rows].sum(axis=1), orders, selection) for selection in selections]
+    selected = np.flatnonzero(np.any(masks, axis=0))
+    spectra = [_turned(orders[selected], banked[:, selected], *pair) for banked, pair in zip(rows, angles, strict=True)]
+    for rotor, pair in zip(engine.rotors, units, strict=True):
+        a, b = (np.asarray(s.with_finer_base(base).coefficients).reshape(-1, places * d) for s in pair)
+        indices = np.flatnonzero(np.abs(a).max(axis=1) + np.abs(b).max(axis=1))
+        if len(indices):
+            u, a, b = unbalance(rotor), a[indices].T, b[indices].T
+            real, imaginary = _dm(a.real) * u[0] + _dm(b.real) * u[1], _dm(a.imag) * u[0] + _dm(b.imag) * u[1]
+            spectra.append(SymbolicSpectrum(np.asarray(indices * float(base)), real, imaginary))
+    total = sum_spectra(spectra)
+    at_places = [slice(k * d, (k + 1) * d) for k in range(places)]
+    return [SymbolicSpectrum(total.orders, total.real[place, :], total.imaginary[place, :]) for place in at_places]
 
-    def _loaded(self, problem: Problem, engine: Engine) -> Spectrum:
-        (point,), fidelity = problem.points, problem.fidelity
-        wrench = shaking_loads(engine, point, fidelity)
-        return self._signal(PointLoads(point, wrench, None, moving=engine, fidelity=fidelity)).series
 
-    def _rows(self, spectrum: Spectrum) -> ComplexArray:
-        coefficients = spectrum.with_finer_base(self._base).coefficients
-        return np.asarray(coefficients.reshape(len(coefficients), -1))
-
-
-def _padded(rows: ComplexArray, count: int) -> ComplexArray:
-    return np.pad(rows, ((0, count - len(rows)), (0, 0)))
+def _turned(orders: Array, rows: ComplexArray, star: Any, bank: Any) -> SymbolicSpectrum:
+    # load of a cylinder from its coefficients at the bank angles of `BANK_SAMPLES`, or at its own
+    by_bank = split_by_bank(*rows) if len(rows) > 1 else (rows[0],)
+    phases = ca.DM(orders).T * star
+    cosine, sine = (ca.repmat(wave(phases), rows.shape[2], 1) for wave in (ca.cos, ca.sin))
+    real, imaginary = _dm(by_bank[-1].real.T), _dm(by_bank[-1].imag.T)
+    if len(rows) > 1:
+        c, s = ca.cos(bank), ca.sin(bank)
+        real = real + _dm(by_bank[0].real.T) * c + _dm(by_bank[1].real.T) * s
+        imaginary = imaginary + _dm(by_bank[0].imag.T) * c + _dm(by_bank[1].imag.T) * s
+    return SymbolicSpectrum(orders, real * cosine - imaginary * sine, real * sine + imaginary * cosine)
 
 
 def _selected(squares: Array, orders: Array, selection: OrderSelection) -> Mask:
@@ -182,12 +144,6 @@ def _selected(squares: Array, orders: Array, selection: OrderSelection) -> Mask:
     tail = np.cumsum(squares[::-1])[::-1]
     mask = (tail > selection.left_out**2 * tail[0]) & (squares > _NEGLIGIBLE**2 * tail[0])
     return np.asarray(mask if mask.any() else np.arange(len(orders)) == 0)
-
-
-def _bank_coefficients(rows: Sequence[ComplexArray]) -> _BankCoefficients:
-    if len(rows) == 1:
-        return _BankCoefficients(0.0 * rows[0], 0.0 * rows[0], rows[0])
-    return _BankCoefficients(*split_by_bank(*rows))
 
 
 def _dm(values: Array) -> Any:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
-from laufruhe.load_models.turned_loads import OrderSelection, TurnedLoads
-from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
+from laufruhe.load_models.turned_loads import OrderSelection, turned_loads
+from laufruhe.machine import OperatingPoint, Rotor
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
@@ -86,12 +86,10 @@ class UnevenModel:
         self.problem, self.layout, self.rotor_throws = problem, layout, rotor_throws
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
-        self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
+        firsts = [layout.pins.index(pin) for pin in range(len(layout.throw_positions))]
+        self._start = [problem.engine.slider_cranks[k].throw - layout.pin_offsets[k] for k in firsts]
         self._left_out = left_out
         self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], SymbolicSpectrum] = {}
-
-    def _points(self, measure: Measure) -> list[OperatingPoint]:
-        return [p for p in self.problem.points if measure.points is None or p.name in measure.points]
 
     def rows(self, measure: Measure, symbols: UnevenSymbols) -> tuple[Any, Grid]:
         """Return the rows of a measure, shape (k, d), and their grid (P1).
@@ -102,7 +100,7 @@ class UnevenModel:
             counted = counted_rotors(measure, self.problem.engine.rotors)
             rows = [(self._unbalance(r, symbols) / radius_of(r)).T for r in counted]
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
-        chosen = self._points(measure)
+        chosen = [point for point in self.problem.points if measure.includes_point(point)]
         total_weight = sum(point.weight for point in chosen)
         blocks: list[Any] = []
         weights: list[Array] = []
@@ -120,7 +118,8 @@ class UnevenModel:
             for p in chosen
         ]
         # orders differ between points: all have the samples that the highest order needs
-        steps = max(_steps(place) for places in signals for place in places)
+        highest = max(float(place.orders.max()) / place.base for places in signals for place in places)
+        steps = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
         for point, places in zip(chosen, signals, strict=True):
             values = [place.sampled(steps) for place in places]
             if is_mapped_later:
@@ -132,42 +131,48 @@ class UnevenModel:
     def _signal(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> list[SymbolicSpectrum]:
         # one spectrum for each mount, one for the block, or one for each place inside the crankcase
         if measure.is_inside:
-            return self._inside(measure, point, symbols)
+            # loads inside the crankcase, by every place (S37)
+            return self._turned(
+                point, symbols,
+                lambda loads: narrow_signal(
+                    measure, measure.load.signal(loads).series, self.problem.engine
+                ).truncated(HIGHEST),
+                [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True,
+            )  # fmt: skip
         counted = self._counted(measure, point, symbols)
         if isinstance(measure.channel, LoadChannel) and measure.channel.part is not None:
             return [counted.mapped(np.eye(6)[measure.channel.part])]
         by_order = [self._maps(measure, float(h), point) for h in counted.orders]
         return [counted.map_orders([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
-    def _inside(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> list[SymbolicSpectrum]:
-        # loads inside the crankcase, by every place (S37)
-        engine = self.problem.engine
-
-        def signal(loads: PointLoads) -> Spectrum:
-            return narrow_signal(measure, measure.load.signal(loads).series, engine).truncated(HIGHEST)
-
-        return self._turned(point, symbols, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
-
     def _turned(
         self, point: OperatingPoint, symbols: UnevenSymbols, signal: Callable[[PointLoads], Spectrum],
         selections: Sequence[OrderSelection], keep_places: bool,
     ) -> list[SymbolicSpectrum]:  # fmt: skip
-        k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
-        loads = TurnedLoads(self.problem, k, signal, symbols.bank is not None, selections, keep_places)
-        angles = [self._place(k, part, symbols) for k, part in enumerate(parts)]
-        stars = [pin - bank - math.tau * _turns_of(part) for (pin, bank), part in zip(angles, parts, strict=True)]
-        return loads.spectra(stars, [bank for _, bank in angles], lambda rotor: self._unbalance(rotor, symbols))
+        engine = self.problem.engine
+        angles = []
+        for k, part in enumerate(engine.slider_cranks):
+            side = self.layout.side(k)
+            bank = side * symbols.bank if symbols.bank is not None else part.bank
+            offset = -side * symbols.split if symbols.split is not None else self.layout.pin_offsets[k]
+            # the firing order fixes the number of turns before the firing
+            turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
+            angles.append((symbols.throws[self.layout.pins[k]] + offset - bank - math.tau * turns, bank))
+        return turned_loads(
+            self.problem, self.problem.points.index(point), signal, selections, keep_places, angles,
+            symbols.bank is not None, lambda rotor: self._unbalance(rotor, symbols),
+        )  # fmt: skip
 
     def _counted(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> SymbolicSpectrum:
-        # only the lowest orders of gas move a block on soft mounts
-        gain = self._gain(measure, point) if measure.on_mounts else None
+        gain = None
+        if measure.on_mounts and not isinstance(self._mounting, RigidMounting):
+            # only the lowest orders of gas move a block on soft mounts
+            gain = lambda h: float(np.abs(self._map(measure, h, point.speed)[:, :, ROLL]).max())  # noqa: E731
         wrench = self.wrench(point, symbols, gain)
         counted = np.flatnonzero(measure.counted(wrench.orders))
-        return (
-            wrench.select(counted)
-            if len(counted)
-            else SymbolicSpectrum(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
-        )
+        if len(counted):
+            return wrench.select(counted)
+        return SymbolicSpectrum(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
 
     def _maps(self, measure: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         weights = np.diag(measure.direction_weights or (1.0, 1.0, 1.0))
@@ -185,35 +190,20 @@ class UnevenModel:
         travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
-    def _gain(self, measure: Measure, point: OperatingPoint) -> Callable[[float], float] | None:
-        if isinstance(self._mounting, RigidMounting):
-            return None
-        return lambda h: float(np.abs(self._map(measure, h, point.speed)[:, :, 3]).max())
-
     def wrench(
         self, point: OperatingPoint, symbols: UnevenSymbols, gain: Callable[[float], float] | None = None
     ) -> SymbolicSpectrum:
         """Return the wrench at an operating point; `gain` weights the orders of the roll moment for their selection."""
-        if gain is not None:
-            return self._wrench(point, symbols, gain)
-        if (point, symbols) not in self._wrenches:
-            self._wrenches[point, symbols] = self._wrench(point, symbols, lambda _: 1.0)
-        return self._wrenches[point, symbols]
-
-    def _wrench(
-        self, point: OperatingPoint, symbols: UnevenSymbols, gain: Callable[[float], float]
-    ) -> SymbolicSpectrum:
+        if gain is None and (point, symbols) in self._wrenches:
+            return self._wrenches[point, symbols]
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
         unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
-        roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain)
-        (wrench,) = self._turned(point, symbols, _wrench_of, [*unweighted, roll], False)
+        roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
+        signal = lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :])  # noqa: E731
+        (wrench,) = self._turned(point, symbols, signal, [*unweighted, roll], False)
+        if gain is None:
+            self._wrenches[point, symbols] = wrench
         return wrench
-
-    def _place(self, k: int, part: SliderCrank, symbols: UnevenSymbols) -> tuple[Any, Any]:
-        side = self.layout.side(k)
-        bank = side * symbols.bank if symbols.bank is not None else part.bank
-        offset = -side * symbols.split if symbols.split is not None else self.layout.pin_offsets[k]
-        return symbols.throws[self.layout.pins[k]] + offset, bank
 
     def _unbalance(self, rotor: Rotor, symbols: UnevenSymbols) -> Any:
         """Return the unbalance of a rotor (re, im) [kg m], turned with its throw."""
@@ -237,23 +227,6 @@ class UnevenModel:
         turn = symbols.throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
-
-
-def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
-    k = layout.pins.index(pin)
-    return parts[k].throw - layout.pin_offsets[k]
-
-
-def _turns_of(part: SliderCrank) -> int:
-    return round((part.firing_angle + part.throw - part.bank) / math.tau)
-
-
-def _wrench_of(loads: PointLoads) -> Spectrum:
-    return loads.wrench.mapped(lambda wrench: wrench[:, None, :])
-
-
-def _steps(spectrum: SymbolicSpectrum) -> int:
-    return max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * float(spectrum.orders.max()) / spectrum.base))
 
 
 def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:

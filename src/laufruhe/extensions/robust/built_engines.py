@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from laufruhe.extensions.robust.tolerance import Tolerances, tolerances_of, with_errors
 from laufruhe.extensions.robust.worst_case import MAX_NODES, Terms, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
-from laufruhe.load_models.batch import feature_rows
+from laufruhe.load_models.batch import BatchNorm, feature_rows
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.batch_norms import BatchNorm
 from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, with_common_base
 from laufruhe.problem.measure import Limit, Measure, kinks_of
 from laufruhe.problem.problem import Problem

@@ -123,9 +123,9 @@ class SmoothProgram:
     def _loads_of(self, moves: ThrowMoves | None) -> SymbolicLoads:
         if moves is None:
             # the affine model gives loads and unbalances, which do not depend on the mounts
-            return FixedCrankLoads(self.problem, AffineModel(off_resonance(self.problem)), self._unbalance_columns)
+            return FixedCrankLoads(AffineModel(off_resonance(self.problem)), self._unbalance_columns)
         model = UnevenModel(self.problem, moves.layout, rotor_throws_of(moves.phasing, moves.start))
-        return OpenCrankLoads(self.problem, moves, model, self._throw_deviations, self._unbalance_columns)
+        return OpenCrankLoads(moves, model, self._throw_deviations, self._unbalance_columns)
 
     def _build(self) -> NonlinearProgram:
         minimum = ca.MX(0.0)
