@@ -14,7 +14,7 @@ from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure
-from laufruhe.problem.static_load import static_part, with_alternating_loads, with_mean_loads
+from laufruhe.problem.static_load import static_part, with_loads
 from problem_files import PROBLEMS
 
 SAMPLES = 23040
@@ -76,7 +76,7 @@ def test_an_objective_at_its_static_part_says_so(name: str, static: float) -> No
 
 def test_an_alternating_objective_names_what_it_leaves_out() -> None:
     given = load(FOUR)
-    problem, evaluation = with_alternating_loads(given), evaluate(given)
+    problem, evaluation = with_loads(given, alternating=True), evaluate(given)
     part = static_part(problem, evaluation)
     assert part == static_part(given, evaluation)
     assert part is not None
@@ -97,11 +97,12 @@ def test_an_engine_without_gas_has_no_static_part() -> None:
 @pytest.mark.slow
 def test_the_optimum_of_alternating_loads_is_proven_and_no_other_design_is_better() -> None:
     given = load(FOUR)
-    whole, result = solve(given), solve(with_alternating_loads(given))
+    whole, result = solve(given), solve(with_loads(given, alternating=True))
     assert result.objective is not None
     assert result.certificate is not None
     assert result.objective.name == "mean alternating mount force"
-    assert (result.certificate.kind, with_mean_loads(result.problem).objective) == ("global", given.objective)
+    assert result.certificate.kind == "global"
+    assert with_loads(result.problem, alternating=False).objective == given.objective
     assert result.objective.value < objective_value(result.problem, whole.final)
     rng, problem = np.random.default_rng(3), result.problem
     for _ in range(40):
@@ -116,7 +117,7 @@ def test_the_key_of_a_file_narrows_a_measure(tmp_path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(text)
     problem = load(path)
-    assert problem.objective == with_alternating_loads(load(FOUR)).objective
+    assert problem.objective == with_loads(load(FOUR), alternating=True).objective
     path.write_text(text.replace("alternating = true", "alternating = true\norders = [0, 2]"))
     with pytest.raises(InputError, match="contains 0, which alternating leaves out"):
         load(path)

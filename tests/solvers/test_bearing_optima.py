@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import with_alternating_loads
+from laufruhe.problem.static_load import with_loads
 from laufruhe.report.json_result import as_dict
 from problem_files import MOUNTS
 from ready import solved
@@ -175,7 +175,7 @@ def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None
     assert result.final.value(measure) == pytest.approx(lost[1], rel=2e-4)
     with pytest.raises(InputError, match=r"objective\.alternating.*which includes the steady load; leave it out"):
         read(tmp_path, rubbing + WEBS + asked("mean friction power", "alternating = true"))
-    assert with_alternating_loads(alone).objective == alone.objective
+    assert with_loads(alone, alternating=True).objective == alone.objective
 
 
 @pytest.mark.slow

@@ -267,10 +267,6 @@ class AffineModel:
 
         Parameters
         ----------
-        measure
-            Measure of loads, masses or a constant number.
-        samples
-            Number of samples over the common period.
         averaged
             Whether the rows of a mean are averages over the step about each sample.
         peaks

@@ -18,8 +18,7 @@ from laufruhe.physics.crank_stars import Stars, StarSpace, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FORCE, SWAYING_COUPLE, Channel
-from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.measure import Term
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Phasing, Problem
 
 # relative factor of an order that counts as zero
@@ -38,8 +37,6 @@ class AmplitudeTerm:
 
     Attributes
     ----------
-    weight
-        Weight w.
     force, couple
         Factors f_h and c_h of every order.
     """
@@ -91,107 +88,64 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     Amplitudes suffice if all of the following hold. Equal throws cause all forces and couples, and only the star is
     open. Limits have the same value for all even stars. Every term is a root mean square, or has a single order, so
     that no phase between orders matters.
-
-    Parameters
-    ----------
-    problem
-        Problem of one of the stars.
-    phasing
-        Open crank star.
-    layout
-        Positions of the cylinders.
     """
     engine = problem.engine
     if problem.decisions or phasing.shafts.optional or not problem.objective:
         return None
     if any(rotor.role is not Role.THROW for rotor in engine.rotors):
         return None
-    single = _one_throw(engine, layout)
-    if single is None or not all(_is_amplitude(term) for term in problem.objective):
+    measures = [term.measure for term in problem.objective]
+    if any(m.channel not in _LEVERS for m in measures):
         return None
-    if not _limits_are_kept(problem, phasing, layout):
+    if not all(m.norm.is_euclidean or (m.orders is not None and len(m.orders) == 1) for m in measures):
         return None
-    x = layout.throw_positions[0]
-    points = tuple(replace(point, gas=None) for point in problem.points)
-    alone = evaluate(replace(problem, engine=single, points=points))
-    highest = max(len(shaking_loads(single, point, problem.fidelity).coefficients) for point in points)
-    highest = min(highest, max(orders_needed(p.rod_ratio, p.offset_ratio) for p in single.slider_cranks) + 1)
-    orders = _orders(problem, highest)
-    terms = tuple(_factors(term, alone, orders, abs(x)) for term in problem.objective)
-    used = [
-        k for k in range(len(orders))
-        if any(t.force[k] > NEGLIGIBLE * max(t.force) or t.couple[k] > NEGLIGIBLE * max(t.couple) for t in terms)
-    ]  # fmt: skip
-    return AmplitudeObjective(
-        tuple(orders[k] for k in used),
-        tuple(
-            AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms
-        ),
-    )
-
-
-def _limits_are_kept(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
-    # even stars have equal forces if they have equal numbers of throws on the steps
-    if not problem.limits:
-        return True
-    if (
-        any(_LEVERS.get(limit.measure.channel) != 0 for limit in problem.limits)
-        or len(even_patterns(phasing.cycle, layout)) > 1
-    ):
-        return False
-    evaluation = evaluate(problem)
-    return all(evaluation.value(limit.measure) <= limit.maximum for limit in problem.limits)
-
-
-def _is_amplitude(term: Term) -> bool:
-    q = term.measure
-    if q.channel not in _LEVERS:
-        return False
-    return q.norm.is_euclidean or (q.orders is not None and len(q.orders) == 1)
-
-
-def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
     places, pins = layout.throw_positions, layout.pins
-    if len(engine.slider_cranks) != len(pins):
+    if len(engine.slider_cranks) != len(pins) or places[0] == 0.0:
         return None
-    if places[0] == 0.0 or any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
+    if any(x != places[pin] for x, pin in zip(layout.positions, pins, strict=True)):
         return None
     cylinders = tuple(part for part, pin in zip(engine.slider_cranks, pins, strict=True) if pin == 0)
     if any(type(part) is not SliderCrank for part in cylinders):
         return None
-    return Engine(engine.name, engine.cycle, cylinders, tuple(rotor for rotor in engine.rotors if rotor.x == places[0]))
-
-
-def _orders(problem: Problem, highest: int) -> list[int]:
-    orders: set[int] = set()
-    for term in problem.objective:
-        counted = term.measure.orders
-        orders |= set(range(1, highest)) if counted is None else {int(h) for h in counted if h == int(h) and h > 0}
-    return sorted(orders)
-
-
-def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> AmplitudeTerm:
-    counted = term.measure.orders
-    values = []
-    for h in orders:
-        counts = counted is None or any(float(h) == order for order in counted)
-        values.append(alone.value(replace(term.measure, orders=(float(h),))) if counts else 0.0)
-    zeros = (0.0,) * len(orders)
-    if _LEVERS[term.measure.channel] == 0:
-        return AmplitudeTerm(term.weight, tuple(values), zeros)
-    return AmplitudeTerm(term.weight, zeros, tuple(v / x for v in values))
+    if problem.limits:
+        # even stars have equal forces if they have equal numbers of throws on the steps
+        is_of_forces = all(_LEVERS.get(limit.measure.channel) == 0 for limit in problem.limits)
+        if not is_of_forces or len(even_patterns(phasing.cycle, layout)) > 1:
+            return None
+        if evaluate(problem).violation(problem.limits) > 0.0:
+            return None
+    rotors = tuple(rotor for rotor in engine.rotors if rotor.x == places[0])
+    single = Engine(engine.name, engine.cycle, cylinders, rotors)
+    points = tuple(replace(point, gas=None) for point in problem.points)
+    alone = evaluate(replace(problem, engine=single, points=points))
+    highest = max(len(shaking_loads(single, point, problem.fidelity).coefficients) for point in points)
+    highest = min(highest, max(orders_needed(p.rod_ratio, p.offset_ratio) for p in single.slider_cranks) + 1)
+    all_orders = {float(h) for h in range(1, highest)}
+    by_measure = [
+        all_orders if m.orders is None else {h for h in m.orders if h == int(h) and h > 0} for m in measures
+    ]  # fmt: skip
+    orders = sorted(set().union(*by_measure))
+    terms = []
+    for term, counted in zip(problem.objective, by_measure, strict=True):
+        values = tuple(alone.value(replace(term.measure, orders=(h,))) if h in counted else 0.0 for h in orders)
+        zeros = (0.0,) * len(orders)
+        if _LEVERS[term.measure.channel] == 0:
+            terms.append(AmplitudeTerm(term.weight, values, zeros))
+        else:
+            terms.append(AmplitudeTerm(term.weight, zeros, tuple(value / abs(places[0]) for value in values)))
+    used = [
+        k for k in range(len(orders))
+        if any(t.force[k] > NEGLIGIBLE * max(t.force) or t.couple[k] > NEGLIGIBLE * max(t.couple) for t in terms)
+    ]  # fmt: skip
+    kept = [AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms]
+    return AmplitudeObjective(tuple(int(orders[k]) for k in used), tuple(kept))
 
 
 def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
     """Return dual vectors v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 for every term t (S4).
 
     Each gives a lower bound Re sum_h v_h C_h of the objective. Orders with a small weight stay at zero, which keeps
-    the bound valid.
-
-    Returns
-    -------
-    NDArray
-        Dual vectors, shape (directions, orders).
+    the bound valid. The result has the shape (directions, orders).
     """
     total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
     heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
@@ -210,12 +164,9 @@ def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
 
 def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
     """Yield sizes of v on the heavy orders; a term with several of them divides its unit between them."""
-    grid = [np.array(s) for s in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))] if len(heavy) > 1 else []
-    grid = (
-        [np.ones(len(heavy)), *grid]
-        if any(_orders_of(t, heavy) > 1 for t in objective.terms)
-        else [np.ones(len(heavy))]
-    )
+    grid = [np.ones(len(heavy))]
+    if any(np.count_nonzero(np.take(term.couple, heavy) > 0.0) > 1 for term in objective.terms):
+        grid += [np.array(shares) for shares in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))]
     for shares in grid:
         sizes = np.zeros(len(heavy))
         for term in objective.terms:
@@ -224,7 +175,3 @@ def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Arra
             length = float(np.sqrt((unit**2).sum()))
             sizes += term.weight * factors * (unit / length if length > 0.0 else unit)
         yield sizes
-
-
-def _orders_of(term: AmplitudeTerm, heavy: Sequence[int]) -> int:
-    return sum(1 for h in heavy if term.couple[h] > 0.0)

@@ -12,7 +12,6 @@ from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.isolated_cylinders import isolate_cylinder, only_gas_of
 from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, with_upright_angles
@@ -21,7 +20,8 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_stars import StarSpace
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, kinks_of, load_rows
+from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
 
@@ -36,16 +36,8 @@ class FiringModel(StarModel):
     Loads that do not depend on the firing order are those of the star. To loads inside the crankcase, the load of every
     cylinder is added, later by its slot.
 
-    Parameters
-    ----------
-    phasing
-        Open crank star and firing order.
-    space
-        Allowed firing orders, as stars of slots.
-    geometry
-        Bank angle and split pin [rad], or None each.
-    origin
-        Slot of every cylinder in the firing order from which moves are counted; the first of the space if None.
+    The parameters are those of `StarModel`: `space` has the allowed firing orders, as stars of slots, and `origin` the
+    slot of every cylinder in the firing order from which moves are counted.
     """
 
     def __init__(
@@ -58,11 +50,14 @@ class FiringModel(StarModel):
         layout, slots = phasing.layout(*geometry), space.first if origin is None else origin
         steps = firing_lattice(phasing.cycle, phasing.cylinders).steps
         cranks = StarSpace(steps, even_patterns(phasing.cycle, layout), layout.throw_positions)
-        star_phasing = replace(
-            phasing,
-            realise=lambda candidate: _without_inside(phasing.realise(candidate)),
-            firing_order=slot_order(slots),
-        )
+
+        def without_inside(candidate: Candidate) -> Problem:
+            problem = phasing.realise(candidate)
+            objective = tuple(term for term in problem.objective if _is_of_star(term.measure))
+            limits = tuple(limit for limit in problem.limits if _is_of_star(limit.measure))
+            return replace(problem, objective=objective, limits=limits)
+
+        star_phasing = replace(phasing, realise=without_inside, firing_order=slot_order(slots))
         super().__init__(star_phasing, cranks, geometry, slot_steps(phasing.cycle, slots))
         # loads that depend on the firing order have the period of the cycle
         self.base = phasing.cycle.base_order
@@ -73,37 +68,47 @@ class FiringModel(StarModel):
         self._slots, self._origin_evaluation = slots, evaluate(self.problem)
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
-        """Return the problem of all firing orders at `samples` steps over the cycle."""
-        stars, problem = super()._rows(samples, averaged), self.problem
-        step_of_slot = np.array(slot_steps(self.phasing.cycle, range(self.space.throws)))
+        # norms of the star in terms of slots, in the order of terms and limits
+        stars, steps = (
+            super()._rows(samples, averaged),
+            np.array(slot_steps(self.phasing.cycle, range(self.space.throws))),
+        )
+        star_norms = iter(
+            replace(
+                norm,
+                moves=norm.moves[:, steps],
+                slope_moves=None if norm.slope_moves is None else norm.slope_moves[:, steps],
+            )
+            for _, norm in (*stars.terms, *stars.limits)
+        )
         terms, limits = (
-            iter([_by_slot(norm, step_of_slot) for _, norm in pairs]) for pairs in (stars.terms, stars.limits)
+            tuple((number, self._norm(measure, samples, averaged, star_norms)) for number, measure in pairs)
+            for pairs in (
+                [(term.weight, term.measure) for term in self.problem.objective],
+                [(limit.maximum, limit.measure) for limit in self.problem.load_limits],
+            )
         )
-        return StarProblem(
-            tuple((term.weight, self._norm(term.measure, samples, averaged, terms)) for term in problem.objective),
-            tuple(
-                (limit.maximum, self._norm(limit.measure, samples, averaged, limits)) for limit in problem.load_limits
-            ),
-            self.domains,
-            samples,
-        )
+        return StarProblem(terms, limits, self.domains, samples)
 
     def _norm(self, measure: Measure, samples: int, averaged: bool, star_norms: Iterator[StarNorm]) -> StarNorm:
         """Return a measure in all firing orders; `star_norms` yields the norms of the stars, in order."""
         if not measure.is_inside:
             return next(star_norms)
         signals = [signal.with_base(self.base) for signal in self._origin_evaluation.signals(measure.load)]
-        steps = samples if averaged and measure.norm.averages else None
-        origin = load_rows(measure, self.problem.points, _averaged(signals, steps), self.problem.engine, samples)
         kinks, count = kinks_of(measure, signals, self.problem.engine), self.space.throws
+
+        def rows(signals: Sequence[Spectrum]) -> Rows:
+            if averaged and measure.norm.averages:
+                signals = [signal.averaged(signal.period / samples) for signal in signals]
+            return load_rows(measure, self.problem.points, signals, self.problem.engine, samples, kinks)
+
+        origin = rows(signals)
         moves = np.zeros((count, count, *origin.vectors.shape))
         for k in range(1, count):
             first = self._loads_of_cylinder(measure.load, k)
             for slot in range(count):
                 later = [signal.shift(Fraction(slot, count), slot * signal.period / count) for signal in first]
-                moves[k, slot] = load_rows(
-                    measure, self.problem.points, _averaged(later, steps), self.problem.engine, samples, kinks
-                ).vectors
+                moves[k, slot] = rows(later).vectors
             moves[k] -= moves[k, self._slots[k]].copy()
         if measure.load.depends_on_unbalances:
             star = next(star_norms)
@@ -132,20 +137,6 @@ class FiringModel(StarModel):
                 signal = signal + motored.mapped(np.negative)
             signals.append(signal.with_base(self.base))
         return signals
-
-
-def _averaged(signals: Sequence[Spectrum], steps: int | None) -> Sequence[Spectrum]:
-    return signals if steps is None else [signal.averaged(signal.period / steps) for signal in signals]
-
-
-def _by_slot(norm: StarNorm, steps: NDArray[np.int64]) -> StarNorm:
-    slope_moves = None if norm.slope_moves is None else norm.slope_moves[:, steps]
-    return replace(norm, moves=norm.moves[:, steps], slope_moves=slope_moves)
-
-
-def _without_inside(problem: Problem) -> Problem:
-    objective = tuple(term for term in problem.objective if _is_of_star(term.measure))
-    return replace(problem, objective=objective, limits=tuple(x for x in problem.limits if _is_of_star(x.measure)))
 
 
 def _is_of_star(measure: Measure) -> bool:

@@ -7,10 +7,10 @@ crankcase, because one cylinder may load the pins and bearings of another.
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.machine import Chambers, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine import Chambers, Engine, Rotor, SliderCrank
 from laufruhe.machine.facing import Facing
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics.gas_cycle import alike_under
@@ -28,22 +28,12 @@ def massless_copy(part: SliderCrank) -> SliderCrank:
 
 
 def isolate_cylinder(engine: Engine, k: int, keep_places: bool, part: SliderCrank | None = None) -> Engine:
-    """Return the engine reduced to cylinder k, without rotors.
+    """Return the engine reduced to cylinder k, or to `part` in its place, without rotors.
 
-    Parameters
-    ----------
-    engine
-        Engine with all cylinders.
-    k
-        Index of the cylinder.
-    keep_places
-        Whether the other cylinders stay as massless copies.
-    part
-        Cylinder to put in place of cylinder k; None for that of the engine.
+    The other cylinders stay as massless copies if `keep_places`.
     """
-    cylinders = engine.slider_cranks
-    active = cylinders[k] if part is None else part
-    with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(cylinders)]
+    active = engine.slider_cranks[k] if part is None else part
+    with_idle = [active if j == k else massless_copy(idle) for j, idle in enumerate(engine.slider_cranks)]
     return replace(engine, slider_cranks=tuple(with_idle) if keep_places else (active,), rotors=())
 
 
@@ -54,20 +44,22 @@ def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -
 
 
 def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
-    """Return the factors of cos(bank), of sin(bank) and of 1 in the loads of a cylinder.
-
-    Parameters
-    ----------
-    upright, across, upside
-        Load coefficients at the three bank angles of `BANK_SAMPLES`.
-    """
+    """Return the factors of cos(bank), sin(bank) and 1 in the loads of a cylinder, from those at `BANK_SAMPLES`."""
     constant = 0.5 * (upright + upside)
     return 0.5 * (upright - upside), across - constant, constant
 
 
 def only_gas_of(problem: Problem, name: str) -> Problem:
     """Return the problem with the gas of the named cylinder only."""
-    return replace(problem, points=tuple(_point_with_gas_of(point, name) for point in problem.points))
+    points = []
+    for point in problem.points:
+        gas = point.gas
+        if isinstance(gas, Chambers):
+            chambers = [replace(chamber, cylinders=(name,)) for chamber in gas.chambers if name in chamber.cylinders]
+            point = replace(point, gas=replace(gas, chambers=tuple(chambers)) if chambers else None)
+        # massless copies have no bore, so that other gas models do not act on them
+        points.append(point)
+    return replace(problem, points=tuple(points))
 
 
 def motored(problem: Problem) -> Problem:
@@ -80,21 +72,10 @@ def gas_distinguishes_cylinders(problem: Problem) -> bool:
     if not problem.depends_on_gas:
         return False
     gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
-    return len({tuple(_gas_key(gas, part) for gas in gases) for part in problem.engine.cylinders}) > 1
-
-
-def _gas_key(gas: GasModel, part: SliderCrank) -> Hashable:
-    # without rounding errors in the lead of a facing piston
-    facing = part.facing
-    if isinstance(facing, Facing):
-        part = replace(part, facing=replace(facing, ahead=round(facing.ahead, LEAD_DIGITS)))
-    return alike_under(gas, part)
-
-
-def _point_with_gas_of(point: OperatingPoint, name: str) -> OperatingPoint:
-    gas = point.gas
-    if not isinstance(gas, Chambers):
-        # massless copies have no bore, so that other gas models do not act on them
-        return point
-    chambers = tuple(replace(chamber, cylinders=(name,)) for chamber in gas.chambers if name in chamber.cylinders)
-    return replace(point, gas=replace(gas, chambers=chambers) if chambers else None)
+    alike = set()
+    for part in problem.engine.cylinders:
+        if isinstance(part.facing, Facing):
+            # without rounding errors in the lead of a facing piston
+            part = replace(part, facing=replace(part.facing, ahead=round(part.facing.ahead, LEAD_DIGITS)))
+        alike.add(tuple(alike_under(gas, part) for gas in gases))
+    return len(alike) > 1

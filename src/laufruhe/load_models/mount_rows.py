@@ -11,6 +11,7 @@ import numpy as np
 
 from laufruhe.load_models.mount_symbols import SymbolicResponse
 from laufruhe.load_models.symbolic_spectrum import cosines_and_sines
+from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels
@@ -27,8 +28,6 @@ class PointResponse:
 
     Attributes
     ----------
-    name, weight
-        Name and weight of the operating point.
     base
         Order of the common period.
     orders
@@ -37,8 +36,7 @@ class PointResponse:
         Mount forces and deflections of every order.
     """
 
-    name: str
-    weight: float
+    point: OperatingPoint
     base: float
     orders: Array
     response: SymbolicResponse
@@ -47,28 +45,14 @@ class PointResponse:
 def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure: Measure) -> tuple[Any, Grid]:
     """Return the rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
 
-    Rows are values at samples, or coefficients of orders for a root mean square (Parseval).
-
-    Parameters
-    ----------
-    points
-        Response at every operating point.
-    names
-        Names of the mounts, in the order of the response.
-    measure
-        Measure of mount forces or mount deflections.
-
-    Returns
-    -------
-    tuple
-        Rows as an expression of shape (k, 3), and their grid.
+    Rows are values at samples, or coefficients of orders for a root mean square (Parseval); their expression has the
+    shape (k, 3). `names` are those of the mounts, in the order of the response.
     """
-    chosen = [p for p in points if measure.points is None or p.name in measure.points]
+    chosen = [response for response in points if measure.includes_point(response.point)]
     mounts = measure.places(names)
-    total_weight = sum(point.weight for point in chosen)
+    total_weight = sum(response.point.weight for response in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
-    exact = measure.norm.is_euclidean
     # orders differ between points: all have the samples that the highest order needs
     highest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
     samples = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
@@ -76,7 +60,7 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
         signal = point.response.force if measure.channel is channels.MOUNT_FORCE else point.response.travel
         counted = np.flatnonzero(measure.counted(point.orders)).tolist()
         orders, (real, imaginary) = point.orders[counted], (part[:, counted] for part in signal)
-        if exact:
+        if measure.norm.is_euclidean:
             is_mean = orders == 0.0
             values, steps = ca.horzcat(real, imaginary), np.append(0.5 + 0.5 * is_mean, 0.5 - 0.5 * is_mean)
         else:
@@ -87,7 +71,7 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
             if measure.direction_weights is not None:
                 rows = rows @ ca.diag(ca.DM(list(measure.direction_weights)))
             blocks.append(rows)
-            weights += [*(point.weight / total_weight / len(mounts) * steps)]
+            weights += [*(point.point.weight / total_weight / len(mounts) * steps)]
     return ca.vertcat(*blocks), Grid(np.array(weights), samples, points=len(chosen))
 
 
@@ -96,12 +80,9 @@ def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> li
     pairs = []
     counted = [measure.orders] if measure.orders is None else [(order,) for order in measure.orders]
     for point in points:
-        if measure.points is not None and point.name not in measure.points:
-            continue
-        for orders in counted:
-            group = np.flatnonzero(
-                (point.orders > 0.0) & replace(measure, orders=orders).counted(point.orders)
-            ).tolist()
+        for orders in counted if measure.includes_point(point.point) else ():
+            is_counted = (point.orders > 0.0) & replace(measure, orders=orders).counted(point.orders)
+            group = np.flatnonzero(is_counted).tolist()
             if group:
                 forces = point.response.force, point.response.rigid_force
                 elastic, rigid = (sum(ca.sumsqr(part[:, group]) for part in parts) for parts in forces)

@@ -10,6 +10,7 @@ that places one throw after the other adds to the squares at each step.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,16 +51,9 @@ class PairTable:
         return total
 
     def increments(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """Return the increase of the squares, shape (n,), when one throw is added to partial stars.
+        """Return the increase of the squares, shape (n,), when one throw on `steps`, shape (n,), is added.
 
-        Parameters
-        ----------
-        stars
-            Steps of the throws before this one, shape (n, at least `throw`).
-        steps
-            Step of the throw in every star, shape (n,).
-        throw
-            Index of the throw.
+        `stars` has the steps of the throws before it, shape (n, at least `throw`).
         """
         total = self.linear[throw, steps]
         count = self.linear.shape[1]
@@ -85,13 +79,7 @@ def pair_table(norm: StarNorm) -> PairTable:
 
 @dataclass(frozen=True, eq=False)
 class PairObjective:
-    """Weighted sum of root mean squares, under limits on root mean squares.
-
-    Attributes
-    ----------
-    terms, limits
-        Pairs (weight, table) and (maximum, table).
-    """
+    """Weighted sum of root mean squares, pairs (weight, table), under limits, pairs (maximum, table)."""
 
     terms: tuple[tuple[float, PairTable], ...]
     limits: tuple[tuple[float, PairTable], ...]
@@ -120,8 +108,5 @@ class PairObjective:
 
     def lower_value(self, squares: Array) -> float:
         """Return a lower bound of the objective under rounding errors, from one row of squares, shape (tables,)."""
-        minimum = sum(
-            weight * float(np.sqrt(max(squares[k] - table.rounding, 0.0)))
-            for k, (weight, table) in enumerate(self.terms)
-        )
-        return float(minimum)
+        terms = zip(self.terms, squares, strict=False)
+        return sum(weight * math.sqrt(max(square - table.rounding, 0.0)) for (weight, table), square in terms)

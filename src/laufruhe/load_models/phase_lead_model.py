@@ -40,6 +40,12 @@ class LoadShare:
     bare: list[Spectrum]
     columns: list[list[Spectrum]]
 
+    def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
+        """Return the load with a change of every spectrum."""
+        return LoadShare(
+            [change(signal) for signal in self.bare], [[change(signal) for signal in column] for column in self.columns]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class PhaseLeadNorm:
@@ -47,8 +53,6 @@ class PhaseLeadNorm:
 
     Attributes
     ----------
-    norm
-        Norm of the rows at these leads.
     derivatives
         For each lead: derivative of the constant rows, shape (k, d), derivative of the slope, shape (k, d, n), and
         the part of the slope that its shaft causes, shape (k, d, n).
@@ -62,12 +66,7 @@ class PhaseLeadNorm:
 
 
 class PhaseLeadModel:
-    """Loads of an engine at any leads of its geared shafts.
-
-    Parameters
-    ----------
-    problem
-        Problem whose decisions are leads and unbalances.
+    """Loads of an engine at any leads of its geared shafts; the decisions of the problem are leads and unbalances.
 
     Attributes
     ----------
@@ -94,13 +93,15 @@ class PhaseLeadModel:
     def shares(self, measure: Measure) -> tuple[LoadShare, list[LoadShare]]:
         """Return the load of a measure from the fixed parts and from each shaft, over a common period."""
         if measure not in self._cache:
-            engine = self.problem.engine
-            shares = [_share(model.spectra(measure.load)) for model in (self._fixed, *self._shafts)]
+            shares = []
+            for model in (self._fixed, *self._shafts):
+                bare, columns = zip(*model.spectra(measure.load), strict=True)
+                shares.append(LoadShare(list(bare), [list(column) for column in zip(*columns, strict=True)]))
             signals = [signal for share in shares for column in (share.bare, *share.columns) for signal in column]
-            base = common_base([engine.cycle.base_order, *(signal.base for signal in signals)])
+            base = common_base([self.problem.engine.cycle.base_order, *(signal.base for signal in signals)])
             count = max(len(signal.with_finer_base(base).coefficients) for signal in signals)
             fixed, *shafts = (
-                _mapped(share, lambda signal: signal.with_finer_base(base).padded(count)) for share in shares
+                share.mapped(lambda signal: signal.with_finer_base(base).padded(count)) for share in shares
             )
             self._cache[measure] = fixed, shafts
         return self._cache[measure]
@@ -108,26 +109,23 @@ class PhaseLeadModel:
     def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
         """Return a measure at given leads, with derivatives in the leads.
 
-        Parameters
-        ----------
-        measure
-            Measure of loads or masses.
-        leads
-            Leads [rad], shape (leads,).
-        samples
-            Number of samples over the common period.
-        averaged
-            Whether the rows of a mean are averages over the step about each sample (P7).
+        The parameters are those of `at`.
         """
         if not measure.is_load:
             norm = self.base_model.norm(measure, samples)
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
             return PhaseLeadNorm(norm, (zeros,) * len(self.names))
         fixed, shafts = self.shares(measure)
-        changes = leads - self.start
-        shifted = [_shifted(share, float(change)) for share, change in zip(shafts, changes, strict=True)]
-        total = _sum(fixed, shifted)
-        kinks = kinks_of(measure, total.bare, self.problem.engine)
+        shifted = [
+            share.mapped(lambda signal, lead=lead: signal.shift(-lead / signal.period, -lead)) if lead else share
+            for share, lead in zip(shafts, (leads - self.start).tolist(), strict=True)
+        ]
+        bare = [reduce(add, signals) for signals in zip(fixed.bare, *(share.bare for share in shifted), strict=True)]
+        columns = [
+            [reduce(add, signals) for signals in zip(*parts, strict=True)]
+            for parts in zip(fixed.columns, *(share.columns for share in shifted), strict=True)
+        ]
+        kinks = kinks_of(measure, bare, self.problem.engine)
         averaged = averaged and measure.norm.averages
 
         def rows(signals: Sequence[Spectrum]) -> tuple[Grid, Array]:
@@ -136,19 +134,19 @@ class PhaseLeadModel:
             sampled = load_rows(measure, self.problem.points, signals, self.problem.engine, samples, kinks)
             return sampled.grid, sampled.vectors
 
-        grid, constant = rows(total.bare)
-        slope = _stacked([rows(column)[1] for column in total.columns], constant)
+        grid, constant = rows(bare)
+
+        def slope(columns: Sequence[Sequence[Spectrum]]) -> Array:
+            slopes = [rows(column)[1] for column in columns]
+            return np.stack(slopes, axis=-1) if slopes else np.zeros((*constant.shape, 0))
+
         derivatives = []
         for share in shifted:
-            derivative = _mapped(share, lambda signal: signal.derivative)
-            constant_derivative = rows(derivative.bare)[1]
-            slope_derivative, shaft_slope = (
-                _stacked([rows(column)[1] for column in part.columns], constant) for part in (derivative, share)
-            )
-            derivatives.append((constant_derivative, slope_derivative, shaft_slope))
-        steps = total.bare[0].period * np.arange(samples) / samples
+            derivative = share.mapped(lambda signal: signal.derivative)
+            derivatives.append((rows(derivative.bare)[1], slope(derivative.columns), slope(share.columns)))
+        steps = bare[0].period * np.arange(samples) / samples
         angles = np.array([np.concatenate([steps, kinks_of_signal]) for kinks_of_signal in kinks])
-        return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(derivatives), angles)
+        return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope(columns), grid), tuple(derivatives), angles)
 
     def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[PhaseLeadNorm, ...]]:
         """Return the problem in the unbalances at given leads, and its norms with derivatives, terms before limits.
@@ -199,31 +197,3 @@ def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> P
         for d in problem.unbalances
     ]
     return replace(problem, engine=replace(engine, slider_cranks=parts, rotors=rotors), decisions=tuple(decisions))
-
-
-def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> LoadShare:
-    by_column = zip(*(columns for _, columns in spectra), strict=True)
-    return LoadShare([bare for bare, _ in spectra], [list(column) for column in by_column])
-
-
-def _shifted(share: LoadShare, lead: float) -> LoadShare:
-    return _mapped(share, lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else share
-
-
-def _mapped(share: LoadShare, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
-    return LoadShare(
-        [change(signal) for signal in share.bare], [[change(signal) for signal in column] for column in share.columns]
-    )
-
-
-def _sum(fixed: LoadShare, shafts: Sequence[LoadShare]) -> LoadShare:
-    bare = [reduce(add, signals) for signals in zip(fixed.bare, *(share.bare for share in shafts), strict=True)]
-    columns = [
-        [reduce(add, signals) for signals in zip(*parts, strict=True)]
-        for parts in zip(fixed.columns, *(share.columns for share in shafts), strict=True)
-    ]
-    return LoadShare(bare, columns)
-
-
-def _stacked(columns: Sequence[Array], constant: Array) -> Array:
-    return np.stack(columns, axis=-1) if columns else np.zeros((*constant.shape, 0))

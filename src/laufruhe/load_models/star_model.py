@@ -19,7 +19,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.physics.crank_stars import StarSpace
-from laufruhe.problem.decision import Decision, Domain
+from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
@@ -35,8 +35,6 @@ class StarNorm:
 
     Attributes
     ----------
-    norm
-        Norm N.
     constant
         Rows V0 of the origin star, shape (k, d).
     moves
@@ -45,8 +43,6 @@ class StarNorm:
         Derivative B of the rows of the origin star, shape (k, d, n).
     slope_moves
         Change E of the derivative, shape (throws, steps, k, d, n); None if unbalances act alike in every star.
-    grid
-        Weights and order of the rows.
     """
 
     norm: Norm
@@ -59,33 +55,21 @@ class StarNorm:
     def at(self, star: Sequence[int]) -> AffineNorm:
         """Return the norm of one star, from the step of every throw."""
         indices = np.arange(len(star)), np.asarray(star, dtype=np.intp)
-        constant = _sum_with_zeros(self.constant, self.moves[indices])
-        slope = self.slope if self.slope_moves is None else _sum_with_zeros(self.slope, self.slope_moves[indices])
-        return AffineNorm(self.norm, constant, slope, self.grid)
 
+        def total(first: Array, changes: Array) -> Array:
+            # sums that are rounding errors become zero
+            moves = changes[indices]
+            sums = first + moves.sum(axis=0)
+            largest = np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim)))
+            return np.where(np.abs(sums) <= _ROUNDING * (np.abs(first).max(initial=0.0) + largest.sum()), 0.0, sums)
 
-def _sum_with_zeros(first: Array, moves: Array) -> Array:
-    # sums that are rounding errors become zero
-    total = first + moves.sum(axis=0)
-    scale = np.abs(first).max(initial=0.0) + np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim))).sum()
-    return np.where(np.abs(total) <= _ROUNDING * scale, 0.0, total)
+        slope = self.slope if self.slope_moves is None else total(self.slope, self.slope_moves)
+        return AffineNorm(self.norm, total(self.constant, self.moves), slope, self.grid)
 
 
 @dataclass(frozen=True, eq=False)
 class StarProblem:
-    """Problem of all stars at one number of samples.
-
-    Attributes
-    ----------
-    terms
-        Pairs (weight, norm) of the objective.
-    limits
-        Pairs (maximum, norm).
-    domains
-        Sets of the decisions.
-    samples
-        Number of samples over the common period.
-    """
+    """Problem of all stars at one number of samples over the common period, with pairs as those of `AffineProblem`."""
 
     terms: tuple[tuple[float, StarNorm], ...]
     limits: tuple[tuple[float, StarNorm], ...]
@@ -175,41 +159,27 @@ class StarModel:
         return self._cache[key]
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
-        complete, motored = self._full_model.at(samples, averaged), self._origin_motored.at(samples, averaged)
-        moved = {place: model.at(samples, averaged) for place, model in self._one_moved.items()}
-        return StarProblem(
-            self._norms(complete.terms, motored.terms, {place: problem.terms for place, problem in moved.items()}),
-            self._norms(complete.limits, motored.limits, {place: problem.limits for place, problem in moved.items()}),
-            self.domains,
-            samples,
+        problems = [model.at(samples, averaged) for model in self.models]
+        terms, limits = (
+            tuple((column[0][0], self._star_norm(*(norm for _, norm in column))) for column in zip(*pairs, strict=True))
+            for pairs in ([problem.terms for problem in problems], [problem.limits for problem in problems])
         )
+        return StarProblem(terms, limits, self.domains, samples)
 
-    def _norms(
-        self,
-        complete: tuple[tuple[float, AffineNorm], ...],
-        motored: tuple[tuple[float, AffineNorm], ...],
-        moved: dict[tuple[int, int], tuple[tuple[float, AffineNorm], ...]],
-    ) -> tuple[tuple[float, StarNorm], ...]:
-        star_norms = []
-        for number, ((weight, norm), (_, origin)) in enumerate(zip(complete, motored, strict=True)):
-            moved_norms = {place: norms[number][1] for place, norms in moved.items()}
-            moves = self._changes({place: other.constant for place, other in moved_norms.items()}, origin.constant)
-            # slopes mostly agree, which saves the memory for their changes
-            negligible = _SAME_SLOPE * np.abs(origin.slope).max(initial=0.0)
-            is_same = all(
-                np.abs(other.slope - origin.slope).max(initial=0.0) <= negligible for other in moved_norms.values()
-            )
-            slopes = {place: other.slope for place, other in moved_norms.items()}
-            slope_moves = None if is_same else self._changes(slopes, origin.slope)
-            star_norm = StarNorm(norm.norm, norm.constant, moves, norm.slope, slope_moves, norm.grid)
-            star_norms.append((weight, star_norm))
-        return tuple(star_norms)
+    def _star_norm(self, complete: AffineNorm, origin: AffineNorm, *moved: AffineNorm) -> StarNorm:
+        # norms of the models in the order of `models`
+        def changes(first: Array, rows: Sequence[Array]) -> Array:
+            total = np.zeros((self.space.throws, self.space.phases, *first.shape))
+            for place, moved_rows in zip(self._one_moved, rows, strict=True):
+                np.subtract(moved_rows, first, out=total[place])
+            return total
 
-    def _changes(self, rows: dict[tuple[int, int], Array], origin: Array) -> Array:
-        changes = np.zeros((self.space.throws, self.space.phases, *origin.shape))
-        for place, moved in rows.items():
-            np.subtract(moved, origin, out=changes[place])
-        return changes
+        moves = changes(origin.constant, [norm.constant for norm in moved])
+        # slopes mostly agree, which saves the memory for their changes
+        negligible = _SAME_SLOPE * np.abs(origin.slope).max(initial=0.0)
+        is_same = all(np.abs(norm.slope - origin.slope).max(initial=0.0) <= negligible for norm in moved)
+        slope_moves = None if is_same else changes(origin.slope, [norm.slope for norm in moved])
+        return StarNorm(complete.norm, complete.constant, moves, complete.slope, slope_moves, complete.grid)
 
 
 def with_upright_angles(problem: Problem) -> Problem:
@@ -217,22 +187,18 @@ def with_upright_angles(problem: Problem) -> Problem:
 
     Their set, a disc, is the same from every angle. Counted from upright, they act alike in every star.
     """
-    return replace(problem, decisions=tuple(_upright(decision) for decision in problem.decisions))
-
-
-def _upright(decision: Decision) -> Decision:
-    if not decision.rotor_drives:
-        return decision
-    gain = decision.rotor_drives[0].gain
-    if not decision.set.free_angle or gain == 0.0:
-        return decision
-    turn = gain / abs(gain)
-    turn = turn.conjugate() if decision.rotor_drives[0].mirrored else turn
-    drives = tuple(
-        replace(drive, gain=drive.gain * (turn if drive.mirrored else turn.conjugate()))
-        for drive in decision.rotor_drives
-    )
-    return replace(decision, drives=drives, start=decision.start * turn)
+    decisions = []
+    for decision in problem.decisions:
+        drives = decision.rotor_drives
+        if drives and decision.set.free_angle and drives[0].gain != 0.0:
+            turn = drives[0].gain / abs(drives[0].gain)
+            turn = turn.conjugate() if drives[0].mirrored else turn
+            turned = tuple(
+                replace(drive, gain=drive.gain * (turn if drive.mirrored else turn.conjugate())) for drive in drives
+            )
+            decision = replace(decision, drives=turned, start=decision.start * turn)
+        decisions.append(decision)
+    return replace(problem, decisions=tuple(decisions))
 
 
 def compress_rows(parts: Sequence[Array]) -> list[Array] | None:

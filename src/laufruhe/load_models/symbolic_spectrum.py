@@ -16,15 +16,7 @@ from laufruhe.numerics.spectrum import base_of
 
 @dataclass(frozen=True, eq=False)
 class SymbolicSpectrum:
-    """Spectrum of a signal whose coefficients are CasADi expressions.
-
-    Attributes
-    ----------
-    orders
-        Orders, shape (n,).
-    real, imaginary
-        Real and imaginary parts of the coefficients, expressions of shape (d, n).
-    """
+    """Spectrum of a signal with n orders whose coefficients are CasADi expressions, shape (d, n) for each part."""
 
     orders: Array
     real: Any

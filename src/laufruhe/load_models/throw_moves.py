@@ -52,24 +52,17 @@ class ThrowMoves:
         self.intervals = Intervals(max(intervals.minimum, min(MIN_INTERVAL, intervals.maximum)), intervals.maximum)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
         self._open_bank, self._open_split = phasing.is_geometry_open
-        self.size = len(self._throws) + self._open_bank + self._open_split
-        self.lower, self.upper = self._bounds()
-
-    def _bounds(self) -> tuple[Array, Array]:
-        low, high = [], []
-        start, phasing = self.start, self.phasing
-        for k in self._throws:
-            pair = phasing.throw_bounds[k] if phasing.throw_bounds else None
-            low.append(-MAX_DEVIATION if pair is None else pair[0] - start.throws[k])
-            high.append(MAX_DEVIATION if pair is None else pair[1] - start.throws[k])
+        ends = [(-MAX_DEVIATION, MAX_DEVIATION)] * len(self._throws)
+        if phasing.throw_bounds:
+            ends = [(low - x, high - x) for (low, high), x in zip(phasing.throw_bounds, start.throws, strict=True)]
         for is_open, bounds, initial in (
             (self._open_bank, phasing.bank, start.bank_angle),
             (self._open_split, phasing.split, start.split_pin),
         ):
             if is_open and bounds is not None and initial is not None:
-                low.append(bounds[0] - initial)
-                high.append(bounds[1] - initial)
-        return np.array(low), np.array(high)
+                ends.append((bounds[0] - initial, bounds[1] - initial))
+        self.size = len(ends)
+        self.lower, self.upper = np.array(ends).reshape(-1, 2).T
 
     def angles(self, x: Any) -> tuple[list[Any], Any, Any]:
         """Return the throws, bank angle and split pin [rad] at deviations x, shape (size,)."""
@@ -86,9 +79,8 @@ class ThrowMoves:
             first = first + 0.5 * (bank - start.bank_angle)
         if split is not None and start.split_pin is not None:
             first = first + 0.5 * (split - start.split_pin)
-        throws = [first] if not self.phasing.throw_bounds else []
-        throws += [start.throws[k] + x[j] for j, k in enumerate(self._throws)]
-        return throws, bank, split
+        moved = [start.throws[k] + x[j] for j, k in enumerate(self._throws)]
+        return moved if self.phasing.throw_bounds else [first, *moved], bank, split
 
     def candidate(self, x: Array) -> Candidate:
         """Return the crank at deviations x [rad], shape (size,)."""

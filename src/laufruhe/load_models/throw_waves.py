@@ -12,9 +12,11 @@ h + 1. An open split pin only shifts the load in time.
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import zip_longest
 
 import numpy as np
 
@@ -158,10 +160,11 @@ class ThrowWaves:
         )
         inside = any(measure.is_inside for measure in problem.measures)
         self.parts = [*self._cylinders(inside), *self._unbalances(rotor_throws, inside)]
-        self.rest = AffineModel(
-            replace(motored(problem), engine=isolate_rotors(engine, remaining, inside)), keep_all=True
-        )
-        self.times = self._kept_orders()
+        rest = replace(motored(problem), engine=isolate_rotors(engine, remaining, inside))
+        self.rest = AffineModel(rest, keep_all=True)
+        # unbalances on the throws turn in order 1
+        loads = [measure for measure in problem.measures if measure.is_load]
+        self.times = tuple(sorted({Fraction(1)}.union(*map(self._kept_orders, loads))))
         waves = sorted({wave for part in self.parts for wave, *_ in self._waves_of(part)})
         self.orders = np.array([[float(order) for order in wave] for wave in waves])
         self._place_of = {wave: place for place, wave in enumerate(waves)}
@@ -214,10 +217,6 @@ class ThrowWaves:
     def _is_averaged_peak(self, measure: Measure) -> bool:
         return uses_averages(self.problem, measure) and not measure.norm.averages
 
-    @property
-    def _loads(self) -> list[Measure]:
-        return [measure for measure in self.problem.measures if measure.is_load]
-
     def counted(self, measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
         """Return the counted orders of the load of a measure, for each operating point with a weight."""
         engine = self.problem.engine
@@ -228,29 +227,21 @@ class ThrowWaves:
             if share > 0.0
         ]
 
-    def _kept_orders(self) -> tuple[Fraction, ...]:
-        """Return the orders that each measure needs, so that higher ones have at most `share_left_out`."""
-        # unbalances on the throws turn in order 1
-        orders = {Fraction(1)}
-        for measure in self._loads:
-            squares: dict[Fraction, float] = {}
-            evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
-            for signal in (signal for evaluation in evaluations for signal in self.counted(measure, evaluation)):
-                sizes = np.square(np.abs(signal.coefficients)).reshape(len(signal.coefficients), -1).sum(axis=1)
-                for j in np.flatnonzero(sizes):
-                    order = int(j) * signal.base
-                    squares[order] = squares.get(order, 0.0) + float(sizes[j])
-            ordered = sorted(squares)
-            tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
-            low_share, high_share = self.share_left_out
-            high_share = high_share if measure.is_inside and not self._is_averaged_peak(measure) else low_share
-            shares = [
-                _TINY_SHARE if k < _LOWEST_ORDERS else low_share if k < _LOW_ORDERS else high_share
-                for k in range(len(ordered))
-            ]
-            remainders = zip(ordered, tail, shares, strict=True)
-            orders |= {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
-        return tuple(sorted(orders))
+    def _kept_orders(self, measure: Measure) -> set[Fraction]:
+        """Return the orders that a load needs, so that higher ones have at most `share_left_out`."""
+        squares: dict[Fraction, float] = defaultdict(float)
+        evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
+        for signal in (signal for evaluation in evaluations for signal in self.counted(measure, evaluation)):
+            sizes = np.square(np.abs(signal.coefficients)).reshape(len(signal.coefficients), -1).sum(axis=1)
+            for j in np.flatnonzero(sizes):
+                squares[int(j) * signal.base] += float(sizes[j])
+        ordered = sorted(squares)
+        tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
+        low_share, high_share = self.share_left_out
+        high_share = high_share if measure.is_inside and not self._is_averaged_peak(measure) else low_share
+        shares = [_TINY_SHARE] * _LOWEST_ORDERS + [low_share] * (_LOW_ORDERS - _LOWEST_ORDERS)
+        remainders = zip_longest(ordered, tail, shares[: len(ordered)], fillvalue=high_share)
+        return {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
 
     def left_out(self, measure: Measure, samples: int) -> float:
         """Return the largest change of a measure by the omitted orders, for throws at any angles [SI]."""
@@ -313,34 +304,23 @@ class ThrowWaves:
         times = np.array([float(order) for order in self.times])
         phases = np.exp(1j * times * part.ahead)[:, None, None]
         if measure.is_load:
-            by_bank = [evaluation.signals(measure.load) for evaluation in part.evaluations]
-            by_point = [
-                self._components([self._coefficients(signal) for signal in signals])
-                for signals in zip(*by_bank, strict=True)
-            ]
+            by_point = []
+            for signals in zip(*(evaluation.signals(measure.load) for evaluation in part.evaluations), strict=True):
+                by_bank = [np.array([signal.at(order) for order in times]) for signal in signals]
+                if len(by_bank) > 1:
+                    # coefficients of e^{-i b}, 1 and e^{i b} in the bank angle b
+                    a, b, constant = split_by_bank(*by_bank)
+                    by_bank = [0.5 * (a - 1j * b), constant, 0.5 * (a + 1j * b)]
+                by_point.append(by_bank)
             return [self._rows_of(measure, component, samples) * phases for component in zip(*by_point, strict=True)]
-        return [np.asarray((times == 1.0)[:, None, None] * phases * self._weights(measure, part))]
-
-    @staticmethod
-    def _components(by_bank: list[ComplexArray]) -> list[ComplexArray]:
-        # coefficients of e^{-i b}, 1 and e^{i b} in the bank angle b
-        if len(by_bank) == 1:
-            return by_bank
-        a, b, constant = split_by_bank(*by_bank)
-        return [0.5 * (a - 1j * b), constant, 0.5 * (a + 1j * b)]
-
-    def _weights(self, measure: Measure, part: MovingPart) -> ComplexArray:
-        engine = self.problem.engine
-        rows = [
+        real, imaginary = (
             mass_rows(
-                measure, [replace(r, unbalance=turn * part.unbalances.get(r.name, 0.0)) for r in engine.rotors]
+                measure,
+                [replace(r, unbalance=turn * part.unbalances.get(r.name, 0.0)) for r in self.problem.engine.rotors],
             ).vectors
             for turn in (1.0, 1.0j)
-        ]
-        return np.asarray(rows[0] - 1j * rows[1])
-
-    def _coefficients(self, signal: Spectrum) -> ComplexArray:
-        return np.array([signal.at(float(order)) for order in self.times])
+        )
+        return [np.asarray((times == 1.0)[:, None, None] * phases * (real - 1j * imaginary))]
 
     def _rows_of(self, measure: Measure, by_point: Sequence[ComplexArray], samples: int) -> ComplexArray:
         """Return rows of every order, shape (orders, k, d), from load coefficients at every operating point."""

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
-from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 from laufruhe.errors import Complaint, InputError, SolverError
@@ -32,9 +31,19 @@ class Cluster(Executor):
         if self._client.status in ("closing", "closed"):
             raise RuntimeError("the connection is closed")
         call, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
+
+        def copy_result(call: Any) -> None:
+            if not answer.set_running_or_notify_cancel():
+                return
+            try:
+                answer.set_result(call.result(PATIENCE))
+            except Exception as error:
+                is_its_own = call.status == "error"
+                answer.set_exception(error if is_its_own else CancelledError(str(error)))
+
         # cancelling the future cancels the call
         answer.add_done_callback(lambda done: call.cancel() if done.cancelled() else None)
-        call.add_done_callback(partial(_copy_result, answer))
+        call.add_done_callback(copy_result)
         return answer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
@@ -50,16 +59,6 @@ class Cluster(Executor):
     def gone(self) -> str:
         """Message for the loss of all workers."""
         return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
-
-
-def _copy_result(answer: Future[Any], call: Any) -> None:
-    if not answer.set_running_or_notify_cancel():
-        return
-    try:
-        answer.set_result(call.result(PATIENCE))
-    except Exception as error:
-        is_its_own = call.status == "error"
-        answer.set_exception(error if is_its_own else CancelledError(str(error)))
 
 
 @contextmanager

@@ -162,15 +162,14 @@ def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
     present = [kinks for kinks in parts if kinks is not None]
     if len(present) < 2:
         return present[0] if present else None
-    degrees = max(kinks.jumps.shape[1] for kinks in present)
-    jumps = [_pad(kinks.jumps, degrees) for kinks in present]
-    return merge_kinks(np.concatenate([kinks.angles for kinks in present]), np.concatenate(jumps))
-
-
-def _pad(jumps: Array, degrees: int) -> Array:
-    padded = np.zeros((len(jumps), degrees, *jumps.shape[2:]))
-    padded[:, : jumps.shape[1]] = jumps
-    return padded
+    jumps = np.zeros(
+        (sum(len(k.jumps) for k in present), max(k.jumps.shape[1] for k in present), *present[0].jumps.shape[2:])
+    )
+    start = 0
+    for kinks in present:
+        jumps[start : start + len(kinks.jumps), : kinks.jumps.shape[1]] = kinks.jumps
+        start += len(kinks.jumps)
+    return merge_kinks(np.concatenate([kinks.angles for kinks in present]), jumps)
 
 
 def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
@@ -191,16 +190,8 @@ def _left(angles: Array, jumps: Array) -> SignalKinks | None:
 def find_kinks(signal: Callable[[Array], Array], breaks: Array, period: float) -> SignalKinks | None:
     """Return the kinks of a periodic function; None if no derivative jumps.
 
-    Derivatives on both sides of a break are those of polynomials through values near it.
-
-    Parameters
-    ----------
-    signal
-        Function of angles (n,) [rad] that returns values (n, ...), smooth between the breaks.
-    breaks
-        Angles where a derivative may jump, shape (k,) [rad].
-    period
-        Period [rad].
+    Derivatives on both sides of a break are those of polynomials through values near it. The parameters are those of
+    `laufruhe.numerics.spectrum.spectrum_with_kinks`, with the period [rad].
     """
     places = _within(breaks, period)
     places = places[np.unique(np.round(places / SAME_ANGLE), return_index=True)[1]]

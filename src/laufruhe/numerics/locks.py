@@ -18,13 +18,13 @@ _OPEN_FILES: set[int] = set()
 """File handles of the folders that this process has locked."""
 
 
-def _let_go() -> None:
+def _close_all() -> None:
     while _OPEN_FILES:
         os.close(_OPEN_FILES.pop())
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
+    os.register_at_fork(after_in_child=_close_all)
 
 
 @contextmanager
@@ -40,19 +40,16 @@ def folder_lock(folder: Path, wait: bool = True) -> Iterator[bool | None]:
     handle = os.open(folder, os.O_RDONLY)
     _OPEN_FILES.add(handle)
     try:
-        yield _locked(handle, wait)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+            is_locked: bool | None = True
+        except BlockingIOError:
+            is_locked = False
+        except OSError:
+            # a file system without locks
+            is_locked = None
+        yield is_locked
     finally:
         if handle in _OPEN_FILES:
             _OPEN_FILES.discard(handle)
             os.close(handle)
-
-
-def _locked(handle: int, wait: bool) -> bool | None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        return False
-    except OSError:
-        # a file system without locks
-        return None
-    return True

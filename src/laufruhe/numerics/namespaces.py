@@ -6,41 +6,24 @@ Functions of `np` on symbols may be wrong without an error. CasADi is imported a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 
-class Maths(Protocol):
-    """Functions that a formula may call."""
+@dataclass(frozen=True)
+class Maths:
+    """Functions that a formula may call: sine, cosine, and a matrix from rows of scalars."""
 
-    def sin(self, x: Any, /) -> Any:
-        """Return the sine."""
-
-    def cos(self, x: Any, /) -> Any:
-        """Return the cosine."""
-
-    def matrix(self, rows: Sequence[Sequence[Any]], /) -> Any:
-        """Return a matrix from rows of scalars."""
+    sin: Callable[[Any], Any]
+    cos: Callable[[Any], Any]
+    matrix: Callable[[Sequence[Sequence[Any]]], Any]
 
 
-class _Numbers:
-    @staticmethod
-    def sin(x: Any, /) -> Any:
-        return np.sin(x)
-
-    @staticmethod
-    def cos(x: Any, /) -> Any:
-        return np.cos(x)
-
-    @staticmethod
-    def matrix(rows: Sequence[Sequence[Any]], /) -> Any:
-        return np.array(rows, dtype=float)
-
-
-NUMBERS: Maths = _Numbers()
+NUMBERS = Maths(np.sin, np.cos, lambda rows: np.array(rows, dtype=float))
 
 
 @cache
@@ -48,13 +31,4 @@ def symbols() -> Maths:
     """Return the namespace for CasADi's SX, MX and DM."""
     import casadi as ca
 
-    class Symbols:
-        sin = staticmethod(ca.sin)
-        cos = staticmethod(ca.cos)
-
-        @staticmethod
-        def matrix(rows: Sequence[Sequence[Any]], /) -> Any:
-            return ca.vertcat(*(ca.horzcat(*row) for row in rows))
-
-    namespace: Maths = Symbols()
-    return namespace
+    return Maths(ca.sin, ca.cos, lambda rows: ca.vertcat(*(ca.horzcat(*row) for row in rows)))

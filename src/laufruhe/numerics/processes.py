@@ -251,7 +251,11 @@ class Processes(Executor):
             if future.set_running_or_notify_cancel():
                 try:
                     child = self._start() if child is None else child
-                    is_answer, answer = _exchange(child, request)
+                    assert child.stdin is not None
+                    assert child.stdout is not None
+                    pickle.dump(request, child.stdin)
+                    child.stdin.flush()
+                    is_answer, answer = pickle.load(child.stdout)
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
                     self._end(child)
                     child = None
@@ -294,15 +298,6 @@ class Processes(Executor):
                         stream.close()
 
 
-def _exchange(child: _Child, request: bytes) -> tuple[bool, Any]:
-    assert child.stdin is not None
-    assert child.stdout is not None
-    pickle.dump(request, child.stdin)
-    child.stdin.flush()
-    is_answer, answer = pickle.load(child.stdout)
-    return bool(is_answer), answer
-
-
 def serve(parent: int) -> None:
     """Run calls from standard input and write their results to standard output, until the parent process ends."""
     _serve(parent, sys.stdin.buffer, os.fdopen(os.dup(1), "wb"))
@@ -315,19 +310,19 @@ def _serve(parent: int, requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     end_with_parent(parent)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, calls), daemon=True).start()
+
+    def listen() -> None:
+        # runs in its own thread, so that the end of the parent ends a running call too
+        while True:
+            try:
+                calls.put(pickle.load(requests))
+            except BaseException:
+                os._exit(1)
+
+    threading.Thread(target=listen, daemon=True).start()
     while True:
         answers.write(_answered(calls.get()))
         answers.flush()
-
-
-def _listen(requests: IO[bytes], calls: SimpleQueue[bytes]) -> None:
-    # runs in its own thread, so that the end of the parent ends a running call too
-    while True:
-        try:
-            calls.put(pickle.load(requests))
-        except BaseException:
-            os._exit(1)
 
 
 def _answered(call: bytes) -> bytes:

@@ -14,7 +14,6 @@ from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, S
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
-from importlib import import_module
 from itertools import count, islice, takewhile
 from pickle import PicklingError
 from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
@@ -93,24 +92,16 @@ def executor_for(maximum: int | None = None) -> Iterator[Executor]:
         yield processes
 
 
-def _import(*_: Callable[..., object], libraries: Sequence[str] = ()) -> None:
+def _import(*_: Callable[..., object]) -> None:
     # unpickling the arguments has imported their modules
-    for name in libraries:
-        import_module(name)
+    return
 
 
 @contextmanager
-def worker_pool(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Iterator[None]:
-    """Start processes for all searches in the block, and end them after it.
+def worker_pool(*works: Callable[..., object]) -> Iterator[None]:
+    """Start processes for all searches in the block, which will run these functions, and end them after it.
 
     No process is started if there is a current executor, or only one processor.
-
-    Parameters
-    ----------
-    works
-        Functions that the processes will run; their modules are imported at once.
-    libraries
-        Names of modules that these functions import late.
     """
     workers = processors()
     if _current.get() is not None or workers == 1:
@@ -120,7 +111,7 @@ def worker_pool(*works: Callable[..., object], libraries: Sequence[str] = ()) ->
     pool = Processes(workers, ForkedWorker.several(workers))
     try:
         for _ in range(workers):
-            pool.submit(_import, *works, libraries=libraries)
+            pool.submit(_import, *works)
         with working_on(pool):
             yield
     finally:
@@ -149,8 +140,6 @@ def unordered_map(
         Function of one piece, picklable.
     pieces
         Arguments, taken as workers become free.
-    executor
-        Executor that runs the calls.
     patient
         True to wait at the time limit (`laufruhe.numerics.budget`) for running pieces and to drop the others.
 
@@ -200,16 +189,8 @@ def unordered_map(
 def ordered_map(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
     """Return the results of work(piece) in the order of the pieces, up to the time limit.
 
-    The first pieces run here; their time decides whether processes are started for the others.
-
-    Parameters
-    ----------
-    work
-        Function of one piece, picklable.
-    pieces
-        Arguments.
-    what
-        Name of the pieces in progress reports.
+    The first pieces run here; their time decides whether processes are started for the others. `what` is the name of
+    the pieces in progress reports.
     """
     began, answers = time.process_time(), list[A]()
     for piece in until_time_limit(pieces):
@@ -276,9 +257,15 @@ class Speculation(Generic[T, A]):
 
     def prefetch(self, steps: Iterable[tuple[Hashable, T]]) -> None:
         """Submit likely next steps (key, step), the likeliest first, up to the number of free workers."""
-        executor = self._executor or self._workers()
-        if executor is None:
+        executor = self._executor = self._executor or current_executor()
+        if worker_count() == 1:
             return
+        if executor is None:
+            if time.perf_counter() - self._began <= self._worth:
+                return
+            executor = self._executor = self._processes = Processes()
+            # count starting processes as busy, so that no step waits for one
+            self._starting = [executor.submit(_import, self._work) for _ in range(worker_count(executor))]
         new = ((key, step) for key, step in steps if key not in self._pending)
         # without workers, and for steps that cannot be pickled, `result` computes the step
         with suppress(RuntimeError, OSError):
@@ -287,17 +274,6 @@ class Speculation(Generic[T, A]):
             for key, step in islice(new, max(free, 0)):
                 with suppress(PicklingError, AttributeError, TypeError):
                     self._pending[key] = executor.submit(_answer_of, time.time() + seconds_left(), self._work, step)
-
-    def _workers(self) -> Executor | None:
-        current = current_executor()
-        if worker_count() == 1 or (current is None and time.perf_counter() - self._began <= self._worth):
-            return None
-        if current is None:
-            current = self._processes = Processes()
-            # count starting processes as busy, so that no step waits for one
-            self._starting = [current.submit(_import, self._work) for _ in range(worker_count(current))]
-        self._executor = current
-        return current
 
     def result(self, key: Hashable, step: T) -> A:
         """Return the result of a step: the prefetched one of this key, else computed now."""
@@ -327,15 +303,7 @@ class Speculation(Generic[T, A]):
 
 @contextmanager
 def speculation(work: Callable[[T], A], worth: float = WORTH_PROCESSES) -> Iterator[Speculation[T, A]]:
-    """Yield a `Speculation` for one search; its processes end with the block.
-
-    Parameters
-    ----------
-    work
-        Function of one step, picklable.
-    worth
-        Time of the search after which processes are started [s].
-    """
+    """Yield a `Speculation` for one search; its processes start after `worth` seconds, and end with the block."""
     prefetched = Speculation(work, worth)
     try:
         yield prefetched

@@ -5,7 +5,7 @@ from __future__ import annotations
 from laufruhe.present.numbers import figure, share
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import static_part, with_alternating_loads
+from laufruhe.problem.static_load import static_part, with_loads
 
 
 def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
@@ -15,7 +15,7 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
         return ""
     unit = problem.objective_unit or ""
     static, alternating, total = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
-    if with_alternating_loads(problem).objective == problem.objective:
+    if with_loads(problem, alternating=True).objective == problem.objective:
         return f"The steady reaction to the mean torque, {static} alone, is left out; with it the objective is {total}."
     lead = f"The steady reaction to the mean torque alone makes {static}"
     if part.is_floor:

@@ -150,6 +150,8 @@ class Channel:
     span
         For distances of shafts: function of measure and two engines that returns (smallest, largest) values while the
         shafts move between their places in the two engines.
+    is_placing
+        True for distances of shafts.
     """
 
     name: str
@@ -170,11 +172,11 @@ class Channel:
     title: str = ""
     place: str = ""
     span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]] = lambda *_: ()
+    is_placing: bool = False
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_number: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
-    is_placing: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _KNOWN[self.name] = self
@@ -281,28 +283,11 @@ class NumberChannel(Channel):
 
 
 @dataclass(frozen=True, eq=False)
-class SizeChannel(NumberChannel):
-    """Number that depends on sizes alone, not on loads."""
-
-    depends_on_loads: bool = False
-
-
-@dataclass(frozen=True, eq=False)
 class MountChannel(NumberChannel):
     """Number of a block on its mounts."""
 
     needs: Need = Needs.ELASTIC
     is_mounting: ClassVar[bool] = True
-
-
-@dataclass(frozen=True, eq=False)
-class PlaceChannel(NumberChannel):
-    """Distance between places of balancer shafts."""
-
-    keys: tuple[str, ...] = ("of",)
-    depends_on_loads: bool = False
-    minimised: bool = False
-    is_placing: ClassVar[bool] = True
 
 
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
@@ -343,30 +328,20 @@ def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor
     """
 
     def signal(moving: Engine, loads: PointLoads) -> Spectrum:
-        spectrum = load(moving, loads.point, loads.fidelity)
-        if factor is None:
-            return spectrum
-        factors = factor(moving, loads.point)
-        columns = factors if factors.ndim > 1 else factors[:, None]
-        return spectrum.mapped(lambda values: values * columns)
+        spectrum, factors = load(moving, loads.point, loads.fidelity), channel.factors_of(moving, loads.point)
+        return spectrum if factors is None else spectrum.mapped(lambda values: values * factors)
 
     keys, needs, places = where
-    return LoadChannel(
+    channel = LoadChannel(
         name, unit, keys, needs, signal=crankcase_signal(name, signal), places=places, size_factors=factor
     )
-
-
-@dataclass(frozen=True, eq=False)
-class FlywheelChannel(NumberChannel):
-    """Number that is monotone in every number of the flywheel."""
-
-    depends_on_loads: bool = False
+    return channel
 
 
 def _of_wheel(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
     needs: Need = Needs.FLYWHEEL, depends_on_torque: bool = False,
-) -> FlywheelChannel:  # fmt: skip
+) -> NumberChannel:  # fmt: skip
     """Return the channel of a number of the flywheel: its largest value over the operating points that count."""
 
     def flywheel_value(measure: MeasureQuery, evaluation: EvaluatedDesign) -> FlywheelFunction:
@@ -379,9 +354,10 @@ def _of_wheel(
         # without a flywheel the turning inertia alone gives the speed variation
         return () if inertia is None else (flywheel_value(measure, evaluation)(wheel or Flywheel(inertia)),)
 
-    return FlywheelChannel(
-        name, unit, keys, needs, values=values, flywheel_value=flywheel_value, depends_on_torque=depends_on_torque
-    )
+    return NumberChannel(
+        name, unit, keys, needs, values=values, flywheel_value=flywheel_value, depends_on_torque=depends_on_torque,
+        depends_on_loads=False,
+    )  # fmt: skip
 
 
 _AT_POINTS = ("operating_points",)
@@ -525,10 +501,6 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
     )
 
 
-def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
-    return lambda loads: channel.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True))
-
-
 _ON_CRANK: PlaceSpec = (ON_BLOCK, Needs.UNCONDITIONAL, lambda _: ("crankshaft",))
 
 
@@ -536,23 +508,24 @@ def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> 
     return crank_torque(moving, point, fidelity).mapped(lambda values: values[:, None, None])
 
 
-def _side_forces(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    return bearings.piston_pin_forces(moving, point, fidelity).mapped(lambda values: values[..., 1:])
-
-
 def _of_places(
     name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
 ) -> Channel:
+    # distance between places of balancer shafts
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         return [lower for lower, _ in span(measure, evaluation.engine, evaluation.engine)]
 
-    return PlaceChannel(name, "m", sides=sides, values=values, span=span)
+    return NumberChannel(
+        name, "m", ("of",), sides=sides, minimised=False, depends_on_loads=False, values=values, span=span,
+        is_placing=True,
+    )  # fmt: skip
 
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 RESULTANT_MOUNT_FORCE = LoadChannel(
-    "resultant mount force", "N", needs=Needs.MOUNTS, signal=_summed(MOUNT_FORCE), is_block_load=True
-)
+    "resultant mount force", "N", needs=Needs.MOUNTS, is_block_load=True,
+    signal=lambda loads: MOUNT_FORCE.signal(loads).mapped(lambda values: values.sum(axis=1, keepdims=True)),
+)  # fmt: skip
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
 """Loads at mounts for which bounds over boxes of mount numbers exist."""
@@ -573,7 +546,10 @@ CRANK_PIN_FORCE = crankcase_channel("crank-pin force", "N", AT_EACH_CRANK_PIN, b
 CRANK_PIN_PRESSURE = crankcase_channel(
     "crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, bearings.pin_forces, bearings.crank_pin_factors
 )
-SIDE_FORCE = crankcase_channel("side force", "N", IN_EACH_CYLINDER, _side_forces)
+SIDE_FORCE = crankcase_channel(
+    "side force", "N", IN_EACH_CYLINDER,
+    lambda *at: bearings.piston_pin_forces(*at).mapped(lambda values: values[..., 1:]),
+)  # fmt: skip
 ROD_FORCE = crankcase_channel("rod force", "N", IN_EACH_CYLINDER, bearings.piston_pin_forces)
 FRICTION_POWER = replace(
     crankcase_channel("friction power", "W", OF_EACH_BEARING, bearings.main_bearing_forces, bearings.drag_factors),

@@ -139,35 +139,33 @@ class Numbers:
         if self.mounts:
             rows = iter(self.mounts)
             mounts = tuple(mount.mapped(lambda spring: mount_from_numbers(spring, next(rows))) for mount in base.mounts)
-        shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in base.geared})
+        shares = self._of_kind(Kind.SHARE.name)
         # a sum of changes may exceed a bound by a rounding error
-        geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in base.geared)
-        parts = list(base.slider_cranks)
+        geared = tuple(replace(g, share=min(max(g.share + shares.get(g.name, 0.0), 0.0), 1.0)) for g in base.geared)
+        parts, pistons = [], self._of_kind(Kind.PISTON.name)
         # the inertia deficit of a rod may be negative
         lower = {"rod_inertia_deficit": -math.inf}
-        for k, part in enumerate(parts):
-            pistons = {key: change for (kind, key), change in self.changes.items() if kind is Kind.PISTON}
+        for part in base.slider_cranks:
             moves = {mass: change for (name, mass), change in pistons.items() if name == part.name}
             masses = {mass: max(getattr(part, mass) + change, lower.get(mass, 0.0)) for mass, change in moves.items()}
-            parts[k] = replace(part, **masses) if masses else part
+            parts.append(replace(part, **masses) if masses else part)
         flywheel = base.flywheel and self.flywheel(base.flywheel)
         engine = replace(
             base, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
         )
         for extra in base.extras:
-            changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
-            engine = extra.move(engine, changes, base.slider_cranks)
-        leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
+            engine = extra.move(engine, self._of_kind(extra.name), base.slider_cranks)
+        leads = self._of_kind(Kind.LEAD.name)
         return with_leads(engine, leads) if leads else engine
 
     def flywheel(self, base: Flywheel) -> Flywheel:
         """Return a flywheel with these numbers."""
-        return base.moved(self._of_kind(Kind.FLYWHEEL, dict(enumerate(base.numbers))).values())
-
-    def _of_kind(self, kind: Kind, numbers: Mapping[Any, Any]) -> dict[Any, Any]:
+        changes = self._of_kind(Kind.FLYWHEEL.name)
         # numbers without a change may be None
-        changes = {key: change for (change_kind, key), change in self.changes.items() if change_kind is kind}
-        return {key: value + changes[key] if key in changes else value for key, value in numbers.items()}
+        return base.moved([x + changes[k] if k in changes else x for k, x in enumerate(base.numbers)])
+
+    def _of_kind(self, name: str) -> dict[Any, float]:
+        return {key: change for (kind, key), change in self.changes.items() if kind.name == name}
 
 
 class Drive(Protocol):
@@ -398,15 +396,7 @@ def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Seq
 
 @dataclass(frozen=True)
 class Domain:
-    """Columns of the decision vector that belong to one decision.
-
-    Attributes
-    ----------
-    decision
-        The decision.
-    start
-        Index of its first column.
-    """
+    """Columns of the decision vector that belong to one decision; `start` is the index of the first one."""
 
     decision: Decision
     start: int

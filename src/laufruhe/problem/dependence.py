@@ -21,12 +21,11 @@ class Dependence(StrEnum):
     """Dependence of a channel on open numbers of one kind while all others are fixed."""
 
     NONE = "none"
-    """Constant."""
     AFFINE = "affine"
     """Affine; a mass is a sum of lengths of affine vectors."""
     BIAFFINE = "affine while unbalances are fixed"
     BENT = "affine between bearings while unbalances are fixed"
-    """As BIAFFINE, with a kink where a rotor passes a bearing of its shaft (B4)."""
+    """Affine while unbalances are fixed, with a kink where a rotor passes a bearing of its shaft (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Affine in masses that follow from sizes, times a factor of each place that is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
@@ -40,20 +39,8 @@ class Dependence(StrEnum):
     UNKNOWN = "unknown"
 
 
-_LETTERS = {
-    "0": Dependence.NONE,
-    "a": Dependence.AFFINE,
-    "b": Dependence.BIAFFINE,
-    "v": Dependence.BENT,
-    "m": Dependence.MASSES,
-    ">": Dependence.SHIFT,
-    "w": Dependence.SWING,
-    "c": Dependence.CONVEX,
-    "+": Dependence.MONOTONE_UP,
-    "-": Dependence.MONOTONE_DOWN,
-    "s": Dependence.SMOOTH,
-    "?": Dependence.UNKNOWN,
-}
+# letters of the table, in the order of the class
+_LETTERS = dict(zip("0abvm>wc+-s?", Dependence, strict=True))
 _COLUMNS = (
     Kind.UNBALANCE, Kind.SHARE, Kind.PISTON, Kind.PLACE, Kind.SIZE, Kind.LEAD, Kind.STAR, Kind.STIFFNESS, Kind.MOUNT,
     Kind.FLYWHEEL,

@@ -36,12 +36,6 @@ class Evaluation(EvaluatedDesign):
 
     Attributes
     ----------
-    engine
-        The design.
-    fidelity
-        Fidelity of the model.
-    loads
-        Loads at every operating point.
     samples
         Number of samples over the cycle at which measures are taken.
     resonance
@@ -63,14 +57,8 @@ class Evaluation(EvaluatedDesign):
     def rows(self, measure: Measure, samples: int | None = None, kink_angles: Sequence[Array] | None = None) -> Rows:
         """Return the rows of a measure of loads or masses over the whole cycle.
 
-        Parameters
-        ----------
-        measure
-            Measure that is no number.
-        samples
-            Number of samples over the cycle; by default that of the evaluation.
-        kink_angles
-            Angles of kinks at each operating point [rad]; by default those of the signals.
+        `samples` is the number of samples over the cycle, by default that of the evaluation. `kink_angles` has the
+        angles of kinks at each operating point [rad], by default those of the signals.
         """
         if not measure.is_load:
             return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
@@ -183,14 +171,7 @@ def with_common_base(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectr
 def evaluate(problem: Problem, engine: Engine | None = None, samples: int | None = None) -> Evaluation:
     """Compute the loads of a design by the exact model.
 
-    Parameters
-    ----------
-    problem
-        Operating points and fidelity.
-    engine
-        Design; by default that of the problem as given.
-    samples
-        Number of samples over the cycle at which measures are taken; by default that of the fidelity.
+    By default the design is that of the problem as given, and `samples` over the cycle are those of the fidelity.
 
     Raises
     ------

@@ -26,8 +26,6 @@ class PointLoads:
     moving
         Engine whose slider-cranks and rotors make these loads, for loads inside the crankcase; None if the wrench alone
         is known.
-    fidelity
-        Fidelity of the model.
     """
 
     point: OperatingPoint

@@ -25,15 +25,7 @@ from laufruhe.problem.loads import MeasureQuery, PointLoads
 
 @dataclass(frozen=True)
 class Measure(MeasureQuery):
-    """A number of a design: a norm of a channel, narrowed by keys.
-
-    Attributes
-    ----------
-    channel
-        Quantity that is measured.
-    norm
-        Norm of a load over angles, places and operating points.
-    """
+    """A number of a design: a channel narrowed by keys, or the norm of a load over angles, places and points."""
 
     channel: Channel
     norm: Norm = MEAN
@@ -74,6 +66,13 @@ class Measure(MeasureQuery):
         if not isinstance(self.channel, LoadChannel):
             raise TypeError(f"{self.name} is no load")
         return self.channel
+
+    @property
+    def roles(self) -> tuple[Role, ...]:
+        """Roles of the rotors in a sum of masses."""
+        if not isinstance(self.channel, MassChannel):
+            raise TypeError(f"{self.name} is no mass")
+        return self.channel.roles
 
     @property
     def on_mounts(self) -> bool:
@@ -181,9 +180,8 @@ class Limit:
         if self.outside is not None:
             low, high = self.outside
             sides.append(max((low - value, low, "at most"), (value - high, high, "at least")))
-        return min(
-            ((slack / (abs(bound) or 1.0), bound, side) for slack, bound, side in sides), default=(math.inf, 0.0, "")
-        )
+        relative = ((slack / (abs(bound) or 1.0), bound, side) for slack, bound, side in sides)
+        return min(relative, default=(math.inf, 0.0, ""))
 
 
 Side: TypeAlias = tuple[Limit, str]
@@ -200,17 +198,7 @@ MEASURES: Mapping[str, tuple[Channel, Norm]] = {
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Vectors whose norm is a measure (P1).
-
-    Attributes
-    ----------
-    norm
-        Norm of the measure.
-    vectors
-        Rows, shape (k, d) [SI].
-    grid
-        Weights and grouping of the rows.
-    """
+    """Vectors whose norm is a measure, shape (k, d) [SI] (P1)."""
 
     norm: Norm
     vectors: Array
@@ -230,10 +218,6 @@ def load_rows(
 
     Parameters
     ----------
-    measure
-        Measure of a load.
-    points
-        Operating points.
     signals
         Signal of the channel at each operating point, shape (n, places, d), all with one base order.
     engine
@@ -296,21 +280,15 @@ def narrow_signal(measure: Measure, signal: Spectrum, engine: Engine) -> Spectru
     return signal.without_mean if measure.alternating else signal
 
 
-def _roles(measure: Measure) -> tuple[Role, ...]:
-    if not isinstance(measure.channel, MassChannel):
-        raise TypeError(f"{measure.name} is no mass")
-    return measure.channel.roles
-
-
 def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
     """Return the rotors whose masses a measure sums."""
-    roles = _roles(measure)
+    roles = measure.roles
     return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
 def counterweight_masses(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
     """Return the masses of the counterweights of mechanisms that a measure sums [kg]; none if it names rotors."""
-    counts = Role.COUNTERWEIGHT in _roles(measure) and measure.rotors is None
+    counts = Role.COUNTERWEIGHT in measure.roles and measure.rotors is None
     return [mass for part in parts if counts and (mass := part.counterweight_mass) is not None]
 
 

@@ -36,13 +36,7 @@ def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
 
     The objective of a balanced engine gives no scale, so the objectives of single parts are summed. If only some orders
     count, a small fraction of all orders is added, because each order is a sum over the cycle of the complete signal.
-
-    Parameters
-    ----------
-    problem
-        Objective, operating points and fidelity.
-    engine
-        Engine on its mounts; by default that of the problem as given.
+    The engine is by default that of the problem as given.
     """
     engine = problem.engine if engine is None else engine
     return _cached_zero(Problem("", "", engine, problem.points, objective=problem.objective, fidelity=problem.fidelity))
@@ -59,15 +53,12 @@ def _cached_zero(problem: Problem) -> float:
     # at even speed, because the effect of one part on the speed does not count
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
     total = _sum_of_parts(even)
-    all_orders = replace(
-        even,
-        objective=tuple(
-            replace(term, measure=term.measure.with_all_orders if term.measure.is_load else term.measure)
-            for term in even.objective
-        ),
+    all_orders = tuple(
+        replace(term, measure=term.measure.with_all_orders if term.measure.is_load else term.measure)
+        for term in even.objective
     )
-    if all_orders.objective != even.objective:
-        total += OF_ORDERS / ROUNDING * _sum_of_parts(all_orders)
+    if all_orders != even.objective:
+        total += OF_ORDERS / ROUNDING * _sum_of_parts(replace(even, objective=all_orders))
     for term in problem.objective:
         if term.measure.is_mass:
             moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)

@@ -136,12 +136,8 @@ class PhasingOf(Generic[P]):
 
     Attributes
     ----------
-    cycle
-        Two- or four-stroke.
     layout
         Function that returns the layout of a bank angle [rad] and a split pin angle [rad].
-    cylinders
-        Number of cylinders.
     throws
         Given throws [rad]; None if the star is open.
     throw_bounds
@@ -154,8 +150,6 @@ class PhasingOf(Generic[P]):
         Bounds of the firing intervals.
     steps
         Number of steps of a turn for throws; None for those of even firing.
-    shafts
-        Optional shafts.
     best
         Number of stars in the ranking.
     criteria
@@ -289,7 +283,7 @@ class PhasingOf(Generic[P]):
 
 
 def _multiples(step: float, bounds: tuple[float, float], offset: float) -> list[float]:
-    # values between bounds whose sums with `other` are multiples of a step
+    # values between bounds whose sums with `offset` are multiples of a step
     low = math.ceil((bounds[0] + offset) / step - 1e-9)
     high = math.floor((bounds[1] + offset) / step + 1e-9)
     return [m * step - offset for m in range(low, high + 1)]

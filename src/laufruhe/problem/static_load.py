@@ -38,7 +38,7 @@ class StaticPart:
 
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
     """Return the static part of the objective for loads on block and mounts, or None if it is negligible."""
-    with_means = with_mean_loads(problem)
+    with_means = with_loads(problem, alternating=False)
     counted = [term for term in with_means.objective if term.measure.includes_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
         return None
@@ -46,20 +46,11 @@ def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
     static = sum(term.weight * evaluation.value(replace(term.measure, orders=(0.0,))) for term in counted)
     if not static > NEGLIGIBLE * value:
         return None
-    return StaticPart(value, static, objective_value(with_alternating_loads(problem), evaluation))
+    return StaticPart(value, static, objective_value(with_loads(problem, alternating=True), evaluation))
 
 
-def with_alternating_loads(problem: Problem) -> Problem:
-    """Return the problem with an objective without the means of loads."""
-    return _with_loads(problem, True)
-
-
-def with_mean_loads(problem: Problem) -> Problem:
-    """Return the problem with an objective that includes the means of loads."""
-    return _with_loads(problem, False)
-
-
-def _with_loads(problem: Problem, alternating: bool) -> Problem:
+def with_loads(problem: Problem, alternating: bool) -> Problem:
+    """Return the problem with an objective without the means of loads if `alternating`, else with them."""
     terms = []
     for term in problem.objective:
         measure = replace(term.measure, alternating=False)

@@ -28,7 +28,7 @@ from laufruhe.files.study_tables import CaseTable
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import fixed, percent
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import with_alternating_loads
+from laufruhe.problem.static_load import with_loads
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.text import DASH, Text, marked_table, number, statement_table
@@ -158,7 +158,7 @@ class Economics(Part):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the front of one engine."""
         problem = scenes.problem(point)
-        problem = with_alternating_loads(problem) if self.alternating else problem
+        problem = with_loads(problem, alternating=True) if self.alternating else problem
         try:
             points = front(problem, self.mass_limits)
         except SolverError as error:

@@ -35,7 +35,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import with_alternating_loads, with_mean_loads
+from laufruhe.problem.static_load import with_loads
 from laufruhe.solvers import solve
 from laufruhe.studies.scenes import shafts_of
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
@@ -76,10 +76,9 @@ def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
     mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
     price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
     bound, gap = (proof.lower_bound, proof.gap) if proof else (value, 0.0)
-    counterpart_problem = with_alternating_loads(problem)
-    counterpart_problem = (
-        with_mean_loads(problem) if counterpart_problem.objective == problem.objective else counterpart_problem
-    )
+    counterpart_problem = with_loads(problem, alternating=True)
+    if counterpart_problem.objective == problem.objective:
+        counterpart_problem = with_loads(problem, alternating=False)
     return FrontPoint(value, bound, gap, mass, price, objective_value(counterpart_problem, result.final))
 
 

@@ -16,8 +16,8 @@ from laufruhe.problem.channels import (
     IN_EACH_CYLINDER,
     Need,
     Needs,
+    NumberChannel,
     PlaceSpec,
-    SizeChannel,
     crankcase_channel,
     names_of_cylinders,
 )
@@ -38,13 +38,13 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spect
 
 def _size_channel(
     name: str, unit: str, needs: Need, sides: tuple[str, ...], size_value: Callable[[Engine], float]
-) -> SizeChannel:
+) -> NumberChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         return (size_value(evaluation.engine),)
 
     minimised = sides == ("max",)
-    return SizeChannel(
-        name, unit, (), needs, sides=sides, minimised=minimised, values=values, size_value=size_value
+    return NumberChannel(
+        name, unit, (), needs, sides, minimised, depends_on_loads=False, values=values, size_value=size_value
     )  # fmt: skip
 
 

@@ -55,14 +55,6 @@ class Maximum(Norm):
         """Return sum_k |z_k|."""
         return float(lengths(z).sum())
 
-    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return Z: the longest row alone gives a poor bound where several rows are as long."""
-        return z
-
-    def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Return the dual rows at their angles, with zeros at the angles between."""
-        return in_place(z, steps, times)
-
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the largest length."""
         return np.asarray(lengths.max(axis=-1))
@@ -107,11 +99,3 @@ class Maximum(Norm):
                     float((np.maximum(maximum, kink_lengths) - np.maximum(minimum, kink_lengths)).max(initial=0.0))
                 )
         return max(errors) + max(curvatures)
-
-
-def in_place(z: Array, steps: int, times: int) -> Array:
-    """Return dual rows on a finer grid, with zeros at the angles between."""
-    blocks = z.reshape(-1, steps, z.shape[-1])
-    placed = np.zeros((len(blocks), steps * times, z.shape[-1]))
-    placed[:, ::times] = blocks
-    return placed.reshape(-1, z.shape[-1])

@@ -229,13 +229,25 @@ class Norm(ABC):
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Return dual rows, shape (k, d), for a lower bound at a design with rows V (P6).
 
-        They point along V where this gives a bound at least as good as the solver's Z; elsewhere they are those of Z.
+        They point along V where this gives a bound at least as good as the solver's Z; elsewhere they are those of Z,
+        as by default everywhere.
         """
-        raise self._unclaimed("dual norm")
+        return z
 
     def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Return dual rows on a grid `times` as fine, from Z at `steps` samples of each signal (P6)."""
-        return between(z, steps, times)
+        """Return dual rows on a grid `times` as fine, from Z at `steps` samples of each signal (P6).
+
+        Between the samples they are linear, or zero if single rows determine the norm.
+        """
+        blocks = z.reshape(-1, steps, z.shape[-1])
+        if self.is_largest or self.is_diameter:
+            placed = np.zeros((len(blocks), steps * times, z.shape[-1]))
+            placed[:, ::times] = blocks
+            return placed.reshape(-1, z.shape[-1])
+        share = np.arange(times) / times
+        next_blocks = np.roll(blocks, -1, axis=1)
+        mixed = blocks[:, :, None] * (1.0 - share[:, None]) + next_blocks[:, :, None] * share[:, None]
+        return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
         """Return the norm of each design from its row lengths, shape (..., k) to (...); overwrites the lengths.
@@ -300,27 +312,11 @@ class Norm(ABC):
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Return an upper bound of the sampling error of the norm at `steps` samples over a period (F7, F8).
 
-        Parameters
-        ----------
-        signals
-            Signal at each operating point, shape (n, places, d).
-        shares
-            Weight of each operating point, shape (points,).
-        finest
-            Smallest number of samples with which the coarse samples are compared.
+        The coarse samples are compared with at least `finest` samples; signals and shares are those of `upper_bound`.
         """
 
     def _unclaimed(self, what: str) -> TypeError:
         return TypeError(f"norm '{self.name}' has no {what}, which a method needs; implement it in its class")
-
-
-def between(z: Array, steps: int, times: int) -> Array:
-    """Interpolate dual rows at `steps` samples of each signal linearly to a grid `times` as fine."""
-    blocks = z.reshape(-1, steps, z.shape[-1])
-    share = np.arange(times) / times
-    next_blocks = np.roll(blocks, -1, axis=1)
-    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + next_blocks[:, :, None] * share[:, None]
-    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
 
 def lengths(rows: Array) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.enclosing_ball import enclosing_balls
-from laufruhe.numerics.norms.maximum import in_place
+from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.norm import (  # fmt: skip
     LONGEST_TOL,
     MAX_KINKS,
@@ -25,7 +25,6 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     Grid,
     Norm,
     Subdifferential,
-    amplitudes,
     curvature,
     lengths,
     softened_lengths,
@@ -105,14 +104,6 @@ class PeakToPeak(Norm):
         blocks = z.reshape(-1, grid.steps, z.shape[-1])
         return np.asarray(blocks - blocks.mean(axis=1, keepdims=True)).reshape(z.shape)
 
-    def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return Z: one ball alone gives a poor bound where several are as large."""
-        return z
-
-    def refined_dual(self, z: Array, steps: int, times: int) -> Array:
-        """Return the dual rows at their angles, with zeros at the angles between."""
-        return in_place(z, steps, times)
-
     def cones(self, grid: Grid) -> Cones:
         """Return one head for all rows, with a free centre for each signal."""
         count = len(grid.weights)
@@ -120,11 +111,9 @@ class PeakToPeak(Norm):
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return twice an epigraph variable of the radii of all enclosing balls (E22)."""
-        return 2.0 * unit * self._radius(program, grid, rows / unit, share)
-
-    def _radius(self, program: EpigraphProgram, grid: Grid, rows: Any, share: Any) -> Any:
         import casadi as ca
 
+        rows = rows / unit
         signals = [rows[k : k + grid.steps, :] for k in range(0, rows.shape[0], grid.steps)]
         middles = [ca.sum1(signal) / grid.steps for signal in signals]
         reach = [
@@ -134,12 +123,11 @@ class PeakToPeak(Norm):
         for signal, middle in zip(signals, middles, strict=True):
             centre = program.free(middle)
             program.hold(softened_lengths(signal - ca.repmat(centre, grid.steps, 1), share) - top)
-        return top
+        return 2.0 * unit * top
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return twice the sum of the amplitudes of all orders but zero."""
-        counted = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
-        return max((_swing(signal) for signal in counted), default=0.0)
+        return 2.0 * Maximum().upper_bound([signal.without_mean for signal in signals], shares)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
@@ -180,11 +168,6 @@ def _shares_of(directions: Array) -> Array | None:
     shares, _, rank, _ = np.linalg.lstsq(system, right, rcond=SAME_WAY)
     near = np.abs(system @ shares - right).max() <= SAME_WAY and shares.min() >= -SAME_WAY
     return np.maximum(shares, 0.0) if near and rank == len(directions) else None
-
-
-def _swing(signal: Spectrum) -> float:
-    alternating = signal.with_coefficients(np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
-    return 2.0 * float(amplitudes(alternating).max(initial=0.0))
 
 
 def _reach(steps: Array, kink_values: Array) -> float:

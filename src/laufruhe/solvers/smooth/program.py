@@ -200,7 +200,7 @@ class SmoothProgram:
         # E4
         wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
-            PointResponse(point.name, point.weight, wrench.base, wrench.orders,
+            PointResponse(point, wrench.base, wrench.orders,
                    response(self._mounts, wrench.orders * point.speed, wrench.real, wrench.imaginary))
             for point, wrench in zip(self.problem.points, self._loads.wrenches(wrench_map), strict=True)
         ]  # fmt: skip
