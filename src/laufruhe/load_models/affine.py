@@ -169,8 +169,6 @@ class AffineModel:
 
     Parameters
     ----------
-    problem
-        Problem whose unbalances and masses are decided.
     keep_all
         Whether rows keep components that are zero, so that several models can be added up.
     whole_cycle
@@ -304,17 +302,17 @@ class AffineModel:
         kinked = bare_signals if self.kink_model is None else self.kink_model.bare.signals(channel)
         kinks = kinks_of(measure, [signal.with_base(base) for signal in kinked], self.problem.engine)
 
-        def rows(signals: Sequence[Spectrum]) -> Rows:
+        def sampled(signals: Sequence[Spectrum]) -> Rows:
             period = [signal.with_base(base) for signal in signals]
             if parts:
                 period = [signal.averaged(signal.period / (parts * samples)) for signal in period]
             return load_rows(measure, self.problem.points, period, self.problem.engine, samples, kinks)
 
-        bare = rows(bare_signals)
+        bare = sampled(bare_signals)
         if bare.vectors.size * len(self._changes) > MAX_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        return _stacked(bare, [rows(column).vectors for column in column_signals], self._keep_all)
+        return _stacked(bare, [sampled(column).vectors for column in column_signals], self._keep_all)
 
 
 class _Change(NamedTuple):

@@ -58,8 +58,6 @@ class AmplitudeObjective:
 
         Parameters
         ----------
-        space
-            Steps and positions of the throws.
         stars
             Step of every throw, shape (n, throws).
         maximum

@@ -34,8 +34,6 @@ class BatchNorm:
     ----------
     rows
         Matrix R, shape (components, features, k); the features f of a design have the shape (features,).
-    grid
-        Weights and grouping of the k rows.
     """
 
     norm: Norm
@@ -141,8 +139,6 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
 
     Parameters
     ----------
-    problem
-        Problem with open unbalances.
     prune
         Whether samples that repeat within the cycle, and components that are zero, are left out to save time.
 

@@ -30,8 +30,6 @@ class PointResponse:
     ----------
     base
         Order of the common period.
-    orders
-        Orders, shape (n,).
     response
         Mount forces and deflections of every order.
     """

@@ -175,8 +175,6 @@ def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -
 
     Parameters
     ----------
-    mounts
-        Matrices of the mounts.
     omegas
         Angular frequencies [rad/s], shape (n,).
     real, imaginary

@@ -40,6 +40,10 @@ class LoadShare:
     bare: list[Spectrum]
     columns: list[list[Spectrum]]
 
+    def earlier(self, lead: float) -> LoadShare:
+        """Return the load that comes earlier by a lead [rad]."""
+        return self.mapped(lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else self
+
     def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
         """Return the load with a change of every spectrum."""
         return LoadShare(
@@ -116,10 +120,7 @@ class PhaseLeadModel:
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
             return PhaseLeadNorm(norm, (zeros,) * len(self.names))
         fixed, shafts = self.shares(measure)
-        shifted = [
-            share.mapped(lambda signal, lead=lead: signal.shift(-lead / signal.period, -lead)) if lead else share
-            for share, lead in zip(shafts, (leads - self.start).tolist(), strict=True)
-        ]
+        shifted = [share.earlier(lead) for share, lead in zip(shafts, (leads - self.start).tolist(), strict=True)]
         bare = [reduce(add, signals) for signals in zip(fixed.bare, *(share.bare for share in shifted), strict=True)]
         columns = [
             [reduce(add, signals) for signals in zip(*parts, strict=True)]
@@ -153,8 +154,6 @@ class PhaseLeadModel:
 
         Parameters
         ----------
-        leads
-            Leads [rad], shape (leads,).
         samples
             Number of samples over the common period.
         averaged

@@ -55,8 +55,6 @@ def peaks_of(problem: Problem, step_factor: int, is_coarse: bool = False) -> Pea
 
     Parameters
     ----------
-    problem
-        Problem with open mounts.
     step_factor
         Time step over that of the final evaluation.
     is_coarse

@@ -97,10 +97,6 @@ class StarModel:
 
     Parameters
     ----------
-    phasing
-        Open crank star.
-    space
-        Allowed stars.
     geometry
         Bank angle and split pin [rad], or None each.
     origin

@@ -32,12 +32,8 @@ class ThrowMoves:
     ----------
     phasing
         Open crank star with the bounds of its angles.
-    layout
-        Layout of the cylinders.
     start
         Star with firing order from which deviations are counted.
-    intervals
-        Allowed firing intervals [rad].
 
     Attributes
     ----------

@@ -16,7 +16,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import zip_longest
 
 import numpy as np
 
@@ -127,8 +126,6 @@ class ThrowWaves:
     ----------
     problem
         Problem of a crank with its throws at any angles. No open unbalance turns with a throw.
-    layout
-        Layout of the cylinders.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
     is_geometry_open
@@ -239,27 +236,28 @@ class ThrowWaves:
         tail = np.cumsum([squares[order] for order in ordered[::-1]])[::-1]
         low_share, high_share = self.share_left_out
         high_share = high_share if measure.is_inside and not self._is_averaged_peak(measure) else low_share
-        shares = [_TINY_SHARE] * _LOWEST_ORDERS + [low_share] * (_LOW_ORDERS - _LOWEST_ORDERS)
-        remainders = zip_longest(ordered, tail, shares[: len(ordered)], fillvalue=high_share)
-        return {order for order, remainder, share in remainders if remainder > share**2 * tail[0]}
+        shares = np.full(len(ordered), high_share)
+        shares[:_LOW_ORDERS] = low_share
+        shares[:_LOWEST_ORDERS] = _TINY_SHARE
+        return {ordered[k] for k in np.flatnonzero(tail > shares**2 * tail[:1])}
 
     def left_out(self, measure: Measure, samples: int) -> float:
         """Return the largest change of a measure by the omitted orders, for throws at any angles [SI]."""
-        return sum(self._left_out(measure, part, samples) for part in self.parts) if measure.is_load else 0.0
-
-    def _left_out(self, measure: Measure, part: MovingPart, samples: int) -> float:
-        # |A cos b + B sin b + C| is no more than all three
-        signals = [self.counted(measure, evaluation) for evaluation in part.evaluations]
-        if len(signals) == 1:
-            return self.tail(measure, signals[0], samples)
         total = 0.0
-        for u, a, d in zip(*signals, strict=True):
-            constant = (u + d).mapped(lambda values: 0.5 * values)
-            leaning = (
-                (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values),
-                a + constant.mapped(np.negative),
-            )
-            total = max(total, sum(self.tail(measure, [signal], samples) for signal in (constant, *leaning)))
+        for part in self.parts if measure.is_load else ():
+            signals = [self.counted(measure, evaluation) for evaluation in part.evaluations]
+            if len(signals) == 1:
+                total += self.tail(measure, signals[0], samples)
+                continue
+            largest = 0.0
+            for u, a, d in zip(*signals, strict=True):
+                # |A cos b + B sin b + C| is no more than all three
+                constant = (u + d).mapped(lambda values: 0.5 * values)
+                cosine = (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values)
+                sine = a + constant.mapped(np.negative)
+                tails = [self.tail(measure, [signal], samples) for signal in (constant, cosine, sine)]
+                largest = max(largest, sum(tails))
+            total += largest
         return total
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
@@ -295,6 +293,7 @@ class ThrowWaves:
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
         for coefficients, part in zip(waves, self.parts, strict=True):
             if measure.is_load or (measure.is_mass and part.cylinder is None):
+                # for each wave in the bank angle, the rows of every order
                 rows = self._part_rows(measure, part, samples)
                 for wave, h, j in self._waves_of(part):
                     coefficients[self._place_of[wave]] += rows[j][h]

@@ -72,8 +72,6 @@ class UnevenModel:
     ----------
     problem
         Problem of the star from which a program starts, with its firing order.
-    layout
-        Layout of that star.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
     left_out

@@ -251,11 +251,7 @@ class Processes(Executor):
             if future.set_running_or_notify_cancel():
                 try:
                     child = self._start() if child is None else child
-                    assert child.stdin is not None
-                    assert child.stdout is not None
-                    pickle.dump(request, child.stdin)
-                    child.stdin.flush()
-                    is_answer, answer = pickle.load(child.stdout)
+                    is_answer, answer = _exchange(child, request)
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
                     self._end(child)
                     child = None
@@ -296,6 +292,15 @@ class Processes(Executor):
                 with suppress(OSError):
                     if stream is not None:
                         stream.close()
+
+
+def _exchange(child: _Child, request: bytes) -> tuple[bool, Any]:
+    assert child.stdin is not None
+    assert child.stdout is not None
+    pickle.dump(request, child.stdin)
+    child.stdin.flush()
+    is_answer, answer = pickle.load(child.stdout)
+    return is_answer, answer
 
 
 def serve(parent: int) -> None:

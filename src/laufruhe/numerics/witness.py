@@ -38,8 +38,6 @@ def check_bound(what: str, bound: float, value: float, zero_level: float = 0.0) 
 
     Parameters
     ----------
-    what
-        Name of the proof.
     bound, value
         Lower bound, and value of the design, in the same unit.
     zero_level

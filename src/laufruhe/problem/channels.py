@@ -121,8 +121,6 @@ class Channel:
         Part that the engine must have.
     sides
         Sides that a limit may have: "min", "max", "outside".
-    minimised
-        True if it may be an objective.
     depends_on_loads
         False if it certainly does not depend on the loads that excite the block.
     flywheel_value

@@ -53,10 +53,8 @@ class Field:
 
     Attributes
     ----------
-    name
-        Name in datasets.
-    words
-        Name in headings.
+    name, words
+        Name in datasets, and name in headings.
     unit
         SI unit; empty for a ratio.
     own_axes
@@ -85,14 +83,10 @@ class Fields:
 
     Attributes
     ----------
-    title
-        Title of the dataset.
     designs
         First common axis: the designs.
     rows
         Further common axes: those of the rows of a table.
-    fields
-        Quantities.
     """
 
     title: str
@@ -139,8 +133,6 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
 
     Parameters
     ----------
-    designs
-        Evaluated designs by name.
     steps
         Number of samples over the cycle.
     """

@@ -305,16 +305,10 @@ class Decision:
 
     Attributes
     ----------
-    name
-        Name in the problem file.
     unit
         SI unit; "" for a plain number such as a balance factor.
-    set
-        Set of allowed values.
     start
         Value in the design as given; complex, size x e^{i angle}, for an unbalance.
-    drives
-        Effects on numbers of the engine.
     """
 
     name: str

@@ -136,8 +136,6 @@ class PriorityLevel:
 
     Attributes
     ----------
-    terms
-        Terms of its weighted sum.
     within
         Fraction of its minimum by which objectives of lower priority may increase it.
     """
@@ -152,8 +150,6 @@ class Limit:
 
     Attributes
     ----------
-    name
-        Name in reports.
     maximum, minimum
         Largest and smallest allowed value [SI].
     outside

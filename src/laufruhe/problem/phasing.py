@@ -146,8 +146,6 @@ class PhasingOf(Generic[P]):
         Given order; None if it is open.
     bank, split
         Bounds [rad], equal for a given angle; None if the layout has none.
-    intervals
-        Bounds of the firing intervals.
     steps
         Number of steps of a turn for throws; None for those of even firing.
     best
@@ -156,8 +154,6 @@ class PhasingOf(Generic[P]):
         Criteria that rank firing orders, the most important first.
     time_limit
         Time limit of the search [s].
-    method
-        Method of the search.
     thorough
         True if throws are also searched by boxes, and with less unevenness than allowed to show its worth.
     realise
@@ -242,12 +238,6 @@ class PhasingOf(Generic[P]):
         ----------
         steps
             Angle of each throw in steps.
-        phases
-            Number of steps in one turn.
-        geometry
-            Bank angle and split pin angle [rad].
-        left_out
-            Names of optional shafts that are not built.
         """
         layout = self.layout(*geometry)
         order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)

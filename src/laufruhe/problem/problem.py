@@ -32,12 +32,6 @@ class Drawing:
 
     Attributes
     ----------
-    engine
-        Design with open numbers at their start.
-    points
-        Operating points.
-    decisions
-        Open numbers.
     mount_numbers
         Fourteen numbers of each elastic spring (E13).
     """
@@ -97,8 +91,6 @@ class Search:
         Largest number of start points, and seed of random ones.
     boxes
         Largest number of boxes in branch and bound; None lets the method choose.
-    proves
-        True if the result is to be proven.
     """
 
     starts: int = 16
@@ -151,28 +143,16 @@ class Problem:
 
     Attributes
     ----------
-    name
-        Name of the file, for results.
     title, source, assumptions
         Texts for the reader of a report.
     engine
         Design as given; open numbers have their start values.
-    points
-        Operating points.
     decisions
         Open numbers, unbalances before those of the mounts.
-    objective
-        Terms of the weighted sum that is minimised.
-    limits
-        Limits of measures.
-    fidelity
-        Fidelity of the model.
     tolerance
         Relative gap at which an optimum counts as proven.
     mount_numbers
         Numbers of elastic mounts as given: stiffness, loss factor, damping, position, turned angles (E13).
-    search
-        Settings of searches.
     phasing
         Open throws, firing order and shafts; None if these are fixed.
     extras

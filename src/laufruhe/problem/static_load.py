@@ -17,8 +17,6 @@ class StaticPart:
 
     Attributes
     ----------
-    whole
-        Objective for the complete loads [SI].
     static
         Objective for the means over the cycle [SI]. With `alternating` it does not sum to `whole`, because norms do
         not add.
