@@ -124,7 +124,7 @@ def turned_loads(
 
 def _turned(orders: Array, rows: ComplexArray, star: Any, bank: Any) -> SymbolicSpectrum:
     # load of a cylinder from its coefficients at the bank angles of `BANK_SAMPLES`, or at its own
-    by_bank: Sequence[ComplexArray] = split_by_bank(*rows) if len(rows) > 1 else rows
+    by_bank = split_by_bank(*rows) if len(rows) > 1 else tuple(rows)
     phases = ca.DM(orders).T * star
     cosine, sine = (ca.repmat(wave(phases), rows.shape[2], 1) for wave in (ca.cos, ca.sin))
     real, imaginary = _dm(by_bank[-1].real.T), _dm(by_bank[-1].imag.T)
