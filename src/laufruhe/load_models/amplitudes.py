@@ -135,8 +135,8 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
         k for k in range(len(orders))
         if any(t.force[k] > NEGLIGIBLE * max(t.force) or t.couple[k] > NEGLIGIBLE * max(t.couple) for t in terms)
     ]  # fmt: skip
-    kept = [AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms]
-    return AmplitudeObjective(tuple(int(orders[k]) for k in used), tuple(kept))
+    strong = [AmplitudeTerm(t.weight, tuple(t.force[k] for k in used), tuple(t.couple[k] for k in used)) for t in terms]
+    return AmplitudeObjective(tuple(int(orders[k]) for k in used), tuple(strong))
 
 
 def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
