@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+import math
+from itertools import chain
+
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank, Steam
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import OneChamber, pressure_at
-from laufruhe.physics.mechanism import mass_effects, rod_effects
+from laufruhe.physics.gas_loads import chamber_torque
+from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.physics.star_loads import square_of, star_loads
 
 
 def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:
     """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
-    return star_loads(engine, speed, lambda part: rod_effects(part, EXACT))
+    return star_loads(engine, speed, lambda part: effects_of(part, EXACT)[1])
 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:
@@ -29,6 +33,12 @@ def swept_rate(part: SliderCrank, angles: Array) -> Array:
     """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
     ratio = part.shaft.ratio
     return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
+
+
+def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Array:
+    """Torque of one cylinder's gas on the output at equal steps over the cycle from its firing [N m] (L5)."""
+    angles = cycle.angle * np.arange(samples) / samples
+    return np.sum([chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags], axis=0)
 
 
 def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:
@@ -70,9 +80,30 @@ def inertia_coefficients(
     Three arrays of one length: the coefficients that `reciprocating_loads` and
     `rod_inertia_loads` multiply by the phase and place of each cylinder (L2-L4, L7).
     """
-    effects = (*mass_effects(part, fidelity), *rod_effects(part, fidelity))
+    effects = chain(*effects_of(part, fidelity))
     found = [(effect.direction, effect.size * square_of(part, speed) * effect.series()) for effect in effects]
     out = np.zeros((3, max((len(series) for _, series in found), default=1)), dtype=complex)
     for direction, series in found:
         out[direction, : len(series)] += series
     return out[0], out[1], out[2]
+
+
+def mean_pressure_of(steam: Steam) -> float:
+    """Area of a diagram over its length [Pa], in closed form (G16)."""
+
+    def fallen(begin: float, end: float) -> float:
+        return ((begin + steam.clearance) / (end + steam.clearance)) ** steam.exponent if begin != end else 1.0
+
+    def work(begin: float, end: float) -> float:
+        if begin == end:
+            return 0.0
+        first, log = begin + steam.clearance, math.log((end + steam.clearance) / (begin + steam.clearance))
+        power = steam.exponent - 1.0
+        return first * (-math.expm1(-power * log) / power if power else log)
+
+    released = steam.admission * fallen(steam.cut_off, steam.release)
+    squeezed = steam.back_pressure * fallen(steam.compression, steam.lead)
+    out = steam.admission * (steam.cut_off + work(steam.cut_off, steam.release))
+    out += 0.5 * (released + steam.back_pressure) * (1.0 - steam.release)
+    back = steam.back_pressure * (1.0 - steam.compression - work(steam.compression, steam.lead))
+    return out - back - 0.5 * (squeezed + steam.admission) * steam.lead

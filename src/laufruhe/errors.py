@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import copyreg
 import math
 from dataclasses import dataclass
 from numbers import Integral
+from typing import Any
 
 
 def printed(text: str, maximum: int = 2000) -> str:
@@ -26,6 +28,10 @@ def counted(count: int, name: str) -> str:
 class LaufruheError(Exception):
     """Base of all errors that this package raises on purpose."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # an error of a worker process reaches its parent, whatever its class is made of
+        return copyreg.__newobj__, (type(self), *self.args), self.__dict__  # type: ignore[attr-defined]
+
 
 class ModelError(LaufruheError, ValueError):
     """Machine that cannot exist or cannot run as described; `where` is the key at fault, empty if unknown."""
@@ -44,9 +50,6 @@ class KeyedError(ModelError):
     def __init__(self, key: str, text: str, value: str = "") -> None:
         self.key, self.text, self.value = key, text, value
         super().__init__(f"{key}: {text}", f"engine.{key}")
-
-    def __reduce__(self) -> tuple[type[KeyedError], tuple[str, str, str]]:
-        return KeyedError, (self.key, self.text, self.value)
 
 
 @dataclass(frozen=True)
@@ -84,10 +87,6 @@ class InputError(LaufruheError, ValueError):
         self.complaints = complaints
         super().__init__("\n".join(f"{printed(source, 400)}: {complaint}" for complaint in complaints))
 
-    def __reduce__(self) -> tuple[type[InputError], tuple[str, tuple[Complaint, ...]]]:
-        # an error of a worker process has to reach its parent
-        return InputError, (self.source, self.complaints)
-
 
 class LaufruheWarning(UserWarning):
     """Warning about a valid result."""
@@ -118,10 +117,6 @@ class BoundError(LaufruheError, RuntimeError):
     def __init__(self, what: str, bound: float, value: float) -> None:
         self.what, self.bound, self.value = what, float(bound), float(value)
         super().__init__(f"a bound of {self.bound!r} contradicts a known design of {self.value!r} ({what}) [SI]")
-
-    def __reduce__(self) -> tuple[type[BoundError], tuple[str, float, float]]:
-        # an error of a worker process has to reach its parent
-        return BoundError, (self.what, self.bound, self.value)
 
 
 def refused(where: str, value: str, rule: str, remedy: str, source: object = "laufruhe") -> InputError:

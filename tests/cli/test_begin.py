@@ -84,7 +84,7 @@ def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cyli
     ("typed", "said", "count"),
     [
         # an odd number of cylinders in two banks, then an even one
-        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n", "a boxer needs an even number of cylinders", 4),
+        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n", "is no multiple of the 2 banks", 4),
         # no even firing of ten cylinders at 90 degrees, nothing in its place, then throws and an order that they allow
         ("\n\nvee\n\n10\n\n\n1-10-5-7-2-8-3-9-4-6\n\n\n45, 117, 333, 189, 261\n1-2-3-4-5-6-7-8-9-10\n\n\n\n\n\n\n",
          "cannot be even with these pins and banks", 10),

@@ -14,9 +14,9 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine import kinematics as slider_crank
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.uneven_speed import crank_motion
+from one_cylinder import gas_torque
 
 POINT = OperatingPoint("rated", tractor.SPEED, tractor.GAS)
 

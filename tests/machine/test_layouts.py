@@ -106,7 +106,7 @@ class TestPlaces:
     @pytest.mark.parametrize("count", [0, 1, 3, 5])
     def test_banks_need_pairs(self, count: int) -> None:
         for build_layout, name in ((lambda n: vee(n, 0.1, 1.0), "vee"), (lambda n: boxer(n, 0.1, 0.05), "boxer")):
-            with pytest.raises(ModelError, match=f"a {name} needs an even number of cylinders, got {count}"):
+            with pytest.raises(ModelError, match=f"is no multiple of the 2 banks of layout '{name}'"):
                 build_layout(count)
 
 

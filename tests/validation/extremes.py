@@ -20,7 +20,6 @@ from laufruhe.machine.layouts import Mechanism, boxer, build, inline, vee
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
-from laufruhe.physics.gas_loads import gas_torque
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads, shaking_loads
 from laufruhe.problem import channels
@@ -28,6 +27,7 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.sets import Sector
 from laufruhe.solvers import solve
 from many_digits import acceleration_orders
+from one_cylinder import gas_torque
 
 EPS = float(np.finfo(float).eps)
 

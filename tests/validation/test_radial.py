@@ -209,7 +209,7 @@ def test_gas_reaches_pins_and_walls_through_the_master_rod(five: Problem) -> Non
     gas = Seiliger(peak_pressure=60e5, imep=8e5)
     point = replace(five.points[0], gas=gas)
     light = replace(engine, slider_cranks=tuple(
-        part.only(dict.fromkeys(part.weightless, 0.0)) for part in engine.slider_cranks))  # fmt: skip
+        part.only({}) for part in engine.slider_cranks))  # fmt: skip
     pins, walls = pin_forces(light, point), piston_pin_forces(light, point)
     with mp.workdps(40):
         for phi in (0.4, 2.9, 7.7):

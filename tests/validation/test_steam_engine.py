@@ -41,7 +41,7 @@ def towards_crank(chambers: tuple[Chamber, ...], air: float, alpha: float) -> fl
 
 def _pressure(diagram: object, x: float, grows: bool) -> float:
     if isinstance(diagram, Pump):
-        return diagram.suction if grows else diagram.delivery
+        return diagram.admission if grows else diagram.back_pressure
     assert isinstance(diagram, Steam)
     c = diagram.clearance
     if grows:

@@ -14,7 +14,7 @@ from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
 from laufruhe.fidelity.knob import PART_SHARE, Knob, OmittedPart, Rungs, first_sufficient, omitted_part
 from laufruhe.fidelity.mount_knobs import MOUNT_KNOBS
 from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, RodModel
-from laufruhe.physics.mechanism import rod_effects
+from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.problem.problem import Problem
 
@@ -99,7 +99,7 @@ class _Rod(_SwitchedPart):
     whole: ClassVar = {"rod": "rigid"}
 
     def is_there(self, problem: Problem) -> bool:
-        return any(rod_effects(part, EXACT) for part in problem.engine.slider_cranks)
+        return any(effects_of(part, EXACT)[1] for part in problem.engine.slider_cranks)
 
     def describe(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return ["inertia of the rods beyond that of two masses"] if self.is_active(scale.problem, fidelity) else []

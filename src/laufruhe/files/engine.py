@@ -16,9 +16,9 @@ from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.files.rotors import CounterweightTable, check_factors
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
+from laufruhe.machine.engine import parts_with_leads
 from laufruhe.machine.facing import minimum_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Layout, LayoutInput, LayoutKind, Mechanism, Throw, even_throws, rod_of
-from laufruhe.machine.leads import parts_with_leads
 from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 

@@ -149,19 +149,9 @@ class ArticulatedCrank(SliderCrank):
         return sine, lib.sqrt((1.0 - sine) * (1.0 + sine))
 
     @property
-    def crank_pin_mass(self) -> float:
-        """Zero: the rod's share is at the knuckle pin [kg]."""
-        return 0.0
-
-    @property
     def master_bank(self) -> float:
         """Bank angle of the master's cylinder [rad]."""
         return self.knuckle.master.bank
-
-    def is_hinged_to(self, master: SliderCrank) -> bool:
-        """Return True for the cylinder of the master rod."""
-        place = master.shaft, master.x, master.bank
-        return not isinstance(master, ArticulatedCrank) and place == (self.shaft, self.x, self.master_bank)
 
     def on_pin(self, lib: Any, alpha: Any, force: Any, with_masses: bool) -> Any:
         """Return the force on the knuckle pin, with the inertia of the mass there (B11)."""

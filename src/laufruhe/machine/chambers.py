@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
-from typing import ClassVar, TypeAlias
+from typing import TypeAlias
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.gas import AMBIENT_PRESSURE, PressureTrace, Seiliger, Wiebe
+from laufruhe.machine.gas import AMBIENT_PRESSURE, PressureTrace, Seiliger, Wiebe, check_pressures
 from laufruhe.machine.slider_crank import SliderCrank
 
 ENDS: Mapping[str, int] = {"head": 1, "crank": -1}
@@ -37,11 +37,6 @@ class Steam:
         Volume that is left at the dead centre, over that of the stroke.
     exponent
         Of expansion and compression; 1 is a hyperbola.
-
-    Raises
-    ------
-    ModelError
-        If points are out of order, or nothing is left to be compressed into.
     """
 
     admission: float
@@ -54,8 +49,7 @@ class Steam:
     exponent: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("admission", "back_pressure"):
-            _check_pressure(name, getattr(self, name))
+        check_pressures(self, "admission", "back_pressure")
         if not 0.0 <= self.cut_off <= self.release <= 1.0:
             raise ModelError(
                 f"cut_off {self.cut_off:g} and release {self.release:g} are out of order; on the way out steam is cut "
@@ -79,52 +73,12 @@ class Steam:
         """Kinks of the diagram: part of the stroke, and True on the way out."""
         return (self.cut_off, True), (self.release, True), (self.compression, False), (self.lead, False)
 
-    @property
-    def mean_pressure(self) -> float:
-        """Area of the diagram over its length [Pa], in closed form (G16)."""
-        released = self.admission * self._fallen(self.cut_off, self.release)
-        squeezed = self.back_pressure * self._fallen(self.compression, self.lead)
-        out = self.admission * (self.cut_off + self._work(self.cut_off, self.release))
-        out += 0.5 * (released + self.back_pressure) * (1.0 - self.release)
-        back = self.back_pressure * (1.0 - self.compression - self._work(self.compression, self.lead))
-        return out - back - 0.5 * (squeezed + self.admission) * self.lead
 
-    def _fallen(self, begin: float, end: float) -> float:
-        return ((begin + self.clearance) / (end + self.clearance)) ** self.exponent if begin != end else 1.0
+class Pump(Steam):
+    """A piston pump: one pressure while its chamber grows, another while it shrinks (G17; Roetscher, Fig. 1053)."""
 
-    def _work(self, begin: float, end: float) -> float:
-        if begin == end:
-            return 0.0
-        first, log = begin + self.clearance, math.log((end + self.clearance) / (begin + self.clearance))
-        power = self.exponent - 1.0
-        return first * (-math.expm1(-power * log) / power if power else log)
-
-
-@dataclass(frozen=True)
-class Pump:
-    """A piston pump: one pressure while its chamber grows, another while it shrinks (G17; Roetscher, Fig. 1053).
-
-    Attributes
-    ----------
-    suction, delivery
-        Absolute [Pa].
-    """
-
-    suction: float
-    delivery: float
-    turning_points: ClassVar[tuple[tuple[float, bool], ...]] = ()
-
-    def __post_init__(self) -> None:
-        for name in ("suction", "delivery"):
-            _check_pressure(name, getattr(self, name))
-
-    @property
-    def mean_pressure(self) -> float:
-        """Area of the diagram over its length [Pa]; negative, a pump takes work."""
-        return self.suction - self.delivery
-
-
-Diagram: TypeAlias = Steam | Pump | PressureTrace
+    def __init__(self, suction: float, delivery: float) -> None:
+        super().__init__(suction, delivery, cut_off=1.0)
 
 
 @dataclass(frozen=True)
@@ -146,7 +100,7 @@ class Chamber:
     end: str
     bore: float
     rod: float
-    diagram: Diagram
+    diagram: Steam | PressureTrace
 
     def __post_init__(self) -> None:
         if self.end not in ENDS:
@@ -187,7 +141,7 @@ class Chambers:
     crankcase_pressure: float = AMBIENT_PRESSURE
 
     def __post_init__(self) -> None:
-        _check_pressure("crankcase_pressure", self.crankcase_pressure)
+        check_pressures(self, "crankcase_pressure")
         if not self.chambers:
             raise ModelError("there is no chamber; list one at least")
 
@@ -197,8 +151,3 @@ class Chambers:
 
 
 GasModel: TypeAlias = Seiliger | Wiebe | PressureTrace | Chambers
-
-
-def _check_pressure(name: str, pressure: float) -> None:
-    if not 0.0 < pressure < math.inf:
-        raise ModelError(f"{name} {pressure * 1e-5:g} bar must be positive and finite; give an absolute pressure")

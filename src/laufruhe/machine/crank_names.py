@@ -21,14 +21,14 @@ _SAME = math.radians(1e-6)
 
 def name_of_crank(throws: Sequence[float]) -> str:
     """Return the name of a crank with these throws [rad], however turned or mirrored; empty if it has none."""
+
+    def is_turned(image: Sequence[float]) -> bool:
+        ahead = throws[0] - image[0]
+        return all(abs(math.remainder(a - b - ahead, math.tau)) < _SAME for a, b in zip(throws, image, strict=True))
+
     for name, degrees in CRANKS.items():
         named = [math.radians(angle) for angle in degrees]
         images = [[sign * angle for angle in angles] for sign in (1.0, -1.0) for angles in (named, named[::-1])]
-        if len(named) == len(throws) and any(_turned(throws, image) for image in images):
+        if len(named) == len(throws) and any(map(is_turned, images)):
             return name
     return ""
-
-
-def _turned(throws: Sequence[float], other: Sequence[float]) -> bool:
-    ahead = throws[0] - other[0]
-    return all(abs(math.remainder(a - b - ahead, math.tau)) < _SAME for a, b in zip(throws, other, strict=True))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
@@ -14,6 +16,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.extra import Extra
+from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
@@ -116,24 +119,17 @@ class Engine:
                 raise ModelError(f"{part.name} stands in the place of {places[place]}; move one of them")
             places[place] = part.name
         for shaft in self.shafts:
-            self._check_period(shaft)
+            if not _returns(shaft.ratio, self.cycle.turns):
+                raise ModelError(
+                    f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
+                    f"{self.cycle.turns} turns; use a multiple of 1/{self.cycle.turns}"
+                )
         for part in self.slider_cranks:
-            self._check_firing(part)
-
-    def _check_period(self, shaft: Shaft) -> None:
-        if not _returns(shaft.ratio, self.cycle.turns):
-            raise ModelError(
-                f"shaft '{shaft.name}' with ratio {shaft.ratio:g} does not return within the cycle of "
-                f"{self.cycle.turns} turns; use a multiple of 1/{self.cycle.turns}"
-            )
-
-    def _check_firing(self, part: SliderCrank) -> None:
-        crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank - part.fires_at
-        if abs(math.remainder(crank_angle, math.tau)) > 1e-9:
-            raise ModelError(
-                f"{part.name} fires at {math.degrees(part.firing_angle):g} deg, "
-                f"{math.degrees(math.remainder(crank_angle, math.tau)):g} deg from its dead centre"
-            )
+            crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank - part.fires_at
+            late = math.remainder(crank_angle, math.tau)
+            if abs(late) > 1e-9:
+                fires = f"{part.name} fires at {math.degrees(part.firing_angle):g} deg"
+                raise ModelError(f"{fires}, {math.degrees(late):g} deg from its dead centre")
 
     def extra(self, kind: type[E]) -> E | None:
         """Return the part of an extension by its class, or None."""
@@ -170,6 +166,26 @@ class Engine:
         turns = sorted(reduced_turn(as_turn(part.firing_angle), cycle_turns) for part in self.cylinders)
         following = [*turns[1:], turns[0] + cycle_turns] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
+
+
+def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
+    """Return the slider-cranks with phase leads [rad] by the names of their shafts (L10)."""
+
+    def turned(part: SliderCrank, lead: float) -> SliderCrank:
+        throw, firing_angle = part.throw + part.shaft.ratio * lead, part.firing_angle - lead
+        return replace(part, throw=throw, firing_angle=firing_angle) if lead else part
+
+    return tuple(turned(part, leads.get(part.shaft.name, 0.0)) for part in parts)
+
+
+def with_leads(engine: Engine, leads: Mapping[str, float]) -> Engine:
+    """Return the engine with phase leads of its shafts [rad], and so of all loads on them (L10)."""
+    parts = parts_with_leads(engine.slider_cranks, leads)
+    if any(part.facing is not None for part in parts):
+        parts = with_shared_chambers([replace(part, facing=None) for part in parts], engine.cycle.angle)
+    turned = {shaft.name: cmath.exp(1j * shaft.ratio * leads.get(shaft.name, 0.0)) for shaft in engine.shafts}
+    rotors = tuple(replace(rotor, unbalance=rotor.unbalance * turned[rotor.shaft.name]) for rotor in engine.rotors)
+    return replace(engine, slider_cranks=parts, rotors=rotors)
 
 
 @lru_cache(maxsize=64)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
-from laufruhe.machine.slider_crank import SliderCrank, Swept
+from laufruhe.machine.slider_crank import SliderCrank, Swept, as_kind
 from laufruhe.numerics.roots import rising_root
 
 MAX_AHEAD = 0.5 * math.pi
@@ -104,7 +104,7 @@ class SharedChamber(SliderCrank):
 
 @lru_cache(maxsize=256)
 def _chamber(part: SliderCrank) -> SharedChamber:
-    return SharedChamber(**{field.name: getattr(part, field.name) for field in fields(SliderCrank)})
+    return as_kind(SharedChamber, part)
 
 
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
@@ -119,29 +119,23 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
     for k, part in enumerate(parts):
         for other in parts:
             if other is not part and part.faces(other):
-                pistons[k] = replace(part, facing=_facing(part, other, cycle_angle))
+                both = f"{part.name} and {other.name} share a chamber"
+                ahead = math.remainder(part.firing_angle - other.firing_angle, cycle_angle)
+                ahead = 0.0 if abs(ahead) < 1e-12 else ahead
+                if abs(ahead) >= MAX_AHEAD:
+                    raise ModelError(
+                        f"{both} and come to their dead centres {math.degrees(abs(ahead)):.6g} deg apart; bring them "
+                        f"within {math.degrees(MAX_AHEAD):g} deg"
+                    )
+                if any(type(p) is not SliderCrank or abs(p.shaft.ratio) != 1.0 or p.offset for p in (part, other)):
+                    raise ModelError(
+                        f"{both}, which is known of plain slider-cranks without offset on cranks of a ratio of 1 or "
+                        "-1; leave [gas] out"
+                    )
+                if part.bore != other.bore:
+                    raise ModelError(f"{both} and have two bores; give them one")
+                pistons[k] = replace(part, facing=Facing(other.crank_radius, other.rod_length, ahead))
     return tuple(pistons)
-
-
-def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing:
-    ahead = math.remainder(part.firing_angle - other.firing_angle, cycle_angle)
-    ahead = 0.0 if abs(ahead) < 1e-12 else ahead
-    if abs(ahead) >= MAX_AHEAD:
-        raise ModelError(
-            f"{part.name} and {other.name} share a chamber and come to their dead centres "
-            f"{math.degrees(abs(ahead)):.6g} deg apart; bring them within {math.degrees(MAX_AHEAD):g} deg"
-        )
-    plain = all(
-        type(piston) is SliderCrank and abs(piston.shaft.ratio) == 1.0 and not piston.offset for piston in (part, other)
-    )
-    if not plain:
-        raise ModelError(
-            f"{part.name} and {other.name} share a chamber, which is known of plain slider-cranks without offset on "
-            "cranks of a ratio of 1 or -1; leave [gas] out"
-        )
-    if part.bore != other.bore:
-        raise ModelError(f"{part.name} and {other.name} share a chamber and have two bores; give them one")
-    return Facing(other.crank_radius, other.rod_length, ahead)
 
 
 def minimum_room(part: SliderCrank, other: SliderCrank) -> float:

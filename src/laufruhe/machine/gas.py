@@ -27,11 +27,6 @@ class Charge:
         cycle has no exhaust stroke and makes no use of the exhaust pressure.
     crankcase_pressure
         Absolute [Pa], on the underside of the piston.
-
-    Raises
-    ------
-    ModelError
-        If a value is out of its range.
     """
 
     compression_ratio: float = 17.0
@@ -40,7 +35,7 @@ class Charge:
     crankcase_pressure: float = AMBIENT_PRESSURE
 
     def __post_init__(self) -> None:
-        _check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
+        check_pressures(self, "intake_pressure", "exhaust_pressure", "crankcase_pressure")
         if not 1.0 < self.compression_ratio <= MAX_COMPRESSION_RATIO:
             raise ModelError(
                 f"compression_ratio {self.compression_ratio:g} must be over 1 and at most {MAX_COMPRESSION_RATIO:g}; "
@@ -63,11 +58,6 @@ class Seiliger(Charge):
         Indicated mean effective pressure of the whole cycle, gas exchange included [Pa].
     compression_exponent, expansion_exponent
         Polytropic exponents.
-
-    Raises
-    ------
-    ModelError
-        If a value is out of its range.
     """
 
     peak_pressure: float
@@ -77,7 +67,7 @@ class Seiliger(Charge):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _check_pressures(self, "peak_pressure")
+        check_pressures(self, "peak_pressure")
         _check_imep(self.imep)
         for name in ("compression_exponent", "expansion_exponent"):
             exponent = getattr(self, name)
@@ -106,11 +96,6 @@ class Wiebe(Charge):
     heat_ratio
         Ratio of specific heats of the charge, from the start of compression to the end
         of expansion.
-
-    Raises
-    ------
-    ModelError
-        If a value is out of its range.
     """
 
     imep: float
@@ -123,7 +108,16 @@ class Wiebe(Charge):
     def __post_init__(self) -> None:
         super().__post_init__()
         _check_imep(self.imep)
-        self._check_burn()
+        if not math.isfinite(self.start):
+            raise ModelError(f"start {self.start} must be finite; give a crank angle from the firing dead centre")
+        if not self.duration > 0.0:
+            raise ModelError(f"duration {math.degrees(self.duration):g} deg must be positive; 30 to 70 deg is usual")
+        first, last = math.degrees(self.start), math.degrees(self.start + self.duration)
+        if first < -180.0 or last > 180.0:
+            raise ModelError(
+                f"the burn from {first:g} to {last:g} deg must lie between -180 and 180 deg about the firing dead "
+                "centre; move start or shorten duration"
+            )
         if not 0.0 <= self.shape <= MAX_SHAPE:
             raise ModelError(f"shape {self.shape:g} must be between 0 and {MAX_SHAPE:g}; 0.5 to 3 is usual")
         if not 0.0 < self.completeness < 1.0:
@@ -131,18 +125,6 @@ class Wiebe(Charge):
         if not 1.0 < self.heat_ratio <= MAX_HEAT_RATIO:
             raise ModelError(
                 f"heat_ratio {self.heat_ratio:g} must be over 1 and at most {MAX_HEAT_RATIO:g}; 1.3 to 1.4 is usual"
-            )
-
-    def _check_burn(self) -> None:
-        first, last = math.degrees(self.start), math.degrees(self.start + self.duration)
-        if not math.isfinite(self.start):
-            raise ModelError(f"start {self.start} must be finite; give a crank angle from the firing dead centre")
-        if not self.duration > 0.0:
-            raise ModelError(f"duration {math.degrees(self.duration):g} deg must be positive; 30 to 70 deg is usual")
-        if first < -180.0 or last > 180.0:
-            raise ModelError(
-                f"the burn from {first:g} to {last:g} deg must lie between -180 and 180 deg about the firing dead "
-                "centre; move start or shorten duration"
             )
 
 
@@ -159,12 +141,6 @@ class PressureTrace:
         Absolute [Pa].
     crankcase_pressure
         Absolute [Pa].
-
-    Raises
-    ------
-    ModelError
-        If there are fewer than four points, angles do not ascend, or a pressure is not
-        positive.
     """
 
     angles: tuple[float, ...]
@@ -172,7 +148,7 @@ class PressureTrace:
     crankcase_pressure: float = AMBIENT_PRESSURE
 
     def __post_init__(self) -> None:
-        _check_pressures(self, "crankcase_pressure")
+        check_pressures(self, "crankcase_pressure")
         if len(self.angles) != len(self.pressures):
             raise ModelError(
                 f"the trace has {len(self.angles)} angles and {len(self.pressures)} pressures; give a pair a point"
@@ -182,25 +158,23 @@ class PressureTrace:
                 f"the trace has {len(self.angles)} points, too few for a cycle; give one every few degrees"
             )
         for k, (angle, pressure) in enumerate(zip(self.angles, self.pressures, strict=True)):
-            self._check_point(k, angle, pressure)
-
-    def _check_point(self, k: int, angle: float, pressure: float) -> None:
-        where = f"point {k + 1} of the trace"
-        if not math.isfinite(angle):
-            raise ModelError(f"{where} has the angle {angle}, which must be finite; remove the point")
-        if k > 0 and angle <= self.angles[k - 1]:
-            raise ModelError(
-                f"{where} at {math.degrees(angle):g} deg must come after the one before it at "
-                f"{math.degrees(self.angles[k - 1]):g} deg; sort the trace and keep one point an angle"
-            )
-        if not 0.0 < pressure < math.inf:
-            raise ModelError(
-                f"{where} has the pressure {pressure * 1e-5:g} bar, which must be positive and finite; "
-                "give absolute pressures"
-            )
+            where = f"point {k + 1} of the trace"
+            if not math.isfinite(angle):
+                raise ModelError(f"{where} has the angle {angle}, which must be finite; remove the point")
+            if k > 0 and angle <= self.angles[k - 1]:
+                raise ModelError(
+                    f"{where} at {math.degrees(angle):g} deg must come after the one before it at "
+                    f"{math.degrees(self.angles[k - 1]):g} deg; sort the trace and keep one point an angle"
+                )
+            if not 0.0 < pressure < math.inf:
+                raise ModelError(
+                    f"{where} has the pressure {pressure * 1e-5:g} bar, which must be positive and finite; "
+                    "give absolute pressures"
+                )
 
 
-def _check_pressures(gas: Charge | PressureTrace, *names: str) -> None:
+def check_pressures(gas: object, *names: str) -> None:
+    """Raise `ModelError` unless these pressures of a gas are absolute ones."""
     for name in names:
         pressure = getattr(gas, name)
         if not 0.0 < pressure < math.inf:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
@@ -14,6 +14,7 @@ from laufruhe.machine.bodies import Motion, Outline
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.numerics.exact_angles import Turn, as_turn, cis
 
+P = TypeVar("P", bound="SliderCrank")
 _ON_ONE_AXIS = 1e-9
 
 
@@ -109,15 +110,19 @@ class SliderCrank:
     shaft: Shaft = CRANKSHAFT
     big_end: tuple[float, float] | None = None
     facing: Shared | None = None
+    noun: ClassVar[str] = "cylinder"
+    """What messages call it."""
     has_pin_loads: ClassVar[bool] = True
     """Whether it is known what it presses its crank pin with."""
     has_rod: ClassVar[bool] = True
     """Whether a rod leans on a cylinder wall."""
     is_balanced_by_share: ClassVar[bool] = True
     """Whether a share of its reciprocating mass at the crank pin means anything (eq. 13)."""
-    weightless: ClassVar[Mapping[str, float]] = {
-        "reciprocating_mass": 0.0, "rotating_mass": 0.0, "rod_inertia_deficit": 0.0,
+    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
+        **dict.fromkeys(("x", "crank_radius", "rod_length", "offset", "bore"), (0, 1)),
+        **dict.fromkeys(("reciprocating_mass", "rotating_mass"), (1, 0)), "rod_inertia_deficit": (1, 2),
     }  # fmt: skip
+    """Powers of mass and length in the unit of every number."""
 
     def __post_init__(self) -> None:
         if not self.crank_radius > 0.0:
@@ -191,25 +196,19 @@ class SliderCrank:
 
     def only(self, masses: Mapping[str, float]) -> Self:
         """Return the mechanism with these masses alone, by field name."""
-        masses_of_parts: dict[str, Any] = {**self.weightless, **masses}
-        return replace(self, **masses_of_parts)
+        none: dict[str, Any] = {name: 0.0 for name, (mass_power, _) in self.dimensions.items() if mass_power}
+        return replace(self, **none | dict(masses))
 
     def scaled(self, length: float, mass: float) -> Self:
         """Return the mechanism in another size."""
-        return replace(
-            self,
-            x=self.x * length,
-            crank_radius=self.crank_radius * length,
-            rod_length=self.rod_length * length,
-            offset=self.offset * length,
-            bore=None if self.bore is None else self.bore * length,
-            reciprocating_mass=self.reciprocating_mass * mass,
-            rotating_mass=self.rotating_mass * mass,
-            rod_inertia_deficit=self.rod_inertia_deficit * mass * length**2,
-            shaft=self.shaft.scaled(length),
-            big_end=self.big_end and (self.big_end[0] * length, self.big_end[1] * length),
-            facing=self.facing and self.facing.scaled(length),
-        )
+        numbers: dict[str, Any] = {
+            name: getattr(self, name) * mass**mass_power * length**length_power
+            for name, (mass_power, length_power) in self.dimensions.items()
+            if getattr(self, name) is not None
+        }
+        big_end = self.big_end and (self.big_end[0] * length, self.big_end[1] * length)
+        facing = self.facing and self.facing.scaled(length)
+        return replace(self, shaft=self.shaft.scaled(length), big_end=big_end, facing=facing, **numbers)
 
     @cached_property
     def star_turn(self) -> Turn:
@@ -244,18 +243,9 @@ class SliderCrank:
         return kinematics.sin_psi(*shape), kinematics.cos_psi(*shape)
 
     @property
-    def crank_pin_mass(self) -> float:
-        """Mass of the rod's end that turns with the crank pin [kg]."""
-        return self.rotating_mass
-
-    @property
     def master_bank(self) -> float | None:
         """Bank angle of the cylinder whose rod carries this rod [rad]; None for a rod on the crank pin."""
         return None
-
-    def is_hinged_to(self, _master: SliderCrank) -> bool:
-        """Return True if the rod works on a pin of another cylinder's rod."""
-        return False
 
     def on_pin(self, _lib: Any, _alpha: Any, force: Any, _with_masses: bool) -> Any:
         """Return the force on the rod's pin for a force on its piston pin, in the plane of its axis (B11).
@@ -300,3 +290,8 @@ class SliderCrank:
         top = math.sqrt((self.rod_length + self.crank_radius) ** 2 - e2)
         bottom = math.sqrt((self.rod_length - self.crank_radius) ** 2 - e2)
         return 4.0 * self.rod_length * self.crank_radius / (top + bottom)
+
+
+def as_kind(kind: type[P], part: SliderCrank, **own: Any) -> P:
+    """Return a slider-crank as a mechanism of another class, with the fields that only this has."""
+    return kind(**{shared.name: getattr(part, shared.name) for shared in fields(part)}, **own)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.machine import Engine, Role, Shaft, SliderCrank
+from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.numerics.exact_angles import as_turn, cis, direction
 
 _ROUNDING = 1e-9
@@ -37,35 +37,27 @@ def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceF
     kappa = (-Re sum U e^{-i theta} - m_rot r) / (m_rec r), with the unbalances U [kg m] of the counterweights of a
     throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
     """
-    shafts = dict.fromkeys(part.shaft for part in engine.slider_cranks)
-    return tuple(factor for shaft in shafts for factor in _on_shaft(engine, shaft, and_of_none))
-
-
-def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFactor]:
-    throws = _throws([part for part in engine.slider_cranks if part.shaft == shaft])
-    places = np.array([throw[0].x for throw in throws])
-    opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
-    rotors = [rotor for rotor in engine.rotors if rotor.shaft == shaft]
-    weights = [rotor for rotor in rotors if rotor.role is Role.COUNTERWEIGHT]
-    masses = [rotor for rotor in rotors if rotor.role is Role.THROW]
-    masses += [pin for pin in engine.pins if pin.shaft == shaft]
-    for rotor in (*weights, *masses):
-        distance = np.abs(places - rotor.x)
-        near = np.flatnonzero(distance <= distance.min() + _ROUNDING)
-        for j in near.tolist():
-            along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
-            opposite[j] -= along / len(near)
-            counted[j] |= rotor in weights and (and_of_none or rotor.unbalance != 0.0)
     factors = []
-    for k, throw in enumerate(throws):
-        unbalance = sum(part.reciprocating_mass * part.crank_radius for part in throw)
-        if counted[k] and unbalance > 0.0:
-            factors.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / unbalance)))
-    return factors
-
-
-def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:
-    throws: dict[tuple[float, object], list[SliderCrank]] = {}
-    for part in parts:
-        throws.setdefault((round(part.x, 9), direction(part.throw)), []).append(part)
-    return list(throws.values())
+    for shaft in dict.fromkeys(part.shaft for part in engine.slider_cranks):
+        on_throws: dict[tuple[float, object], list[SliderCrank]] = defaultdict(list)
+        for part in engine.slider_cranks:
+            if part.shaft == shaft:
+                on_throws[round(part.x, 9), direction(part.throw)].append(part)
+        throws = list(on_throws.values())
+        places = np.array([throw[0].x for throw in throws])
+        opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
+        weights = [rotor for rotor in engine.rotors if rotor.shaft == shaft and rotor.role is Role.COUNTERWEIGHT]
+        masses = [rotor for rotor in engine.rotors if rotor.shaft == shaft and rotor.role is Role.THROW]
+        masses += [pin for pin in engine.pins if pin.shaft == shaft]
+        for rotor in (*weights, *masses):
+            distance = np.abs(places - rotor.x)
+            near = np.flatnonzero(distance <= distance.min() + _ROUNDING)
+            for j in near.tolist():
+                along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
+                opposite[j] -= along / len(near)
+                counted[j] |= rotor in weights and (and_of_none or rotor.unbalance != 0.0)
+        for k, throw in enumerate(throws):
+            unbalance = sum(part.reciprocating_mass * part.crank_radius for part in throw)
+            if counted[k] and unbalance > 0.0:
+                factors.append(BalanceFactor(tuple(part.name for part in throw), float(opposite[k] / unbalance)))
+    return tuple(factors)

@@ -93,7 +93,9 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
 
 
 def _carried(parts: Sequence[SliderCrank]) -> Array | None:
-    hinges = np.array([[part.is_hinged_to(master) for part in parts] for master in parts], dtype=float)
+    """Return a matrix with ones where the rod of a column is hinged to the rod of a row; None without hinges."""
+    crank_rods = [(part.shaft, part.x, part.bank) if part.master_bank is None else None for part in parts]
+    hinges = np.array([[(part.shaft, part.x, part.master_bank) == rod for part in parts] for rod in crank_rods], float)
     return hinges if hinges.any() else None
 
 
@@ -180,25 +182,15 @@ def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
     return point.speed * np.array([bearing.drag for bearing in engine.bearings])
 
 
-def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
-    return rotor_loads((rotor,), speed, cycle).mapped(lambda wrench: wrench[:, :3])
-
-
-def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    return _pin_load(cycle, part, speed, gas, fidelity, _at_piston)
-
-
-def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    return _pin_load(cycle, part, speed, gas, fidelity, _at_master)
-
-
 @lru_cache(maxsize=256)
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
     load = _pin_load(cycle, part, speed, gas, fidelity, _at_pin)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
     turned = load.mapped(lambda force: force @ np.array([[0.0, y, z], [0.0, z, -y]]))
-    rod = Rotor("rod", part.x, part.crank_pin_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
-    series = turned + _of_rotor(rod, speed, cycle)
+    # of a hinged rod nothing turns with the crank pin
+    mass = part.rotating_mass if part.master_bank is None else 0.0
+    rod = Rotor("rod", part.x, mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft)
+    series = turned + rotor_loads((rod,), speed, cycle).mapped(lambda wrench: wrench[:, :3])
     series.coefficients.setflags(write=False)
     return series
 
@@ -212,20 +204,6 @@ def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | Non
         series = series + leaning.mapped(lambda force: force * np.array([0.0, wall.imag, wall.real]))
         series.coefficients.setflags(write=False)
     return series
-
-
-def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tuple[Array, ...]:
-    return force.real, force.imag
-
-
-def _at_pin(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    pin_force = part.on_pin(np, alpha, force, with_masses)
-    return pin_force.real, pin_force.imag
-
-
-def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
-    pin_force = part.on_pin(np, alpha, force, with_masses)
-    return (part.on_wall_of_master(np, alpha, pin_force),)
 
 
 @lru_cache(maxsize=512)
@@ -244,6 +222,23 @@ def _pin_load(
         load = load + fidelity.truncated(_gas_orders(cycle, part, gas, fidelity, reaction))
     load.coefficients.setflags(write=False)
     return load
+
+
+def _at_piston(_: SliderCrank, __: Array, force: ComplexArray, ___: bool) -> tuple[Array, ...]:
+    return force.real, force.imag
+
+
+def _at_pin(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
+    pin_force = part.on_pin(np, alpha, force, with_masses)
+    return pin_force.real, pin_force.imag
+
+
+def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses: bool) -> tuple[Array, ...]:
+    return (part.on_wall_of_master(np, alpha, part.on_pin(np, alpha, force, with_masses)),)
+
+
+_of_piston_pin = partial(_pin_load, reaction=_at_piston)
+_of_hinge = partial(_pin_load, reaction=_at_master)
 
 
 @lru_cache(maxsize=256)

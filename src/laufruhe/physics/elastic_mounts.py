@@ -257,14 +257,11 @@ class ElasticMounting:
     def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
         # forces and travel are of one motion; the wrench is kept, so that it stays itself
         if not (self._moved and self._moved[0][0] is wrench and self._moved[0][1] == speed):
-            self._moved[:] = [(wrench, speed, self._new_motion(wrench, speed))]
+            loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
+            motion = np.zeros((len(wrench.coefficients), 6), dtype=complex)
+            motion[loaded] = self.responses(wrench.orders[loaded] * speed, wrench.coefficients[loaded])
+            self._moved[:] = [(wrench, speed, motion)]
         return self._moved[0][2]
-
-    def _new_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
-        loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
-        out = np.zeros((len(wrench.coefficients), 6), dtype=complex)
-        out[loaded] = self.responses(wrench.orders[loaded] * speed, wrench.coefficients[loaded])
-        return out
 
     @cached_property
     def _travels(self) -> Array:

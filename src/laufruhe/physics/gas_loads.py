@@ -61,25 +61,14 @@ class _CylinderKey:
 @lru_cache(maxsize=64)
 def _one_cylinder(gas: GasModel, key: _CylinderKey, cycle: Cycle, samples: int) -> Spectrum:
     # its kinks are taken out before the transform (L5a)
-    part, breaks = key.part, pressure_breaks(gas, key.part, cycle)
-    torque = spectrum_with_kinks(lambda angles: _torque_at(gas, part, cycle, angles), samples, cycle.base_order, breaks)
+    part = key.part
+
+    def torque_at(angles: Array) -> Array:
+        return np.asarray(np.sum([chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags], axis=0))
+
+    torque = spectrum_with_kinks(torque_at, samples, cycle.base_order, pressure_breaks(gas, part, cycle))
     torque.coefficients.setflags(write=False)
     return torque
-
-
-def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Array:
-    """Return the torque of one cylinder's gas on the output, n P ds/dalpha, P = -A (p - p_crankcase) (L5).
-
-    Returns
-    -------
-    Shape (samples,) [N m], at equal steps over the cycle from the firing dead centre.
-    """
-    return _torque_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
-
-
-def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    torques = [chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags]
-    return np.asarray(np.sum(torques, axis=0))
 
 
 def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: Array) -> Array:

@@ -56,27 +56,12 @@ class Effect:
     series: Callable[[], ComplexArray]
 
 
-def effects_of(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Return the loads of point masses and rods."""
-    masses, rods = _all_effects(part, fidelity)
-    return [effect for effect in (*masses, *rods) if effect.size != 0.0]
-
-
-def mass_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Return the loads of the point masses (L2, L3, L7)."""
-    masses, _ = _all_effects(part, fidelity)
-    return [effect for effect in masses if effect.size != 0.0]
-
-
-def rod_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Return the roll moments that point masses leave out of the rods' inertia (L4, L7)."""
-    _, rods = _all_effects(part, fidelity)
-    return [effect for effect in rods if effect.size != 0.0]
-
-
-def _all_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    masses, rods = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
-    return masses, rods if fidelity.rod == "rigid" else ()
+def effects_of(part: SliderCrank, fidelity: Fidelity) -> tuple[list[Effect], list[Effect]]:
+    """Return the loads of point masses (L2, L3, L7), and the roll moments that these leave out of rods (L4, L7)."""
+    masses, rods = (_slider_crank if type(part) is SliderCrank else _of_momentum)(part, fidelity)
+    masses_and_rods = masses, rods if fidelity.rod == "rigid" else ()
+    of_masses, of_rods = ([effect for effect in effects if effect.size != 0.0] for effects in masses_and_rods)
+    return of_masses, of_rods
 
 
 def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any = 0.0) -> tuple[Any, Any, Any]:
@@ -153,10 +138,6 @@ def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, 
 
 TWO_ORDER_ROLL = 3
 """Last order of a roll moment with two-order kinematics."""
-
-CLOSED_FORMS: dict[type[SliderCrank], Callable[..., tuple[tuple[Effect, ...], tuple[Effect, ...]]]] = {
-    SliderCrank: _slider_crank,
-}
 
 
 def _highest(part: SliderCrank, fidelity: Fidelity) -> int:

@@ -126,8 +126,3 @@ def cycle_measures(samples: Array) -> CycleMeasures:
     """Return mean, maximum and rms of |F(phi)| from samples (n, components) (M4; Hasselgruber, Figs. 10-28)."""
     size = lengths(samples)
     return CycleMeasures(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))
-
-
-def turning_amplitudes(lateral: complex, vertical: complex) -> tuple[float, float]:
-    """Return the amplitudes of the parts of z + i y that turn with the crank, as e^{ix}, and against it (C4, C8)."""
-    return 0.5 * float(abs(vertical + 1j * lateral)), 0.5 * float(abs(vertical - 1j * lateral))

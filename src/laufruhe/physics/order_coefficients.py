@@ -18,7 +18,7 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.arrays import ComplexArray
 
 _TAIL = 1e-18
 _QUARTERS = np.array([1.0, 1j, -1.0, -1j])
@@ -46,16 +46,6 @@ def _complement(rod_ratio: float, offset_ratio: float) -> float:
     low = math.fsum((1.0, offset_ratio, -rod_ratio))
     high = math.fsum((1.0, offset_ratio, rod_ratio))
     return math.sqrt(low * high) / (1.0 + offset_ratio)
-
-
-def _power_series(power: float, q1: float, q2: float, difference: float, terms: int) -> Array:
-    # K8: coefficients of ((1 + q1 D)(1 - q2 D))^power, D = i E, shape (terms,); they are real
-    square, before, last = -q1 * q2, 0.0, 1.0
-    series = [last]
-    for j in range(terms - 1):
-        before, last = last, (difference * (power - j) * last + square * (2.0 * power + 1.0 - j) * before) / (j + 1)
-        series.append(last)
-    return np.array(series)
 
 
 @lru_cache(maxsize=1024)
@@ -90,7 +80,13 @@ def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, hi
     q1, q2, difference = _poles(rod_ratio, offset_ratio)
     scale = ((1.0 - offset_ratio) * (1.0 + offset_ratio) / ((1.0 + q1 * q1) * (1.0 + q2 * q2))) ** (power / 2.0)
     tail = orders_needed(rod_ratio, offset_ratio)
-    series = _power_series(power / 2.0, q1, q2, difference, highest + tail + 1)
+    # K8: coefficients of ((1 + q1 D)(1 - q2 D))^(power / 2), D = i E; they are real
+    half, square, before, last = power / 2.0, -q1 * q2, 0.0, 1.0
+    terms = [last]
+    for j in range(highest + tail):
+        before, last = last, (difference * (half - j) * last + square * (2.0 * half + 1.0 - j) * before) / (j + 1)
+        terms.append(last)
+    series = np.array(terms)
     upper = np.correlate(series, series[: tail + 1], "valid") * scale * _QUARTERS[np.arange(highest + 1) % 4]
     return _fixed(np.concatenate([upper[:0:-1].conj(), upper]))
 
@@ -138,13 +134,6 @@ def _one_sided(two_sided: ComplexArray, highest: int) -> ComplexArray:
     return _fixed(out)
 
 
-def _velocity(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
-    acceleration = piston_acceleration_orders(rod_ratio, offset_ratio, highest)
-    h = np.arange(highest + 1)
-    h[0] = 1
-    return np.asarray(acceleration / (1j * h))
-
-
 @lru_cache(maxsize=256)
 def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest: int) -> ComplexArray:
     """Return the coefficients of -s''/r (n s'/r + e/r), for a crank of ratio n (L3).
@@ -152,11 +141,11 @@ def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, hig
     Times m r^2 (n w)^2 it is the roll moment of the reciprocating mass.
     """
     count = highest + orders_needed(rod_ratio, offset_ratio)
-    acceleration = _two_sided(piston_acceleration_orders(rod_ratio, offset_ratio, count))
-    arm = ratio * _two_sided(_velocity(rod_ratio, offset_ratio, count))
+    acceleration = piston_acceleration_orders(rod_ratio, offset_ratio, count)
+    arm = ratio * _two_sided(acceleration / (1j * np.maximum(np.arange(count + 1), 1)))
     if rod_ratio > 0.0:
         arm[count] += offset_ratio / rod_ratio
-    return _one_sided(-np.convolve(acceleration, arm, mode="full"), highest)
+    return _one_sided(-np.convolve(_two_sided(acceleration), arm, mode="full"), highest)
 
 
 @lru_cache(maxsize=256)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
@@ -20,7 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
-from laufruhe.physics.mechanism import effects_of, mass_effects
+from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import plane_parts
 from laufruhe.physics.star_loads import order_index, star_loads
 from laufruhe.physics.torque import crank_torque
@@ -54,7 +55,7 @@ def _slider_crank_loads(
     cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
 ) -> tuple[Spectrum, _Turning]:
     engine = Engine("pistons, rods and gas", cycle, parts)
-    total = star_loads(engine, speed, lambda part: effects_of(part, fidelity))
+    total = star_loads(engine, speed, lambda part: chain(*effects_of(part, fidelity)))
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
     return fidelity.truncated(total), _turning(engine.pins, speed, cycle)
@@ -67,7 +68,7 @@ def forget() -> None:
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the inertia loads of reciprocating masses: F = -m s'' and its roll moment (L2, L3, L7)."""
-    return star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
+    return star_loads(engine, speed, lambda part: effects_of(part, fidelity)[0])
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:

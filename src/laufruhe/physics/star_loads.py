@@ -13,7 +13,7 @@ from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.numerics.exact_angles import as_turn, cis, star_orders
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.mechanism import Direction, Effect
-from laufruhe.physics.rigid_body import ROLL, plane_parts
+from laufruhe.physics.rigid_body import plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
@@ -35,7 +35,7 @@ def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Ef
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
     sizes = np.array([member.size * square_of(part, speed) for part, (_, member) in zip(parts, members, strict=True)])
-    weights = sizes[:, None] * np.array([_weight(part, members[0][1].direction) for part in parts])
+    weights = sizes[:, None] * np.array([_wrench_of(members[0][1].direction, part) for part in parts])
     turns = tuple([part.star_turn for part in parts])
     load = star_orders(weights, turns, len(series))
     load *= series[:, None]
@@ -64,11 +64,9 @@ def square_of(part: SliderCrank, speed: float) -> float:
     return (part.shaft.ratio * speed) ** 2
 
 
-def _weight(part: SliderCrank, direction: Direction) -> tuple[float, ...]:
+def _wrench_of(direction: Direction, part: SliderCrank) -> tuple[float, ...]:
+    """Return the wrench of a unit load of a cylinder."""
     if direction is Direction.ROLL:
-        return _ROLL
+        return 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
     axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
     return plane_parts(axis.imag, axis.real, part.x, part.shaft)
-
-
-_ROLL = tuple(ROLL.tolist())

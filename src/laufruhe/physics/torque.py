@@ -67,11 +67,8 @@ def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     total, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
-    return {"gas": total + _less(masses), "pistons": points, "rods": masses + _less(points), "all": total}
-
-
-def _less(torque: Spectrum) -> Spectrum:
-    return torque.mapped(lambda values: -values)
+    gas, rods = total + masses.mapped(np.negative), masses + points.mapped(np.negative)
+    return {"gas": gas, "pistons": points, "rods": rods, "all": total}
 
 
 def work_stored(torque: Spectrum, samples: int) -> float:

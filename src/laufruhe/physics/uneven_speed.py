@@ -93,7 +93,9 @@ def _turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turn
 
 @lru_cache(maxsize=32)
 def _compute_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> _Turning:
-    phi, torque = _steps(engine, fidelity), _alternating_torque(engine, point, fidelity)
+    phi, torque = _steps(engine, fidelity), gas_torque(engine, point, fidelity)
+    # F2: the load takes the mean of the torque
+    torque = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     work, (inertia, _) = torque.integral.sample(fidelity.samples), _inertia(engine, fidelity, phi)
     start = start_energy(work, inertia, point.speed)
     pace = spectrum_of(point.speed / np.sqrt(2.0 * (start + work) / inertia), engine.cycle.base_order)
@@ -102,7 +104,17 @@ def _compute_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) 
 
 @lru_cache(maxsize=64)
 def _motion_at(turning: _Turning, times: bytes) -> CrankMotion:
-    torque, angle = turning.torque, _angles_at(turning.pace, np.frombuffer(times))
+    torque, asked = turning.torque, np.frombuffer(times)
+    # crank angles at these times: the inverse of t(phi), whose derivative is the pace, by Newton's method
+    shift = turning.pace.integral.coefficients
+    series = Spectrum(turning.pace.base, np.stack([shift, turning.pace.coefficients], axis=1))
+    origin, angle = float(shift.sum().real), asked.copy()
+    for _ in range(_ROUNDS):
+        values = series.values(angle)
+        step = (asked - (angle + values[:, 0] - origin)) / values[:, 1]
+        angle = angle + step
+        if float(np.abs(step).max()) <= 1e-13:
+            break
     inertia, slope = _inertia(turning.engine, turning.fidelity, angle)
     square = 2.0 * (turning.start + torque.integral.values(angle)) / inertia
     # d/d phi of J w^2 / 2 = torque less load (F2)
@@ -123,7 +135,10 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     def wrench(motion: CrankMotion) -> Array:
         total = _rotor_loads((*engine.pins, *engine.rotors), motion)
         for part in engine.slider_cranks:
-            total += _slider_loads(part, motion, fidelity)
+            # L7 with the second derivative by time in full
+            square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
+            moving, axis = part.motion(np, _alpha(part, motion.angle)), cis(as_turn(part.bank))
+            total += cylinder_wrench(part, moving, axis, square, turning, with_rods=fidelity.rod == "rigid").T
         total[:, 3] += torque.values(motion.angle)
         # parts that accelerate with the crank (L8)
         total[:, 3] += geared_factor(engine) * fidelity.crank_inertia * motion.acceleration
@@ -150,12 +165,6 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
     return gas_loads(engine, gas, fidelity).mapped(lambda loads: loads[:, 3])
-
-
-def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    # F2: torque of the gas less that of the load, which takes its mean
-    torque = gas_torque(engine, point, fidelity)
-    return torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
@@ -203,30 +212,8 @@ def start_energy(work: Array, inertia: Array, speed: float) -> float:
     raise ModelError("the crank all but stops within the cycle; raise the crank inertia or the speed")
 
 
-def _angles_at(pace: Spectrum, times: Array) -> Array:
-    """Return the crank angles at equal times: the inverse of t(phi), whose derivative is `pace`, by Newton."""
-    shift = pace.integral.coefficients
-    series = Spectrum(pace.base, np.stack([shift, pace.coefficients], axis=1))
-    origin = float(shift.sum().real)
-    angle = times.copy()
-    for _ in range(_ROUNDS):
-        values = series.values(angle)
-        step = (times - (angle + values[:, 0] - origin)) / values[:, 1]
-        angle = angle + step
-        if float(np.abs(step).max()) <= 1e-13:
-            break
-    return angle
-
-
 def _alpha(part: SliderCrank, phi: Array) -> Array:
     return np.asarray(part.shaft.ratio * phi + (part.throw - part.bank))
-
-
-def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) -> Array:
-    # F5: L7 with d2/dt2 in full, shape (n, 6)
-    square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
-    moving, axis = part.motion(np, _alpha(part, motion.angle)), cis(as_turn(part.bank))
-    return np.asarray(cylinder_wrench(part, moving, axis, square, turning, with_rods=fidelity.rod == "rigid").T)
 
 
 def _rotor_loads(rotors: Sequence[Rotor], motion: CrankMotion) -> Array:

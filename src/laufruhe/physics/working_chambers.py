@@ -7,14 +7,11 @@ the way out and once on the way back; what its pressure is over that of the air 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.machine import Chamber, Chambers, Cycle, PressureTrace, Pump, SliderCrank, Steam
-from laufruhe.numerics.arrays import Array
+from laufruhe.machine import Chamber, Chambers, Cycle, PressureTrace, SliderCrank, Steam
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.cylinder_volume import JUMP_WIDTH, dead_centres, swept_volume
 from laufruhe.physics.pressure_trace import trace_pressure
 
@@ -37,7 +34,23 @@ def chambers_thrust(gas: Chambers, part: SliderCrank, angles: Array) -> Array:
 
 def chambers_breaks(gas: Chambers, part: SliderCrank) -> Array:
     """Return the angles after the dead centre at which a derivative of a pressure jumps [rad]."""
-    return np.array(sorted({angle for chamber in gas.of(part) for angle in _breaks(chamber, part)}))
+    breaks = set[float]()
+    for chamber in gas.of(part):
+        smallest, largest = _ends(chamber, part)
+        if isinstance(chamber.diagram, PressureTrace):
+            breaks.update(smallest + angle for angle in chamber.diagram.angles)
+            continue
+        inner = [(place, is_out) for place, is_out in chamber.diagram.turning_points if 0.0 < place < 1.0]
+        places, way = np.array([place for place, _ in inner]), np.array([is_out for _, is_out in inner], dtype=bool)
+        # on either way from where the chamber is smallest, forwards or backwards, so that travel rises
+        begin = np.where(way, smallest, smallest + math.tau)
+        low, high = np.zeros(len(inner)), np.ones(len(inner))
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (low + high)
+            beyond = chamber_travel(chamber, part, begin + middle * (largest - begin)) > places
+            low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
+        breaks.update([smallest, largest, *(begin + low * (largest - begin)).tolist()])
+    return np.array(sorted(breaks))
 
 
 def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
@@ -46,8 +59,9 @@ def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Arra
     def at(angles: Array) -> Array:
         smallest, largest = _ends(chamber, part)
         local = np.mod(angles - smallest, math.tau)
-        pressures = PRESSURES[type(chamber.diagram)]
-        return pressures(chamber.diagram, chamber_travel(chamber, part, angles), local < largest - smallest, local)
+        if isinstance(chamber.diagram, PressureTrace):
+            return trace_pressure(chamber.diagram, Cycle.TWO_STROKE, local)
+        return _steam(chamber.diagram, chamber_travel(chamber, part, angles), local < largest - smallest)
 
     return 0.5 * (at(angles - JUMP_WIDTH) + at(angles + JUMP_WIDTH))
 
@@ -63,23 +77,7 @@ def _ends(chamber: Chamber, part: SliderCrank) -> tuple[float, float]:
     return (top, bottom) if chamber.side > 0 else (bottom, top + math.tau)
 
 
-def _breaks(chamber: Chamber, part: SliderCrank) -> list[float]:
-    smallest, largest = _ends(chamber, part)
-    if isinstance(chamber.diagram, PressureTrace):
-        return [smallest + angle for angle in chamber.diagram.angles]
-    inner = [(place, is_out) for place, is_out in chamber.diagram.turning_points if 0.0 < place < 1.0]
-    places, way = np.array([place for place, _ in inner]), np.array([is_out for _, is_out in inner], dtype=bool)
-    # on either way from where the chamber is smallest, forwards or backwards, so that travel rises
-    begin = np.where(way, smallest, smallest + math.tau)
-    low, high = np.zeros(len(inner)), np.ones(len(inner))
-    for _ in range(_HALVINGS):
-        middle = 0.5 * (low + high)
-        beyond = chamber_travel(chamber, part, begin + middle * (largest - begin)) > places
-        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
-    return [smallest, largest, *(begin + low * (largest - begin)).tolist()]
-
-
-def _steam(diagram: Steam, travel: Array, out: NDArray[np.bool_], _: Array) -> Array:
+def _steam(diagram: Steam, travel: Array, out: Mask) -> Array:
     """Return the pressure of admission, expansion and release, then of exhaust, compression and lead (G15)."""
     released = _expanded(diagram, diagram.admission, diagram.cut_off, np.asarray(diagram.release))
     squeezed = _expanded(diagram, diagram.back_pressure, diagram.compression, np.asarray(diagram.lead))
@@ -99,20 +97,3 @@ def _expanded(diagram: Steam, pressure: float, begin: float, end: Array) -> Arra
     volume = end + diagram.clearance
     shrinking = np.where(volume > 0.0, (begin + diagram.clearance) / np.where(volume > 0.0, volume, 1.0), 1.0)
     return np.asarray(pressure * shrinking**diagram.exponent)
-
-
-def _pump(diagram: Pump, _: Array, out: NDArray[np.bool_], __: Array) -> Array:
-    # G17: suction while the chamber grows, delivery while it shrinks
-    return np.where(out, diagram.suction, diagram.delivery)
-
-
-def _trace(diagram: PressureTrace, _: Array, __: NDArray[np.bool_], local: Array) -> Array:
-    # G12: trace over the crank angle from where the chamber of this side is smallest
-    return trace_pressure(diagram, Cycle.TWO_STROKE, local)
-
-
-PRESSURES: Mapping[type, Callable[[Any, Array, NDArray[np.bool_], Array], Array]] = {
-    Steam: _steam,
-    Pump: _pump,
-    PressureTrace: _trace,
-}

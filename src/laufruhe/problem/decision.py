@@ -14,7 +14,7 @@ import numpy as np
 
 from laufruhe.extension import extended
 from laufruhe.machine import Engine, Flywheel, Mount
-from laufruhe.machine.leads import with_leads
+from laufruhe.machine.engine import with_leads
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes

@@ -14,7 +14,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityTable
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.physics.mount_forces import turning_amplitudes
+from laufruhe.physics.rigid_body import turning_parts
 from laufruhe.problem.channels import CHANNELS, mounting_in
 from laufruhe.problem.evaluation import channel_samples, place_measures
 from laufruhe.problem.measure import MEASURES, Measure
@@ -123,7 +123,8 @@ def _by_order(part: slice, result: Result, table: QuantityQuery) -> Labelled:
 
 def _turning(part: slice, result: Result, table: QuantityQuery) -> Labelled:
     orders = table.orders or ORDERS
-    values = [list(turning_amplitudes(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
+    wrenches = [result.final.loads[0].wrench.at(order)[part] for order in orders]
+    values = [[float(abs(turning)) for turning in turning_parts(*wrench[-2:])] for wrench in wrenches]
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
 
 

@@ -4,36 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 from laufruhe import units
 from laufruhe.errors import KeyedError
 from laufruhe.extensions.rotary.unit import FLANKS, RotaryUnit
 from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts.banks import Inline
 from laufruhe.machine.layouts.base import SPACING, LayoutKey
-from laufruhe.machine.layouts.build import Mechanism, numbers_of
-from laufruhe.machine.layouts.inline import Inline
-from laufruhe.machine.slider_crank import SliderCrank
-
-
-@dataclass(frozen=True, kw_only=True)
-class RotorMechanism(Mechanism):
-    """Sizes shared by all rotors of an engine; `rod_rotating_mass` is the mass of the rotor.
-
-    Attributes
-    ----------
-    rotor_radius, rotor_width, rotor_inertia
-        See `RotaryUnit`.
-    """
-
-    rotor_radius: float
-    rotor_width: float
-    rotor_inertia: float
-
-    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
-        numbers = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
-        return RotaryUnit(**numbers_of(plain) | numbers | {"name": f"rotor {number}"})
+from laufruhe.machine.layouts.build import Mechanism
 
 
 class Rotary(Inline):
@@ -56,7 +35,7 @@ class Rotary(Inline):
             raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(cycle))
         return Cycle.TWO_STROKE
 
-    def mechanism(self, options: Mapping[str, Any], **shared: Any) -> RotorMechanism:
+    def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:
         """Return the mechanism of rotor and eccentric.
 
         Raises
@@ -72,10 +51,11 @@ class Rotary(Inline):
             limit = units.quantity_text(shortest, "m")
             rule = f"does not let the rotor turn, it must be over three eccentricities, {limit}"
             raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.quantity_text(radius, "m"))
-        return RotorMechanism(
-            options["eccentricity"], math.inf, 0.0, rod_rotating_mass=options["rotor_mass"], rotor_radius=radius,
-            rotor_width=options["rotor_width"], rotor_inertia=options["rotor_inertia"], **shared,
-        )  # fmt: skip
+        own = {key: options[key] for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
+        mass = options["rotor_mass"]
+        return Mechanism(
+            options["eccentricity"], math.inf, 0.0, rod_rotating_mass=mass, kind=RotaryUnit, own=own, **shared
+        )
 
 
 ROTARY = Rotary()

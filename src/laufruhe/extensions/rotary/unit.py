@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -37,7 +37,11 @@ class RotaryUnit(SliderCrank):
     rotor_radius: float
     rotor_width: float
     rotor_inertia: float = 0.0
+    noun: ClassVar[str] = "rotor"
     has_rod: ClassVar[bool] = False
+    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
+        **SliderCrank.dimensions, "rotor_radius": (0, 1), "rotor_width": (0, 1), "rotor_inertia": (1, 2),
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -118,7 +122,14 @@ class RotaryUnit(SliderCrank):
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
         """Return the outlines of housing and rotor (Y1)."""
-        rotor = self.crank_radius * cmath.exp(1j * alpha) + self._flanks() * cmath.exp(1j * alpha / 3.0)
+        half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
+        height = np.linspace(-half, half, 31)
+        flank = 0.5 * self.rotor_radius + 1j * height
+        if rise > 0.0:
+            arc = 0.5 * (half**2 + rise**2) / rise
+            flank += rise - arc + np.sqrt(arc**2 - height**2)
+        flanks = np.outer(np.exp(1j * math.tau * np.arange(FLANKS) / FLANKS), flank).reshape(-1)
+        rotor = self.crank_radius * cmath.exp(1j * alpha) + flanks * cmath.exp(1j * alpha / 3.0)
         housing = self.housing(np.linspace(0.0, math.tau, 181))
         return Outline(housing, self.rotor_width, False), Outline(rotor, self.rotor_width, True)
 
@@ -126,23 +137,3 @@ class RotaryUnit(SliderCrank):
         """Return the peritrochoid of the apexes, at angles of an apex about the rotor's centre (Y1; textbook eq. 7)."""
         # at alpha = 0 the flank, and no apex, looks to where it fires
         return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)
-
-    def _flanks(self) -> Any:
-        return np.concatenate([self._flank() * cmath.exp(1j * math.tau * k / FLANKS) for k in range(FLANKS)])
-
-    def _flank(self) -> Any:
-        half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
-        height = np.linspace(-half, half, 31)
-        if rise <= 0.0:
-            return 0.5 * self.rotor_radius + 1j * height
-        arc = 0.5 * (half**2 + rise**2) / rise
-        return 0.5 * self.rotor_radius + rise - arc + np.sqrt(arc**2 - height**2) + 1j * height
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the rotor in another size."""
-        return replace(
-            super().scaled(length, mass),
-            rotor_radius=self.rotor_radius * length,
-            rotor_width=self.rotor_width * length,
-            rotor_inertia=self.rotor_inertia * mass * length**2,
-        )

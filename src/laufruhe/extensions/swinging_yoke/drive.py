@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import KeyedError
 from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine.drives.base import DriveKind, Sizes
 from laufruhe.machine.layouts.base import LayoutKey
-from laufruhe.machine.layouts.build import Mechanism, numbers_of
-from laufruhe.machine.slider_crank import SliderCrank
-
-
-@dataclass(frozen=True, kw_only=True)
-class Yoke(Mechanism):
-    """Sizes shared by all yokes of an engine; `options` holds the fields that only `SwingingYoke` has."""
-
-    options: Mapping[str, float]
-
-    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
-        return SwingingYoke(**numbers_of(plain) | dict(self.options))
+from laufruhe.machine.layouts.build import Mechanism
 
 
 class SwingingYokeDrive(DriveKind):
@@ -67,16 +55,15 @@ class SwingingYokeDrive(DriveKind):
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
         if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:
             raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
-        of_lever: dict[str, Any] = {
+        own: dict[str, Any] = {
             "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
             "lever_weight": numbers["lever_weight"] or 0.0,
             "lever_weight_radius": numbers["lever_weight_radius"] or 0.0,
         }  # fmt: skip
         if numbers["lever"] is not None:
             names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
-            of_lever |= {name: numbers["lever"][key] for key, name in names.items()}
-        shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
-        return Yoke(**shared | {"offset": 0.0}, options=of_lever)
+            own |= {name: numbers["lever"][key] for key, name in names.items()}
+        return replace(plain, offset=0.0, kind=SwingingYoke, own=own)
 
 
 SWINGING_YOKE = SwingingYokeDrive()

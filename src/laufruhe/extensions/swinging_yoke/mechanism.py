@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -50,8 +50,9 @@ class SwingingYoke(SliderCrank):
     lever_weight_radius: float = 0.0
     has_pin_loads: ClassVar[bool] = False
     is_balanced_by_share: ClassVar[bool] = False
-    weightless: ClassVar[Mapping[str, float]] = {
-        **SliderCrank.weightless, "lever_mass": 0.0, "lever_inertia": 0.0, "lever_weight": 0.0,
+    dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
+        **SliderCrank.dimensions, "lever_mass": (1, 0), "lever_inertia": (1, 2), "lever_weight": (1, 0),
+        **dict.fromkeys(("pivot", "lever_length", "ram_height", "lever_centre", "lever_weight_radius"), (0, 1)),
     }  # fmt: skip
 
     def __post_init__(self) -> None:
@@ -149,20 +150,6 @@ class SwingingYoke(SliderCrank):
         if self.lever_weight > 0.0:
             bodies.append(Outline(pivot + direction * (_box(0.5 * side, 0.5 * side) - behind), _THICKNESS, True))
         return tuple(bodies)
-
-    def scaled(self, length: float, mass: float) -> Self:
-        """Return the same mechanism in another size."""
-        return replace(
-            super().scaled(length, mass),
-            pivot=self.pivot * length,
-            lever_length=self.lever_length * length,
-            ram_height=self.ram_height * length,
-            lever_mass=self.lever_mass * mass,
-            lever_centre=self.lever_centre * length,
-            lever_inertia=self.lever_inertia * mass * length**2,
-            lever_weight=self.lever_weight * mass,
-            lever_weight_radius=self.lever_weight_radius * length,
-        )
 
 
 def _box(half_length: float, half_width: float) -> Any:

@@ -6,22 +6,16 @@ Cylinders are counted from the front (C3).
 from collections.abc import Mapping
 
 from laufruhe.extension import extended
-from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
-from laufruhe.machine.layouts.boxer import Boxer, boxer
+from laufruhe.machine.layouts.banks import Boxer, Inline, Vee, XEngine, boxer, inline, vee
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, Parts, rod_of
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
 from laufruhe.machine.layouts.delta import Delta
-from laufruhe.machine.layouts.inline import Inline, inline
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
-from laufruhe.machine.layouts.parts import Parts
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.radial import Radial
-from laufruhe.machine.layouts.vee import Vee, vee
-from laufruhe.machine.layouts.x_engine import XEngine
 
 LAYOUTS: Mapping[str, LayoutKind] = extended(
-    "layouts",
-    LayoutKind,
-    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), XEngine(), Parts()),
+    "layouts", LayoutKind, (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), XEngine(), Parts())
 )
 
 __all__ = [

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from laufruhe import units
-from laufruhe.errors import KeyedError
+from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.bodies import Rod
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.build import Mechanism, Throw, build
@@ -154,3 +154,16 @@ class LayoutKind(ABC):
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks and the throws that they work on."""
         return build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order)
+
+
+class Parts(LayoutKind):
+    """Free list of slider-cranks with their places."""
+
+    name = "parts"
+    keys = ()
+    lists = ("slider_cranks", "shafts")
+    is_free = True
+
+    def place(self, inputs: LayoutInput) -> Layout:
+        """Refuse: the list gives every place."""
+        raise ModelError(f"a list of {counted(inputs.cylinders, 'slider-crank')} has no layout; fix the throws")

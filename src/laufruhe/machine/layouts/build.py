@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
@@ -32,6 +32,10 @@ class Mechanism:
         The rod's share per cylinder [kg].
     rod_inertia_deficit
         [kg m2] (eq. 10).
+    kind
+        Class of the slider-cranks.
+    own
+        Fields that only this class has.
     """
 
     crank_radius: float
@@ -43,6 +47,8 @@ class Mechanism:
     offset: float = 0.0
     bore: float | None = None
     big_end: tuple[float, float] | None = None
+    kind: type[SliderCrank] = SliderCrank
+    own: Mapping[str, Any] = field(default_factory=dict)
 
     def cylinder(
         self,
@@ -54,19 +60,9 @@ class Mechanism:
         pin_mass: float = 0.0,
         shaft: Shaft = CRANKSHAFT,
     ) -> SliderCrank:
-        """Return the slider-crank of a cylinder.
-
-        Parameters
-        ----------
-        number
-            Of the cylinder (C3).
-        x, throw, bank, firing_angle, shaft
-            Place [m] and angles [rad]; see `SliderCrank`.
-        pin_mass
-            Rotating mass at the crank pin without the rod's share [kg].
-        """
-        plain = SliderCrank(
-            name=f"cylinder {number}",
+        """Return the slider-crank of a cylinder, with a mass at the crank pin without the rod's share [kg]."""
+        return self.kind(
+            name=f"{self.kind.noun} {number}",
             x=x,
             crank_radius=self.crank_radius,
             rod_length=self.rod_length,
@@ -80,16 +76,8 @@ class Mechanism:
             firing_angle=firing_angle,
             shaft=shaft,
             big_end=self.big_end,
+            **self.own,
         )
-        return self._made_of(plain, number)
-
-    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
-        return plain
-
-
-def numbers_of(plain: SliderCrank) -> dict[str, Any]:
-    """Return the fields of a slider-crank, to construct a mechanism that has more."""
-    return {number.name: getattr(plain, number.name) for number in fields(plain)}
 
 
 def firing_angles(
@@ -217,16 +205,14 @@ def build(
         )
         for k in cylinders
     )
-    return slider_cranks, _throws_of(layout, mechanism, angles)
-
-
-def _throws_of(layout: Layout, mechanism: Mechanism, angles: Sequence[float]) -> tuple[Throw, ...]:
-    return tuple(
+    unbalance = mechanism.rotating_mass * mechanism.crank_radius
+    throws = tuple(
         Throw(
             x,
             angles[pin],
-            tuple(k for k, pin_throw in enumerate(layout.pins) if pin_throw == pin),
-            mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angles[pin])),
+            tuple(k for k, own_pin in enumerate(layout.pins) if own_pin == pin),
+            unbalance * cis(as_turn(angles[pin])),
         )
         for pin, x in enumerate(layout.throw_positions)
     )
+    return slider_cranks, throws

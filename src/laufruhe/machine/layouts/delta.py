@@ -10,9 +10,10 @@ from fractions import Fraction
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
+from laufruhe.machine.layouts.banks import in_banks
 from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
 from laufruhe.machine.layouts.build import Throw
-from laufruhe.machine.layouts.places import Layout, stations
+from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.exact_angles import Turn, angle_of, as_turn, cis, reduced_turn
@@ -99,19 +100,9 @@ class Delta(LayoutKind):
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Return rows by the throws of the lower crank, banks by the dead centres of their first pistons."""
-        rows, rest = divmod(inputs.cylinders, 3)
-        if rest:
-            raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(inputs.cylinders))
-        triangle, places = self._triangle(inputs), stations(rows, inputs.spacing(rows))
+        triangle = self._triangle(inputs)
         turns = [angle_of(reduced_turn(triangle.centre(bank, bank), 1)) for bank in range(3)]
-        return Layout(
-            "delta",
-            places * 3,
-            tuple(turn for turn in turns for _ in places),
-            tuple(range(rows)) * 3,
-            (0.0,) * inputs.cylinders,
-            places,
-        )
+        return in_banks(self.name, inputs.cylinders, inputs.spacing(inputs.cylinders // 3), turns)
 
     def _triangle(self, inputs: LayoutInput) -> Triangle:
         if inputs.options["crank_distance"] is None:
@@ -136,41 +127,28 @@ class Delta(LayoutKind):
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the pistons at the first corners of the banks, then at the second, and the throws of all cranks."""
-        triangle, mechanism = self._triangle(inputs), inputs.mechanism
+        triangle, mechanism, order = self._triangle(inputs), inputs.mechanism, inputs.firing_order
         pistons: list[SliderCrank] = []
         cranks: list[Throw] = []
         for turned in (0, 1):
             for bank in range(3):
                 corner = (bank + turned) % 3
-                for row, x in enumerate(layout.throw_positions):
-                    pistons.append(_piston(triangle, corner, bank, x, throws[row], inputs, len(pistons) + 1))
+                shaft, axis = triangle.shafts[corner], triangle.axis(corner, bank)
+                for x, throw in zip(layout.throw_positions, throws, strict=True):
+                    centre = reduced_turn(triangle.centre(corner, bank) - as_turn(throw), 1)
+                    angle = reduced_turn(axis - triangle.ratios[corner] * centre, 1)
+                    angles = (angle_of(angle), angle_of(reduced_turn(axis, 1)), angle_of(centre))
+                    pistons.append(mechanism.cylinder(len(pistons) + 1, x, *angles, shaft=shaft))
         for shaft in triangle.shafts:
             for x in layout.throw_positions:
                 piston_numbers = tuple(k for k, part in enumerate(pistons) if part.shaft == shaft and part.x == x)
                 angle = pistons[piston_numbers[0]].throw
                 unbalance = mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angle))
                 cranks.append(Throw(x, angle, piston_numbers, unbalance, shaft))
-        _check_order(inputs.firing_order, pistons[: inputs.cylinders])
+        if order is not None:
+            fires = [as_turn(part.firing_angle) for part in pistons[: inputs.cylinders]]
+            turns = [reduced_turn(fires[k - 1] - fires[order[0] - 1], 1) for k in order]
+            if turns != sorted(turns):
+                fired = sorted(range(1, len(fires) + 1), key=lambda k: fires[k - 1])
+                raise ModelError(f"these throws fire in the order {fired}, not {list(order)}")
         return tuple(pistons), tuple(cranks)
-
-
-def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> None:
-    if order is None:
-        return
-    turns = [
-        reduced_turn(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order
-    ]
-    if turns != sorted(turns):
-        fired = sorted(range(len(firsts)), key=lambda k: firsts[k].firing_angle)
-        raise ModelError(f"these throws fire in the order {[k + 1 for k in fired]}, not {list(order)}")
-
-
-def _piston(
-    triangle: Triangle, corner: int, bank: int, x: float, throw: float, inputs: LayoutInput, number: int
-) -> SliderCrank:
-    shaft = triangle.shafts[corner]
-    centre = reduced_turn(triangle.centre(corner, bank) - as_turn(throw), 1)
-    axis = triangle.axis(corner, bank)
-    angle = reduced_turn(axis - triangle.ratios[corner] * centre, 1)
-    angles = (angle_of(angle), angle_of(reduced_turn(axis, 1)), angle_of(centre))
-    return inputs.mechanism.cylinder(number, x, *angles, shaft=shaft)

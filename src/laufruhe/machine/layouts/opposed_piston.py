@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
+from laufruhe.machine.layouts.banks import Inline
 from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey
 from laufruhe.machine.layouts.build import Throw
-from laufruhe.machine.layouts.inline import Inline
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import Shaft
 from laufruhe.machine.slider_crank import SliderCrank

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from laufruhe.errors import ModelError
 from laufruhe.numerics.exact_angles import Turn, as_turn
 
 
@@ -64,9 +63,3 @@ class Layout:
 def stations(count: int, spacing: float) -> tuple[float, ...]:
     """Return `count` places at equal spacing, the first at the front, the middle at x = 0 (C2)."""
     return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))
-
-
-def check_even(cylinders: int, what: str) -> None:
-    """Refuse an odd number of cylinders on two banks."""
-    if cylinders < 2 or cylinders % 2:
-        raise ModelError(f"{what} needs an even number of cylinders, got {cylinders}")

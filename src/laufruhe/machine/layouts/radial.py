@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
-from laufruhe.machine.layouts.build import Mechanism, Throw, build, numbers_of
+from laufruhe.machine.layouts.build import Mechanism, Throw, build
 from laufruhe.machine.layouts.places import Layout
-from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine.slider_crank import SliderCrank, as_kind
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,12 +48,17 @@ class MasterRod(Mechanism):
     knuckle_mass: float
     rod: Mapping[str, float] | None
 
-    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
-        """The master's slider-crank, or an articulated one."""
+    def cylinder(self, number: int, *place: Any, **others: Any) -> SliderCrank:
+        """Return the master's slider-crank, or an articulated one."""
+        plain = super().cylinder(number, *place, **others)
         if number == self.master:
             return plain
-        knuckle = self._knuckle(number)
-        length = self.length or knuckle.length_to(_top(knuckle.master), plain.bank)
+        rod_of_master = SliderCrank(
+            "master rod", 0.0, self.crank_radius, self.rod_length, 0.0, 0.0, self.master_bank, self.offset
+        )
+        knuckle = Knuckle(rod_of_master, self.knuckle_radius, self.knuckle_angles[number - 1])
+        top = complex(math.sqrt((self.rod_length + self.crank_radius) ** 2 - self.offset**2), self.offset)
+        length = self.length or knuckle.length_to(top, plain.bank)
         rod = None if self.rod is None else rod_of("articulated_rod", self.rod, length, "knuckle pin")
         articulated = replace(
             plain,
@@ -63,17 +69,7 @@ class MasterRod(Mechanism):
         )
         if self.knuckle_radius == 0.0:
             return articulated
-        return ArticulatedCrank(**numbers_of(articulated), knuckle=knuckle)
-
-    def _knuckle(self, number: int) -> Knuckle:
-        rod = SliderCrank(
-            "master rod", 0.0, self.crank_radius, self.rod_length, 0.0, 0.0, self.master_bank, self.offset
-        )
-        return Knuckle(rod, self.knuckle_radius, self.knuckle_angles[number - 1])
-
-
-def _top(part: SliderCrank) -> complex:
-    return complex(math.sqrt((part.rod_length + part.crank_radius) ** 2 - part.offset**2), part.offset)
+        return as_kind(ArticulatedCrank, articulated, knuckle=knuckle)
 
 
 class Radial(LayoutKind):
@@ -158,8 +154,9 @@ def _master_rod(inputs: LayoutInput) -> MasterRod:
         raise KeyedError("knuckle_angles", f"{rule}; give one each, by cylinder")
     even = [bank - banks[master - 1] for bank in banks]
     angles = even if knuckle_angles is None else [*knuckle_angles[: master - 1], 0.0, *knuckle_angles[master - 1 :]]
+    shared = {number.name: getattr(inputs.mechanism, number.name) for number in fields(inputs.mechanism)}
     return MasterRod(
-        **{shared.name: getattr(inputs.mechanism, shared.name) for shared in fields(inputs.mechanism)},
+        **shared,
         master=master,
         master_bank=banks[master - 1],
         knuckle_radius=radius,

@@ -22,8 +22,8 @@ from laufruhe.files.fields import Table
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, SliderCrank
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.physics.mount_forces import turning_amplitudes
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
+from laufruhe.physics.rigid_body import turning_parts
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import fixed
@@ -71,7 +71,7 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     unit = part.reciprocating_mass * part.crank_radius * SPEED**2 * float(amplitude)
     load = reciprocating_loads(engine, SPEED).at(order)
     force, couple = load[1:3] / unit, load[4:6] / (unit * spacing)
-    (_, force_against), (_, couple_against) = turning_amplitudes(*force), turning_amplitudes(*couple)
+    force_against, couple_against = (float(abs(turning_parts(*load)[1])) for load in (force, couple))
     return FreeLoad(float(order_amplitude(force)), float(order_amplitude(couple)), force_against, couple_against)
 
 

@@ -1,0 +1,140 @@
+"""Banks of cylinders at equal distances: in line, vee, boxer and X."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+from laufruhe.errors import KeyedError
+from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
+from laufruhe.machine.layouts.places import Layout, stations
+
+STAGGER = LayoutKey("bank_stagger", "length")
+X_BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
+
+
+def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], stagger: float = 0.0) -> Layout:
+    """Return banks that share the throws, numbered bank by bank from the front.
+
+    Parameters
+    ----------
+    spacing
+        Between throws [m].
+    banks
+        Bank angles [rad].
+    stagger
+        Distance by which the first of two banks stands forward of the other [m].
+
+    Raises
+    ------
+    KeyedError
+        If the banks would not be alike.
+    """
+    throws, others = divmod(cylinders, len(banks))
+    if others or not throws:
+        rule = f"is no multiple of the {len(banks)} banks of layout '{name}'; give one that is"
+        raise KeyedError("cylinders", rule, str(cylinders))
+    places = stations(throws, spacing)
+    return Layout(
+        name,
+        tuple(x + (0.5 - k) * stagger for k in range(len(banks)) for x in places),
+        tuple(bank for bank in banks for _ in places),
+        (*range(throws),) * len(banks),
+        (0.0,) * cylinders,
+        places,
+    )
+
+
+def inline(cylinders: int, spacing: float) -> Layout:
+    """Return a single upright bank."""
+    return in_banks("inline", cylinders, spacing, (0.0,))
+
+
+def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
+    """Return two banks on shared or split pins.
+
+    Parameters
+    ----------
+    cylinders
+        Even number: the left bank, leaning to +y, has numbers 1 to n/2, the right bank the rest.
+    spacing
+        Between throws [m].
+    bank_angle
+        Between the banks [rad].
+    split_pin
+        Angle by which the right bank's pin leads the left bank's on one throw [rad].
+    bank_stagger
+        Distance by which the left bank stands forward of the right one [m].
+    """
+    layout = in_banks("vee", cylinders, spacing, (0.5 * bank_angle, -0.5 * bank_angle), bank_stagger)
+    sides = tuple(side for side in (0.5, -0.5) for _ in layout.throw_positions)
+    return replace(layout, sides=sides, pin_offsets=tuple(-side * split_pin for side in sides))
+
+
+def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
+    """Return banks as of a vee of 180 degrees, every cylinder on a throw of its own, opposed pistons in step."""
+    layout = in_banks("boxer", cylinders, spacing, (0.5 * math.pi, -0.5 * math.pi), bank_stagger)
+    return replace(layout, pins=tuple(range(cylinders)), throw_positions=layout.positions)
+
+
+class Inline(LayoutKind):
+    """Single bank with a throw for every cylinder."""
+
+    name = "inline"
+    openable: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
+
+    def place(self, inputs: LayoutInput) -> Layout:
+        """Return a single upright bank."""
+        return inline(inputs.cylinders, inputs.spacing(inputs.cylinders))
+
+
+class Vee(LayoutKind):
+    """Two banks with a throw for each pair of cylinders."""
+
+    name = "vee"
+    keys = (
+        SPACING,
+        LayoutKey("bank_angle", "open angle", "Angle between the banks of a vee."),
+        LayoutKey("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
+        STAGGER,
+    )  # fmt: skip
+    openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")
+    cylinders_per_throw = 2
+    banks = 2
+
+    def place(self, inputs: LayoutInput) -> Layout:
+        """Return two banks on shared or split pins."""
+        count, options = inputs.cylinders, inputs.options
+        if options["bank_angle"] is None:
+            raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
+        split, stagger = options["split_pin_angle"] or 0.0, options["bank_stagger"] or 0.0
+        return vee(count, inputs.spacing(count // self.banks), options["bank_angle"], split, stagger)
+
+
+class Boxer(LayoutKind):
+    """Opposed banks with a throw for every cylinder."""
+
+    name = "boxer"
+    keys = (SPACING, STAGGER)
+    banks = 2
+
+    def place(self, inputs: LayoutInput) -> Layout:
+        """Return banks at 180 degrees."""
+        count, stagger = inputs.cylinders, inputs.options["bank_stagger"]
+        if stagger is None:
+            raise KeyedError("bank_stagger", "is missing; add the distance between opposed cylinders")
+        return boxer(count, inputs.spacing(count // self.banks), stagger)
+
+
+class XEngine(LayoutKind):
+    """Four banks at right angles, a throw for four cylinders: upper left, upper right, lower left, lower right."""
+
+    name = "x-engine"
+    cylinders_per_throw = 4
+    banks = 4
+
+    def place(self, inputs: LayoutInput) -> Layout:
+        """Return the places bank by bank."""
+        return in_banks(self.name, inputs.cylinders, inputs.spacing(inputs.cylinders // 4), X_BANKS)
