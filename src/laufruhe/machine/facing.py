@@ -108,13 +108,7 @@ def _chamber(part: SliderCrank) -> SharedChamber:
 
 
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
-    """Return the pistons, those that face each other with the chamber that both sweep.
-
-    Raises
-    ------
-    ModelError
-        If two pistons have no chamber between them that is modelled.
-    """
+    """Return the pistons, those that face each other with the chamber that both sweep."""
     pistons = list(parts)
     for k, part in enumerate(parts):
         for other in parts:

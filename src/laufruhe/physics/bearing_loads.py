@@ -76,11 +76,6 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     Returns
     -------
     Spectrum of shape (n, cylinders, 2) [N]: P away from the crank, N towards i e^{i beta}. Together they press the rod.
-
-    Raises
-    ------
-    ModelError
-        As `pin_forces`; if there is no rod.
     """
     for part in engine.slider_cranks:
         if not part.has_rod:
@@ -115,11 +110,6 @@ def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelit
     Returns
     -------
     Spectrum of shape (n, bearings, 3) [N], in the axes of C2.
-
-    Raises
-    ------
-    ModelError
-        As `pin_forces`; if a shaft that is loaded has fewer than two bearings.
     """
     _check_even(fidelity)
     gas, parts = fidelity.gas_of(point), engine.slider_cranks

@@ -295,13 +295,7 @@ def _coupled(matrix: Array) -> bool:
 def elastic_mounting(
     block: Block, mounts: Sequence[Mount], answering: tuple[int, ...] | None = None
 ) -> ElasticMounting:
-    """Return the mounting of a block; `answering` selects modes, all when None.
-
-    Raises
-    ------
-    ModelError
-        Without a mount that has a stiffness.
-    """
+    """Return the mounting of a block; `answering` selects modes, all when None."""
     if not any(any(spring.at_rest) for _, spring in every_spring(mounts)):
         raise ModelError("no mount has a stiffness; an elastic mounting needs one")
     return _elastic_mounting(block, tuple(mounts), answering)

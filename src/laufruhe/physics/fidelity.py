@@ -57,11 +57,6 @@ class Fidelity:
         along all of them.
     tolerance
         Relative error of the objective that was requested of an automatic choice.
-
-    Raises
-    ------
-    ChoiceError
-        If a choice means nothing, or two contradict each other.
     """
 
     kinematics: Kinematics = "exact"

@@ -52,13 +52,7 @@ def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChambe
 
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:
-    """Refuse a compression ratio that the shape of a chamber does not allow (Y2).
-
-    Raises
-    ------
-    ModelError
-        If the chamber would vanish.
-    """
+    """Refuse a compression ratio that the shape of a chamber does not allow (Y2)."""
     if isinstance(gas, Charge) and gas.compression_ratio > part.largest_ratio:
         raise ModelError(
             f"{gas.compression_ratio:g} leaves {part.name} no chamber, whose shape allows "

@@ -167,11 +167,6 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
     Returns
     -------
     Shape (4, orders): axial and transverse force, roll moment of point masses and of swings.
-
-    Raises
-    ------
-    ModelError
-        If steps that fine do not resolve it: the crank all but locks.
     """
     radius = part.crank_radius
 
@@ -199,11 +194,6 @@ def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale:
     Returns
     -------
     Shape (functions, orders).
-
-    Raises
-    ------
-    ModelError
-        If steps that fine do not resolve them: the crank all but locks.
     """
     steps = 64
     while steps <= _MAX_STEPS:

@@ -85,13 +85,7 @@ def free_motion(modes: Modes) -> str:
 
 
 def static_motion(modes: Modes, wrench: Array) -> Array:
-    """Return the motion (u, theta) under a steady wrench about the centre of gravity, shape (6,) (E9, E10).
-
-    Raises
-    ------
-    UncarriedLoadError
-        If the wrench drives a motion that no mount resists.
-    """
+    """Return the motion (u, theta) under a steady wrench about the centre of gravity, shape (6,) (E9, E10)."""
     drive = modes.shapes.T @ wrench
     loose = modes.free & (np.abs(drive) > 1e-9 * max(np.abs(drive).max(), 1e-300))
     if np.any(loose):

@@ -42,13 +42,7 @@ class RigidMounting:
     arm: float
 
     def forces(self, wrench: Spectrum, speed: float = 0.0) -> Spectrum:  # noqa: ARG002
-        """Return the mount forces by order, shape (n, mounts, 3) [N]; equal at every speed.
-
-        Raises
-        ------
-        UncarriedLoadError
-            If the wrench drives a direction that no mount carries.
-        """
+        """Return the mount forces by order, shape (n, mounts, 3) [N]; equal at every speed."""
         self.check_carried(wrench)
         return Mapped(wrench, self._forces_of)
 

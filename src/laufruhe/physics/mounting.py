@@ -46,13 +46,7 @@ def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed
 
 
 def mount_maps(mounting: Mounting, order: float, speed: float) -> NDArray[np.complex128]:
-    """Return the mount forces per wrench at one order and speed, shape (mounts, 3, 6).
-
-    Raises
-    ------
-    ModelError
-        Of mounts in the time domain, which have no map.
-    """
+    """Return the mount forces per wrench at one order and speed, shape (mounts, 3, 6)."""
     if isinstance(mounting, RigidMounting):
         return mounting.maps.astype(complex)
     if not isinstance(mounting, ElasticMounting):

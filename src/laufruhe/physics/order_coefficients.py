@@ -50,13 +50,7 @@ def _complement(rod_ratio: float, offset_ratio: float) -> float:
 
 @lru_cache(maxsize=1024)
 def orders_needed(rod_ratio: float, offset_ratio: float = 0.0) -> int:
-    """Return the order beyond which every coefficient is under 1e-18 of the first, times its order squared.
-
-    Raises
-    ------
-    ModelError
-        If more than 20 000 would be needed: the crank all but locks.
-    """
+    """Return the order beyond which every coefficient is under 1e-18 of the first, times its order squared."""
     q1, q2, _ = _poles(rod_ratio, offset_ratio)
     ratio = max(q1, q2)
     if ratio <= 0.0:

@@ -19,11 +19,6 @@ def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float 
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
-
-    Raises
-    ------
-    ModelError
-        If the trace covers less or more than the cycle, or has a gap of over 30 degrees.
     """
     # late, for it takes longer than all the rest of a small problem
     from scipy.interpolate import PchipInterpolator

@@ -17,14 +17,7 @@ _ROUNDING = 1e-12
 
 
 def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """Return the pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5).
-
-    Raises
-    ------
-    ModelError
-        If the peak pressure is below the end of compression, or no cut-off gives the
-        indicated mean pressure.
-    """
+    """Return the pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5)."""
     cylinder = ChargedCylinder(gas, part, cycle)
     top, _ = dead_centres(part)
     cut_off = cylinder.smallest * seiliger_cut_off(gas, cycle)
@@ -44,11 +37,6 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
 
     The mean pressure rises with the cut-off all the way, from heat at constant volume
     alone (1) to constant pressure down the whole stroke (the compression ratio).
-
-    Raises
-    ------
-    ModelError
-        With the range that can be reached.
     """
     end = compression_end_pressure(gas)
     if gas.peak_pressure < end * (1.0 - _ROUNDING):

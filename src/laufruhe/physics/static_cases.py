@@ -90,13 +90,7 @@ def stops_of(mounting: ElasticMounting) -> Stops:
 
 
 def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
-    """Return the equilibrium of the block under a load case (E55).
-
-    Raises
-    ------
-    SolverError
-        If no balance is found: it always is on mounts that hold every motion.
-    """
+    """Return the equilibrium of the block under a load case (E55)."""
     wrench, stops = case_wrench(mounting.block, case), stops_of(mounting)
     q = _balanced(mounting.stiffness, stops, wrench)
     beyond = stops.stiffness * stops.beyond(stops.rows @ q)

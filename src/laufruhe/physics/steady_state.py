@@ -55,13 +55,6 @@ def periodic_state(
 
     The start that repeats itself is found by Newton's method; the columns of its matrix
     are integrated together with the motion itself.
-
-    Raises
-    ------
-    ModelError
-        At standstill.
-    SolverError
-        If no motion repeats itself within 60 shots.
     """
     if not speed > 0.0:
         raise ModelError(f"a steady state in time needs a speed above zero, not {speed:g} rad/s")
@@ -156,13 +149,7 @@ class TimeMounting:
     _states: dict[tuple[int, float], tuple[Spectrum, SteadyState]] = field(default_factory=dict, repr=False)
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7).
-
-        Raises
-        ------
-        SolverError
-            If no motion repeats itself.
-        """
+        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7)."""
         return spectrum_of(self._state(wrench, speed).forces, wrench.base)
 
     def travel(self, wrench: Spectrum, speed: float) -> Spectrum:

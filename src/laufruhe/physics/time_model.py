@@ -132,13 +132,7 @@ def frequencies_with_fluid(mounting: ElasticMounting) -> tuple[float, ...]:
 
 
 def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeModel:
-    """Add a coordinate for the fluid of every track, in which its mass is one (E50).
-
-    Raises
-    ------
-    ModelError
-        Of stiffness that is known over frequency only.
-    """
+    """Add a coordinate for the fluid of every track, in which its mass is one (E50)."""
     tracks = [law for law in dynamic.laws if isinstance(law, FluidTrack)]
     if len(tracks) < len(dynamic.laws):
         raise ModelError(NO_LAW)

@@ -162,13 +162,7 @@ class Swing:
     bent_inertia: Array
 
     def speeds(self, inertia: float) -> Array:
-        """Return the crank speed over the cycle with an inertia without pistons and rods [rad/s] (F2-F4).
-
-        Raises
-        ------
-        ModelError
-            If the crank would stop.
-        """
+        """Return the crank speed over the cycle with an inertia without pistons and rods [rad/s] (F2-F4)."""
         if inertia + self.inertia.min() <= 0.0:
             raise ModelError("the moving parts have no positive inertia; raise the inertia of the flywheel")
         energy = start_energy(self.work, inertia + self.inertia, self.speed)

@@ -72,13 +72,7 @@ class _Turning:
 
 
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
-    """Return the motion under gas and inertia torque against a constant load, at equal time steps (F2-F4).
-
-    Raises
-    ------
-    ModelError
-        If the crank would stop within the cycle: the flywheel is too small for the speed.
-    """
+    """Return the motion under gas and inertia torque against a constant load, at equal time steps (F2-F4)."""
     return _turning(engine, point, fidelity).at(_steps(engine, fidelity))
 
 

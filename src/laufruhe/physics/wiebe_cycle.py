@@ -20,14 +20,7 @@ _ROUNDING = 1e-12
 
 
 def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """Return the pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9).
-
-    Raises
-    ------
-    ModelError
-        If the burn leaves the closed period, or no heat that a charge can hold gives the
-        indicated mean pressure.
-    """
+    """Return the pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9)."""
     cylinder = ChargedCylinder(gas, part, cycle)
     heat = wiebe_heat(gas, part, cycle)
 
@@ -46,11 +39,6 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
 
     Heat released at a volume V works with the efficiency 1 - (V / V_largest)^(kappa-1)
     whatever the rest does, so the mean pressure is linear in the heat.
-
-    Raises
-    ------
-    ModelError
-        With the range that can be reached.
     """
     cylinder = ChargedCylinder(gas, part, cycle)
     _, bottom = dead_centres(part)

@@ -82,13 +82,7 @@ def mean_pressure(torque: float, displacement: float, turns: int) -> float:
 
 
 def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
-    """Return the friction from fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2).
-
-    Raises
-    ------
-    ModelError
-        If there are fewer than three points, one load twice, or no line of friction.
-    """
+    """Return the friction from fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2)."""
     line = _line(brake, fuel, "load")
     if line.slope <= 0.0:
         raise ModelError("the fuel does not rise with the load; check the columns")
@@ -101,13 +95,7 @@ def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
 
 
 def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: float) -> Friction:
-    """Return the friction at a speed from motoring pressures [Pa] at several, on a straight line (W3).
-
-    Raises
-    ------
-    ModelError
-        If there are fewer than three points, one speed twice, or no friction at the speed.
-    """
+    """Return the friction at a speed from motoring pressures [Pa] at several, on a straight line (W3)."""
     line = _line(speeds, drag, "speed")
     friction, by = line.intercept + line.slope * speed, np.array([1.0, speed])
     if friction <= 0.0:

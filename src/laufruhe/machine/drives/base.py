@@ -48,13 +48,7 @@ class DriveKind(ABC):
     has_rod: ClassVar[bool] = True
 
     def radius(self, sizes: Sizes) -> float:
-        """Return the crank radius that makes the stroke [m].
-
-        Raises
-        ------
-        ModelError
-            If none does.
-        """
+        """Return the crank radius that makes the stroke [m]."""
         return radius_for_stroke(
             sizes.stroke, sizes.offset, rod_length=sizes.rod_length, rod_ratio=sizes.rod_ratio or 0.0
         )
@@ -71,11 +65,6 @@ def radius_for_stroke(
 
     Squaring stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2) twice leaves an
     equation linear in r^2 for a given l, and quadratic for a given r / l.
-
-    Raises
-    ------
-    ModelError
-        If no crank with this rod turns through this stroke.
     """
     s2, e2 = stroke * stroke, offset * offset
     if offset == 0.0:

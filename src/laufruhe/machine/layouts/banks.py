@@ -26,11 +26,6 @@ def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], 
         Bank angles [rad].
     stagger
         Distance by which the first of two banks stands forward of the other [m].
-
-    Raises
-    ------
-    KeyedError
-        If the banks would not be alike.
     """
     throws, others = divmod(cylinders, len(banks))
     if others or not throws:

@@ -84,11 +84,6 @@ def firing_angles(
     cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
 ) -> tuple[float, ...]:
     """Return the crank angle at which every cylinder fires [rad], each at its first dead centre after the one before.
-
-    Raises
-    ------
-    ModelError
-        If these throws cannot fire in this order within one cycle.
     """
     previous: Turn = Fraction(-1)
     angles = [0.0] * len(layout.positions)
@@ -111,13 +106,7 @@ def firing_angles(
 
 
 def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tuple[float, ...]:
-    """Return the throw angles of even firing in this order [rad], cylinder 1 at its dead centre at phi = 0.
-
-    Raises
-    ------
-    ModelError
-        If cylinders on one throw ask for two different angles.
-    """
+    """Return the throw angles of even firing in this order [rad], cylinder 1 at its dead centre at phi = 0."""
     step = Fraction(cycle.turns, len(firing_order))
     inputs: dict[int, Turn] = {}
     for place, number in enumerate(firing_order):
@@ -181,11 +170,6 @@ def build(
     firing_order
         Cylinder numbers; without it every cylinder is taken to fire at its first dead
         centre, which matters to gas loads alone.
-
-    Raises
-    ------
-    ModelError
-        If the order cannot be met by the throws.
     """
     if len(angles) != len(layout.throw_positions):
         raise ModelError(f"{counted(len(angles), 'throw')} given where the layout has {len(layout.throw_positions)}")

@@ -31,11 +31,6 @@ def facing_pistons(
         Crank angle by which its pistons come to their dead centre first [rad].
     pin_mass
         Rotating mass at its crank pins without the rods' shares [kg].
-
-    Raises
-    ------
-    ModelError
-        If the crank does not keep step or does not lie above.
     """
     if abs(crank.ratio) != 1.0:
         raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")

@@ -127,13 +127,7 @@ def _banks(count: int) -> tuple[float, ...]:
 
 
 def _master_rod(inputs: LayoutInput) -> MasterRod:
-    """Return the master rod that [engine] describes.
-
-    Raises
-    ------
-    KeyedError
-        If it contradicts itself.
-    """
+    """Return the master rod that [engine] describes."""
     options, count = inputs.options, inputs.cylinders
     radius, master, knuckle_angles = (
         options["knuckle_radius"],
