@@ -40,8 +40,6 @@ class FiringLattice:
         counted as one.
     slots
         Step of each of the n firings of a cycle, in their order.
-    capacity
-        Firings on every step.
     """
 
     steps: int
@@ -105,19 +103,9 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     pins = pin_steps(layout, lattice)
     if len(set(pins)) > 1:
         raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
-    patterns = tuple(_patterns(lattice, pins[0], len(layout.throw_positions)))
-    if not patterns:
-        raise NoEvenStarError(
-            f"no star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one throw "
-            f"{' and '.join(f'{360.0 * s / lattice.steps:g}' for s in pins[0])} deg apart"
-        )
-    return patterns
-
-
-def _patterns(lattice: FiringLattice, pin_steps: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
-    steps, maximum = lattice.steps, lattice.capacity[0]
+    steps, maximum, pin = lattice.steps, lattice.capacity[0], pins[0]
     # the last place that loads each step: what is not full then stays so
-    last = {(step - p) % steps: p for p in range(steps) for step in pin_steps}
+    last = {(step - p) % steps: p for p in range(steps) for step in pin}
 
     def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
         if len(counts) == steps:
@@ -127,13 +115,19 @@ def _patterns(lattice: FiringLattice, pin_steps: tuple[int, ...], throws: int) -
         p = len(counts)
         for count in range(1 if p == 0 else 0, min(left, maximum) + 1):
             after = load.copy()
-            for step in pin_steps:
+            for step in pin:
                 after[(step - p) % steps] += count
-            full = all(after[j] == maximum for j in {(step - p) % steps for step in pin_steps} if last[j] == p)
+            full = all(after[j] == maximum for j in {(step - p) % steps for step in pin} if last[j] == p)
             if full and max(after) <= maximum:
                 yield from grow([*counts, count], after, left - count)
 
-    yield from grow([], [0] * steps, throws)
+    patterns = tuple(grow([], [0] * steps, len(layout.throw_positions)))
+    if not patterns:
+        raise NoEvenStarError(
+            f"no star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one throw "
+            f"{' and '.join(f'{360.0 * s / steps:g}' for s in pin)} deg apart"
+        )
+    return patterns
 
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:

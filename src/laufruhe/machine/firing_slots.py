@@ -56,13 +56,6 @@ class FiringPattern:
         return tuple(b - a for a, b in itertools.pairwise((*self.moments, cycle.angle)))
 
 
-@dataclass
-class _Budget:
-    """Number of nodes that may still be visited."""
-
-    left: int
-
-
 @dataclass(frozen=True)
 class FiringSlots:
     """Firings to share out between throws, and the bounds of intervals.
@@ -102,11 +95,15 @@ class FiringSlots:
             Firings of the cylinders of every throw, where the firing order is given.
         """
         even, slack, complete = self.cycle.angle / self.count, 0.0, True
+
+        def unevenness(pattern: FiringPattern) -> float:
+            return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
+
         while True:
             covers, all_of = self._first_covers(slack, throw_slots)
             complete = complete and (slack > 0.0 or all_of)
             patterns = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
-            patterns.sort(key=lambda pattern: (round(pattern.broken, 9), self._unevenness(pattern)))
+            patterns.sort(key=lambda pattern: (round(pattern.broken, 9), unevenness(pattern)))
             minimum = patterns[0].broken if patterns else math.inf
             if minimum <= max(slack, 1e-7) or slack > self.cycle.angle:
                 least_broken = [pattern for pattern in patterns if pattern.broken <= minimum + 1e-7]
@@ -121,16 +118,12 @@ class FiringSlots:
         for share in _SHARES:
             low, high = self.minimum - slack, self.maximum + slack
             narrowed = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
-            budget = _Budget(_MAX_LOOKED_AT)
-            covers |= dict.fromkeys(itertools.islice(narrowed._covers(throw_slots, budget), maximum + 1))
-            if len(covers) > maximum or budget.left <= 0:
+            nodes = itertools.count(1)
+            covers |= dict.fromkeys(itertools.islice(narrowed._covers(throw_slots, nodes), maximum + 1))
+            if len(covers) > maximum or next(nodes) > _MAX_LOOKED_AT:
                 return list(covers)[:maximum], False
             complete = share == 1.0
         return list(covers), complete
-
-    def _unevenness(self, pattern: FiringPattern) -> float:
-        even = self.cycle.angle / self.count
-        return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
 
     def _shapes(self) -> list[Shape]:
         """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
@@ -154,8 +147,8 @@ class FiringSlots:
             choices.append(shapes)
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
 
-    def _covers(self, throw_slots: Sequence[Sequence[int]] | None, budget: _Budget) -> Iterator[Cover]:
-        """Yield the ways to cover every firing once by throws: slot of the first cylinder, and shape."""
+    def _covers(self, throw_slots: Sequence[Sequence[int]] | None, nodes: Iterator[int]) -> Iterator[Cover]:
+        """Yield the ways to cover every firing once by throws, of so many nodes: slot of the first cylinder, shape."""
         count, shapes = self.count, self._shapes()
         if throw_slots is not None:
             offset_choices = [
@@ -175,8 +168,7 @@ class FiringSlots:
             if free is None:
                 yield placed
                 return
-            budget.left -= 1
-            if budget.left <= 0:
+            if next(nodes) >= _MAX_LOOKED_AT:
                 return
             for number, offset_choices in enumerate(offsets):
                 for member in offset_choices:

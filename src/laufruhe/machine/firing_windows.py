@@ -133,12 +133,6 @@ class FiringWindow:
         return lower, upper
 
 
-def lateness(layout: Layout) -> tuple[float, ...]:
-    """Return c_k of every cylinder: crank angle by which it fires before a throw at theta = 0 [rad]."""
-    zero = [0.0] * len(layout.throw_positions)
-    return tuple(-math.tau * float(layout.dead_centre(zero, k)) for k in range(len(layout.positions)))
-
-
 @dataclass(frozen=True)
 class FiringBounds:
     """Conditions on firing: intervals, throws, order and open angles.
@@ -165,13 +159,12 @@ class FiringBounds:
 
     @cached_property
     def late(self) -> tuple[float, ...]:
-        """c_k of every cylinder, open angles at zero [rad]."""
-        lateness_of_cylinders = lateness(self.layout)
-        minimum = sum(low for low, _ in self.open_angles)
-        return (
-            tuple(late + self.layout.side(k) * minimum for k, late in enumerate(lateness_of_cylinders))
-            if minimum
-            else lateness_of_cylinders
+        """c_k of every cylinder: crank angle by which it fires before a throw at theta = 0, open angles at zero [rad]."""
+        layout, minimum = self.layout, sum(low for low, _ in self.open_angles)
+        zero = [0.0] * len(layout.throw_positions)
+        return tuple(
+            -(math.tau * float(layout.dead_centre(zero, k)) - layout.side(k) * minimum)
+            for k in range(len(layout.positions))
         )
 
     def share(self, k: int) -> float:
@@ -255,18 +248,17 @@ class FiringBounds:
         used, last = {pins[j] for j in fired}, self._angle_index[before]
         back, there = paths[:, last].tolist(), paths[last].tolist()
         for k in candidates:
-            angle_index, free = self._angle_index[k], self.throws is None and pins[k] not in used
-            for lap in (0,) if free else self._laps(k, before, laps[before], back[angle_index], there[angle_index]):
+            angle_index, still = self._angle_index[k], self.late[k] - self.late[before] + math.tau * laps[before]
+            # 2 pi l = interval + theta_own + c_own + t_before
+            low = self.minimum + still - back[angle_index]
+            high = min(self.maximum, math.tau) + still + there[angle_index]
+            choices = range(1)
+            if self.throws is not None or pins[k] in used:
+                choices = range(math.ceil((low - SLACK) / math.tau), math.floor((high + SLACK) / math.tau) + 1)
+            for lap in choices:
                 longer = self._with_interval(paths, before, laps[before], k, lap)
                 if longer is not None:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
-
-    def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
-        # 2 pi l = interval + theta_own + c_own + t_before
-        still = self.late[k] - self.late[before] + math.tau * lap_before
-        low = self.minimum + still - back
-        high = min(self.maximum, math.tau) + still + there
-        return range(math.ceil((low - SLACK) / math.tau), math.floor((high + SLACK) / math.tau) + 1)
 
     def _with_interval(
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False

@@ -168,15 +168,5 @@ def grade_of(text: str) -> float | None:
 
 
 def permitted_unbalance(grade: float, mass: float, speed: float) -> float:
-    """Return the permitted unbalance of a rotor, summed over its planes [kg m] (R1).
-
-    Parameters
-    ----------
-    grade
-        e_per times the speed of rotation [m/s].
-    mass
-        Of the rotor [kg].
-    speed
-        Its fastest in service [rad/s].
-    """
+    """Return the permitted unbalance of a rotor at its fastest speed in service, summed over its planes (R1)."""
     return grade * mass / speed

@@ -40,6 +40,7 @@ SPACING = LayoutKey(
     "positive length",
     "Distance between neighbouring throws; in a boxer between neighbours of a bank.",
 )
+CRANK_DISTANCE = LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons.")
 
 
 @dataclass(frozen=True)
@@ -73,6 +74,17 @@ class LayoutInput:
         if distance is None and places > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
         return 1.0 if distance is None else float(distance)
+
+    @property
+    def crank_distance(self) -> float:
+        """Distance of the two cranks of opposed pistons [m], whose axes have no offset."""
+        distance, offset = self.options["crank_distance"], self.mechanism.offset
+        if distance is None:
+            raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
+        if offset:
+            rule = "means nothing for pistons on one axis; leave it out"
+            raise KeyedError("offset", rule, units.quantity_text(offset, "m"))
+        return float(distance)
 
 
 def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:

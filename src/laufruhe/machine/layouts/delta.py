@@ -7,11 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.banks import in_banks
-from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
+from laufruhe.machine.layouts.base import CRANK_DISTANCE, SPACING, LayoutInput, LayoutKey, LayoutKind
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
@@ -87,7 +86,7 @@ class Delta(LayoutKind):
     name = "delta"
     keys = (
         SPACING,
-        LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        CRANK_DISTANCE,
         LayoutKey("reversed_crank", "cylinder", "Crank of a triangle against the other two: 1 below, 2 left, 3 right."),
         LayoutKey(
             "crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."
@@ -105,14 +104,9 @@ class Delta(LayoutKind):
         return in_banks(self.name, inputs.cylinders, inputs.spacing(inputs.cylinders // 3), turns)
 
     def _triangle(self, inputs: LayoutInput) -> Triangle:
-        if inputs.options["crank_distance"] is None:
-            raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
         if inputs.cycle is not Cycle.TWO_STROKE:
             rule = 'has ports in a triangle of cranks, which work every turn; write "two-stroke"'
             raise KeyedError("cycle", rule, str(inputs.cycle))
-        if inputs.mechanism.offset:
-            rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
         reversed_one = inputs.options["reversed_crank"] or 0
         if reversed_one > 3:
             raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))
@@ -121,7 +115,7 @@ class Delta(LayoutKind):
         if leads is not None and len(leads) != 2:
             raise KeyedError("crank_leads", f"has {len(leads)} angles; give those of two banks, the third follows")
         first, second = map(as_turn, leads) if leads is not None else (equal_lead(ratios),) * 2
-        return Triangle(inputs.options["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
+        return Triangle(inputs.crank_distance, ratios, (first, second, closing_lead(ratios, first, second)))
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]

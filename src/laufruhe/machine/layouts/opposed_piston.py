@@ -9,7 +9,7 @@ from dataclasses import replace
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.layouts.banks import Inline
-from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey
+from laufruhe.machine.layouts.base import CRANK_DISTANCE, SPACING, LayoutInput, LayoutKey
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import Shaft
@@ -56,7 +56,7 @@ class OpposedPiston(Inline):
     name = "opposed-piston"
     keys = (
         SPACING,
-        LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons."),
+        CRANK_DISTANCE,
         LayoutKey(
             "crank_ratio",
             "sign",
@@ -79,17 +79,11 @@ class OpposedPiston(Inline):
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the lower pistons, then the upper ones, and the throws of both cranks."""
         lower, cranks = super().parts(inputs, layout, throws)
-        distance, lead = inputs.options["crank_distance"], inputs.options["crank_lead"]
-        if distance is None:
-            raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
-        ports = inputs.options["port_arc"]
+        lead, ports = inputs.options["crank_lead"], inputs.options["port_arc"]
         if ports is not None and abs(lead) >= ports:
             rule = f"is beyond the ports, which are open for {units.quantity_text(ports, 'rad')} and never together"
             raise KeyedError("crank_lead", f"{rule}; lessen it", units.quantity_text(lead, "rad"))
-        if inputs.mechanism.offset:
-            rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.quantity_text(inputs.mechanism.offset, "m"))
-        crank = Shaft("second crankshaft", float(inputs.options["crank_ratio"] or -1), 0.0, distance)
+        crank = Shaft("second crankshaft", float(inputs.options["crank_ratio"] or -1), 0.0, inputs.crank_distance)
         upper = facing_pistons(lower, crank, lead, inputs.mechanism.rotating_mass)
         second_mass = inputs.options["second_reciprocating_mass"]
         if second_mass is not None:
