@@ -11,7 +11,7 @@ then counted from where cylinder 1 at its dead centre has the first one, as thet
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -159,7 +159,7 @@ class FiringBounds:
 
     @cached_property
     def late(self) -> tuple[float, ...]:
-        """c_k of every cylinder: crank angle by which it fires before a throw at theta = 0, open angles at zero [rad]."""
+        """Crank angle by which every cylinder fires before a throw at theta = 0, open angles at zero, c_k [rad]."""
         layout, minimum = self.layout, sum(low for low, _ in self.open_angles)
         zero = [0.0] * len(layout.throw_positions)
         return tuple(

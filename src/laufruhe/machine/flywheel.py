@@ -19,8 +19,6 @@ class Arms:
 
     Attributes
     ----------
-    count
-        Of them.
     at_rim, at_hub
         Width across the plane of rotation, and depth along the direction of motion [m].
     hub_diameter
@@ -78,12 +76,9 @@ class Rim:
         return 0.25 * self.density * speed**2 * ((3.0 + LATERAL) * outside**2 + (1.0 - LATERAL) * inside**2)
 
     def arm_stress(self, speed: float, torque: float) -> float:
-        """Return the largest stress in an arm that hangs down, the rim carrying none of its own pull [Pa] (T7).
+        """Return the largest stress in an arm that hangs down, from pull and torque of the rim [Pa] (T7).
 
-        Parameters
-        ----------
-        torque
-            That the flywheel hands on [N m].
+        The rim carries none of its own pull.
         """
         if self.arms is None:
             raise ModelError("a flywheel without arms has no stress in them")

@@ -71,11 +71,9 @@ def crank_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return axial and side force on every piston pin (B1, B2, B11).
+    """Return axial and side force on every piston pin, shape (n, cylinders, 2) [N] (B1, B2, B11).
 
-    Returns
-    -------
-    Spectrum of shape (n, cylinders, 2) [N]: P away from the crank, N towards i e^{i beta}. Together they press the rod.
+    P points away from the crank, N towards i e^{i beta}; together they press the rod.
     """
     for part in engine.slider_cranks:
         if not part.has_rod:
@@ -105,12 +103,7 @@ def _check_even(fidelity: Fidelity) -> None:
 
 
 def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the force of the shafts on every main bearing, linear in their unbalances (B4).
-
-    Returns
-    -------
-    Spectrum of shape (n, bearings, 3) [N], in the axes of C2.
-    """
+    """Return the force of the shafts on every main bearing, shape (n, bearings, 3) [N], linear in unbalances (B4)."""
     _check_even(fidelity)
     gas, parts = fidelity.gas_of(point), engine.slider_cranks
     of_rods = _of_rods(engine.cycle, parts, engine.bearings, point.speed, gas, fidelity)
@@ -141,13 +134,9 @@ def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
 
 
 def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the vertical force on the rail under each wheel, of all that turns with an axle (B9).
+    """Return the vertical force on the rail under each wheel, shape (n, bearings, 1) [N], of turning masses (B9).
 
     The wheels stand where the main bearings do. What reciprocates is left out: it drives the frame, not the axle.
-
-    Returns
-    -------
-    Spectrum of shape (n, bearings, 1) [N].
     """
     _check_even(fidelity)
     turning = replace(engine, rotors=(*engine.pins, *engine.rotors))
@@ -165,10 +154,7 @@ def crank_pin_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
-    """Return coefficient of friction times journal speed of every main bearing [m/s] (B7).
-
-    Times the force it is the power that turns to heat there.
-    """
+    """Return coefficient of friction times journal speed of every main bearing [m/s]; times force it is power (B7)."""
     return point.speed * np.array([bearing.drag for bearing in engine.bearings])
 
 
@@ -345,18 +331,9 @@ SIDES = math.radians(60.0)
 
 
 def wear_of(path: ComplexArray, angles: Array) -> Array:
-    """Return the load of every direction over the cycle as a share of the largest (B10).
+    """Return the load of every direction (k,) over the cycle as a share of the largest, 0 to 1, shape (k,) (B10).
 
-    Parameters
-    ----------
-    path
-        Force on the bearing at equal steps of the cycle [N], shape (n,), in the plane across the crank axis (C4).
-    angles
-        Directions [rad], shape (k,).
-
-    Returns
-    -------
-    Shares from 0 to 1, shape (k,); zero where nothing loads the bearing.
+    The path (n,) is the force on the bearing at equal steps of the cycle [N], across the crank axis (C4).
     """
     distance = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
     total = (np.abs(path)[:, None] * (distance <= SIDES)).sum(axis=0)

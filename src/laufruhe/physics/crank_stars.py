@@ -29,22 +29,9 @@ _CHUNK = 1 << 15
 
 
 def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> NDArray[np.complex128]:
-    """Return F_h and C_h of many stars (S1).
+    """Return F_h, and C_h in the unit of the places of throws, of many crank stars, shape (n, orders, 2) (S1).
 
-    Parameters
-    ----------
-    stars
-        Shape (n, throws): step of every throw, 0 to phases - 1.
-    phases
-        Steps P that a turn is divided into.
-    places
-        Of the throws along x [any length].
-    orders
-        Orders h.
-
-    Returns
-    -------
-    Shape (n, orders, 2): F_h, and C_h in the unit of the places.
+    A star (throws,) has the step of every throw, 0 to phases - 1.
     """
     tables, groups = _joined_tables(phases, places, orders)
     out = np.empty((len(stars), 4 * len(orders)))

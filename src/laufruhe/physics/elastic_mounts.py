@@ -46,10 +46,6 @@ class ElasticMounting:
 
     Attributes
     ----------
-    block
-        The body carried.
-    mounts
-        What carries it.
     answering
         Modes that answer, 1 the lowest; all that are excited when None.
     """
@@ -151,18 +147,7 @@ class ElasticMounting:
             reached = further
 
     def responses(self, omegas: Array, wrenches: ComplexArray) -> ComplexArray:
-        """Return the modal amplitudes of each wrench (E4).
-
-        Parameters
-        ----------
-        omegas
-            Angular frequencies [rad/s], shape (n,).
-        wrenches
-            About the origin, shape (n, 6).
-
-        Returns
-        -------
-        Shape (n, 6): factors of the mode shapes.
+        """Return the factors of the mode shapes (n, 6) under wrenches (n, 6) about the origin at `omegas` [rad/s] (E4).
 
         Raises
         ------
@@ -307,16 +292,9 @@ def _elastic_mounting(block: Block, mounts: tuple[Mount, ...], answering: tuple[
 
 
 def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:
-    """Return foundation force over exciting force of one mass on one spring (E11; Fig. 31).
+    """Return the ratio of foundation force to exciting force of one mass on one spring at a speed ratio (E11; Fig. 31).
 
-    Parameters
-    ----------
-    ratio
-        Speed over critical speed, any shape.
-    loss_factor
-        Hysteretic; psi / (2 pi) of eq. 40.
-    damping_ratio
-        Viscous, of critical damping.
+    The hysteretic loss factor is psi / (2 pi) of eq. 40; the viscous damping is a part of critical damping.
     """
     lag = loss_factor + 2.0 * damping_ratio * np.asarray(ratio)
     return np.asarray(np.hypot(1.0, lag) / np.hypot(1.0 - np.asarray(ratio) ** 2, lag))

@@ -42,9 +42,9 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
 
 
 def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the roll moment of one cylinder's gas [N m] by order, counted from its firing (L5), shape (n,).
+    """Return the roll moment of one cylinder's gas [N m] by order, shape (n,) (L5).
 
-    A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
+    Angles count from its firing: a cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
     key = _CylinderKey((type(part), alike_under(gas, part), part.shaft.ratio), part)
     return fidelity.truncated_gas(_one_cylinder(gas, key, cycle, fidelity.gas_steps))

@@ -67,10 +67,7 @@ def effects_of(part: SliderCrank, fidelity: Fidelity) -> tuple[list[Effect], lis
 def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any = 0.0) -> tuple[Any, Any, Any]:
     """Return the force on the block in the turned plane, and roll moments of point masses and of swings (L7).
 
-    Parameters
-    ----------
-    square, turning
-        Square of the speed of its crank [rad2/s2], and acceleration [rad/s2].
+    Its crank has this squared speed [rad2/s2] and turns faster by `turning` [rad/s2].
     """
     ratio = part.shaft.ratio
     force, roll, rods = 0.0, 0.0, 0.0
@@ -162,11 +159,9 @@ def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, .
 
 @lru_cache(maxsize=1024)
 def momentum_orders(part: SliderCrank) -> ComplexArray:
-    """Return the loads at unit crank speed by a transform of the exact motion, as many orders as matter (L7).
+    """Return the loads at unit crank speed by a transform of the exact motion, shape (4, orders) (L7).
 
-    Returns
-    -------
-    Shape (4, orders): axial and transverse force, roll moment of point masses and of swings.
+    They are axial and transverse force, and the roll moments of point masses and of swings.
     """
     radius = part.crank_radius
 
@@ -182,18 +177,9 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
 
 
 def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale: Any, name: str) -> ComplexArray:
-    """Return coefficients of periodic functions of the crank's own angle, as many orders as matter.
+    """Return the coefficients (functions, orders) of periodic functions of the crank's own angle.
 
-    Parameters
-    ----------
-    rows
-        Values of every function at these angles.
-    scale
-        Size that each is measured by, shape (functions, 1).
-
-    Returns
-    -------
-    Shape (functions, orders).
+    As many orders are taken as matter beside the scale of each function, shape (functions, 1).
     """
     steps = 64
     while steps <= _MAX_STEPS:

@@ -110,11 +110,6 @@ def sag_for_critical_speed(speed: float, order: float) -> float:
 
 
 def torque_roll_axis(block: Block) -> Array:
-    """Return the axis about which a free block starts to turn under a crank torque.
-
-    Returns
-    -------
-    Unit vector, shape (3,): I^-1 e over its length (E8).
-    """
+    """Return the unit vector about which a crank torque starts to turn a free block, I^-1 e over its length (E8)."""
     axis = np.linalg.solve(block.tensor, np.array([1.0, 0.0, 0.0]))
     return np.asarray(axis / np.linalg.norm(axis))

@@ -65,12 +65,7 @@ def orders_needed(rod_ratio: float, offset_ratio: float = 0.0) -> int:
 
 @lru_cache(maxsize=256)
 def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
-    """Return the two-sided coefficients of (cos psi)^power, orders -highest ... highest (K9).
-
-    Returns
-    -------
-    Shape (2 highest + 1,), c_{-h} = conj(c_h); f = sum_h c_h e^{i h alpha}.
-    """
+    """Return the coefficients c_h of (cos psi)^power = sum_h c_h e^{i h alpha}, h = -highest ... highest (K9)."""
     q1, q2, difference = _poles(rod_ratio, offset_ratio)
     scale = ((1.0 - offset_ratio) * (1.0 + offset_ratio) / ((1.0 + q1 * q1) * (1.0 + q2 * q2))) ** (power / 2.0)
     tail = orders_needed(rod_ratio, offset_ratio)
@@ -92,18 +87,9 @@ def _fixed(coefficients: ComplexArray) -> ComplexArray:
 
 @lru_cache(maxsize=256)
 def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, highest: int | None = None) -> ComplexArray:
-    """Return the coefficients of s''/r: c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...) (K10).
+    """Return the coefficients of s''/r in the local crank angle, shape (highest + 1,) (C8, K10).
 
-    Parameters
-    ----------
-    rod_ratio, offset_ratio
-        lambda = r/l and epsilon = e/l, lambda + |epsilon| < 1.
-    highest
-        Last order wanted; as many as matter when left out.
-
-    Returns
-    -------
-    Shape (highest + 1,), by C8 in the local crank angle.
+    c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...). As many orders are taken as matter if `highest` is left out.
     """
     highest = orders_needed(rod_ratio, offset_ratio) if highest is None else highest
     h = np.arange(highest + 1)

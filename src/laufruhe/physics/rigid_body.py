@@ -76,11 +76,5 @@ def plane_parts(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> tuple[An
 
 
 def turning_parts(lateral: Any, vertical: Any) -> tuple[Any, Any]:
-    """Return the parts F e^{i h phi} and B e^{-i h phi} of z + i y, with the crank and against it (C4).
-
-    Parameters
-    ----------
-    lateral, vertical
-        Coefficients of one order (C8).
-    """
+    """Return the parts of z + i y that turn with the crank, as e^{i h phi}, and against it, as e^{-i h phi} (C4)."""
     return 0.5 * (vertical + 1j * lateral), 0.5 * np.conj(vertical - 1j * lateral)

@@ -100,13 +100,7 @@ def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
 
 
 def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
-    """Return the indicated mean pressure of the mixed cycle for a cut-off, in closed form [Pa] (G6).
-
-    Parameters
-    ----------
-    cut_off_ratio
-        Volume at the cut-off over the smallest volume, 1 to the compression ratio.
-    """
+    """Return the indicated mean pressure of a ratio of cut-off volume to smallest volume, in closed form [Pa] (G6)."""
     ratio = gas.compression_ratio
     compression = compression_end_pressure(gas) * _polytropic_work(ratio, gas.compression_exponent)
     expansion = cut_off_ratio * _polytropic_work(ratio / cut_off_ratio, gas.expansion_exponent)

@@ -72,11 +72,9 @@ def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
-    """Return F = U (n w)^2 e^{i n phi} of the rotors, with its moments (L1).
+    """Return F = U (n w)^2 e^{i n phi} of the rotors with its moments, shape (n, 6) [N, N m] (L1).
 
-    Returns
-    -------
-    Spectrum of shape (n, 6) [N, N m]; linear in the unbalances and their conjugates.
+    It is linear in the unbalances and their conjugates.
     """
     return _turning_loads(_BALANCED, tuple(rotors), speed, cycle)
 

@@ -166,14 +166,10 @@ class TimeMounting:
 
 
 def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
-    """Return the mount forces by order of the equations that time integrates, without bump stops (E25, E26).
+    """Return the mount forces (n, mounts, 3) [N] of the equations that time integrates, without bump stops (E25, E26).
 
     A comparison with these forces shows the error of the integration alone; one with `ElasticMounting.forces`
     shows the effect of E26.
-
-    Returns
-    -------
-    Shape (n, mounts, 3) [N].
     """
     model = time_model(mounting)
     omega = wrench.orders[:, None, None] * speed

@@ -92,12 +92,7 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the torque of gas, pistons and rods on the crankshaft at even speed, as it drives the output (T1).
-
-    Returns
-    -------
-    Spectrum of shape (n,) [N m].
-    """
+    """Return the torque of gas, pistons and rods that drives the output at even speed, shape (n,) [N m] (T1)."""
     gas = fidelity.gas_of(point)
     masses = fidelity.truncated(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
     total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity))

@@ -21,10 +21,7 @@ _HALVINGS = 53
 def chambers_thrust(gas: Chambers, part: SliderCrank, angles: Array) -> Array:
     """Return P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296).
 
-    Parameters
-    ----------
-    angles
-        Crank angles from the dead centre of the cylinder [rad].
+    Angles count from the dead centre of the cylinder [rad].
     """
     total = np.zeros(np.shape(angles))
     for chamber in gas.of(part):

@@ -16,16 +16,9 @@ X_BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
 
 
 def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], stagger: float = 0.0) -> Layout:
-    """Return banks that share the throws, numbered bank by bank from the front.
+    """Return banks at these angles [rad] that share the throws, numbered bank by bank from the front.
 
-    Parameters
-    ----------
-    spacing
-        Between throws [m].
-    banks
-        Bank angles [rad].
-    stagger
-        Distance by which the first of two banks stands forward of the other [m].
+    The throws are `spacing` apart; the first of two banks stands forward by `stagger` [m].
     """
     throws, others = divmod(cylinders, len(banks))
     if others or not throws:
@@ -50,18 +43,8 @@ def inline(cylinders: int, spacing: float) -> Layout:
 def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
     """Return two banks on shared or split pins.
 
-    Parameters
-    ----------
-    cylinders
-        Even number: the left bank, leaning to +y, has numbers 1 to n/2, the right bank the rest.
-    spacing
-        Between throws [m].
-    bank_angle
-        Between the banks [rad].
-    split_pin
-        Angle by which the right bank's pin leads the left bank's on one throw [rad].
-    bank_stagger
-        Distance by which the left bank stands forward of the right one [m].
+    The left bank, leaning to +y, has numbers 1 to n/2. Its pins are behind those of the right bank by the angle of
+    split pins [rad], and it stands forward by the stagger [m].
     """
     layout = in_banks("vee", cylinders, spacing, (0.5 * bank_angle, -0.5 * bank_angle), bank_stagger)
     sides = tuple(side for side in (0.5, -0.5) for _ in layout.throw_positions)

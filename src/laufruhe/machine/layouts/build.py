@@ -83,8 +83,7 @@ class Mechanism:
 def firing_angles(
     cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
 ) -> tuple[float, ...]:
-    """Return the crank angle at which every cylinder fires [rad], each at its first dead centre after the one before.
-    """
+    """Return the crank angles at which cylinders fire [rad], each at its first dead centre after the one before."""
     previous: Turn = Fraction(-1)
     angles = [0.0] * len(layout.positions)
     start: Turn | None = None
@@ -161,15 +160,9 @@ def build(
     angles: Sequence[float],
     firing_order: Sequence[int] | None = None,
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Return the slider-cranks, and the throws that they work on.
+    """Return the slider-cranks, and the throws that they work on, at these angles when phi = 0 [rad] (C3).
 
-    Parameters
-    ----------
-    angles
-        Angle of every throw when phi = 0 [rad] (C3).
-    firing_order
-        Cylinder numbers; without it every cylinder is taken to fire at its first dead
-        centre, which matters to gas loads alone.
+    Without a firing order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone.
     """
     if len(angles) != len(layout.throw_positions):
         raise ModelError(f"{counted(len(angles), 'throw')} given where the layout has {len(layout.throw_positions)}")

@@ -25,12 +25,10 @@ def facing_pistons(
     ----------
     lower
         Upright slider-cranks on the crankshaft, one for each cylinder.
-    crank
-        Above them, geared at a ratio of 1 or -1.
     lead
-        Crank angle by which its pistons come to their dead centre first [rad].
+        Crank angle by which the second pistons come to their dead centre first [rad].
     pin_mass
-        Rotating mass at its crank pins without the rods' shares [kg].
+        Rotating mass at their crank pins without the rods' shares [kg].
     """
     if abs(crank.ratio) != 1.0:
         raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
