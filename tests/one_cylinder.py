@@ -1,4 +1,4 @@
-"""Pressure and loads of one cylinder, and loads of rods and rotors by themselves, as tests compare them."""
+"""Pressure and loads of one cylinder, loads of rods and rotors by themselves, and irregularity, for comparisons."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank, Steam
+from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, SliderCrank, Steam
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -17,6 +17,7 @@ from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.physics.star_loads import square_of, star_loads
+from laufruhe.physics.torque import swing_of
 
 
 def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:
@@ -39,6 +40,11 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
     """Torque of one cylinder's gas on the output at equal steps over the cycle from its firing [N m] (L5)."""
     angles = cycle.angle * np.arange(samples) / samples
     return np.sum([chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags], axis=0)
+
+
+def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
+    """Degree of irregularity with an inertia without pistons and rods [kg m2] (T3)."""
+    return swing_of(engine, point, fidelity).irregularity(inertia)
 
 
 def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:

@@ -10,11 +10,11 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.machine.firing import lap_orders
-from laufruhe.physics.torque import irregularity
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status
+from one_cylinder import irregularity
 
 THROWS = [0, 50, 130, 180, 265]
 WIDE = {"intervals": {"min": "5 deg", "max": "400 deg"}}

@@ -19,11 +19,12 @@ from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque, irregularity, swing_of, torque_facts, torque_parts, work_stored
+from laufruhe.physics.torque import crank_torque, swing_of, torque_facts, torque_parts, work_stored
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.plots.results.torque import applies, figure
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import MEASURES, Measure, Term
+from one_cylinder import irregularity
 from problem_files import PROBLEMS
 
 

@@ -13,12 +13,12 @@ from laufruhe.cli.fidelity import explained, traded
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Flywheel, Rim
-from laufruhe.physics.torque import irregularity
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
 from laufruhe.solvers.boxes.flywheel import _Coordinates
+from one_cylinder import irregularity
 from problem_files import PROBLEMS, changed, loaded
 from ready import solved
 

@@ -14,12 +14,12 @@ import xarray as xr
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
-from laufruhe.physics.torque import irregularity
 from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 from laufruhe.studies.kinds.layout_comparison import LayoutComparison, _places
 from laufruhe.studies.scenes import Scenes
+from one_cylinder import irregularity
 from problem_files import PROBLEMS
 
 FURTHER = ["mean mount force", "added mass", "maximum main-bearing force", "maximum crank-pin force",

@@ -203,11 +203,6 @@ def _compute_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) ->
     return Swing(point.speed, mean, work.sample(steps), steady_inertia, work.values(bent), bent_inertia)
 
 
-def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
-    """Return the degree of irregularity with an inertia without pistons and rods [kg m2] (T3)."""
-    return swing_of(engine, point, fidelity).irregularity(inertia)
-
-
 _STEPS = 1024
 
 

@@ -63,17 +63,7 @@ class FrictionTest:
     @property
     def line(self) -> tuple[float, float]:
         """Intercept and slope of y over x."""
-        fit = _line(self.x, self.y, "reading")
-        return fit.intercept, fit.slope
-
-
-@dataclass(frozen=True)
-class _Line:
-    """Line y = a + b x with the covariances of a and b."""
-
-    intercept: float
-    slope: float
-    covariance: NDArray[np.float64]
+        return _line(self.x, self.y, "reading")[:2]
 
 
 def mean_pressure(torque: float, displacement: float, turns: int) -> float:
@@ -83,28 +73,28 @@ def mean_pressure(torque: float, displacement: float, turns: int) -> float:
 
 def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
     """Return the friction from fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2)."""
-    line = _line(brake, fuel, "load")
-    if line.slope <= 0.0:
+    intercept, slope, covariance = _line(brake, fuel, "load")
+    if slope <= 0.0:
         raise ModelError("the fuel does not rise with the load; check the columns")
-    friction = line.intercept / line.slope
+    friction = intercept / slope
     if friction <= 0.0:
         raise ModelError("the line through the fuel has no friction: it meets no fuel at a driving load; check it")
     # d(a / b) = da / b - a db / b^2
-    by = np.array([1.0, -friction]) / line.slope
-    return Friction(friction, math.sqrt(max(float(by @ line.covariance @ by), 0.0)))
+    by = np.array([1.0, -friction]) / slope
+    return Friction(friction, math.sqrt(max(float(by @ covariance @ by), 0.0)))
 
 
 def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: float) -> Friction:
     """Return the friction at a speed from motoring pressures [Pa] at several, on a straight line (W3)."""
-    line = _line(speeds, drag, "speed")
-    friction, by = line.intercept + line.slope * speed, np.array([1.0, speed])
+    intercept, slope, covariance = _line(speeds, drag, "speed")
+    friction, by = intercept + slope * speed, np.array([1.0, speed])
     if friction <= 0.0:
         raise ModelError("the line through the motoring pressures has no friction at this speed; check it")
-    return Friction(friction, math.sqrt(max(float(by @ line.covariance @ by), 0.0)))
+    return Friction(friction, math.sqrt(max(float(by @ covariance @ by), 0.0)))
 
 
-def _line(x: Sequence[float], y: Sequence[float], what: str) -> _Line:
-    """Fit a line by least squares, with the covariances of its scatter."""
+def _line(x: Sequence[float], y: Sequence[float], what: str) -> tuple[float, float, NDArray[np.float64]]:
+    """Return intercept and slope of a line by least squares, and their covariances by its scatter."""
     if len(x) < FEWEST:
         raise ModelError(f"a line and its deviation take {FEWEST} points, and there are {len(x)}; measure more")
     places = sorted(x)
@@ -120,4 +110,4 @@ def _line(x: Sequence[float], y: Sequence[float], what: str) -> _Line:
     scatter = float(rest @ rest) / (len(readings) - 2)
     steep, level = scatter / spread, scatter / len(readings)
     covariance = np.array([[level + middle**2 * steep, -middle * steep], [-middle * steep, steep]])
-    return _Line(float(readings.mean()) - slope * middle, slope, covariance)
+    return float(readings.mean()) - slope * middle, slope, covariance

@@ -13,6 +13,6 @@ EXTENSION = Extension(
         "apex speed  0 0 0  0 0 0  0  0 0  0  torsion=0",
         "apex acceleration  0 0 0  0 0 0  0  0 0  0  torsion=0",
     ),
-    sections=("laufruhe.extensions.rotary.section:SECTION",),
+    sections=("laufruhe.extensions.rotary.chambers:SECTION",),
     pictures=("laufruhe.extensions.rotary.chambers:PICTURE",),
 )

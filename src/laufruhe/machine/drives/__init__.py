@@ -4,8 +4,7 @@ from collections.abc import Mapping
 
 from laufruhe.extension import extended
 from laufruhe.machine.drives.base import DriveKind, Sizes
-from laufruhe.machine.drives.scotch_yoke import ScotchYoke
-from laufruhe.machine.drives.slider_crank import Klein, RodDrive
+from laufruhe.machine.drives.slider_crank import Klein, RodDrive, ScotchYoke
 
 DRIVES: Mapping[str, DriveKind] = extended("drives", DriveKind, (RodDrive(), ScotchYoke(), Klein()))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -32,7 +31,7 @@ class Sizes:
     options: Mapping[str, Any]
 
 
-class DriveKind(ABC):
+class DriveKind:
     """Way in which a crank drives a piston rod or a ram; a new one is a file and a line in `DRIVES`.
 
     Attributes
@@ -53,9 +52,9 @@ class DriveKind(ABC):
             sizes.stroke, sizes.offset, rod_length=sizes.rod_length, rod_ratio=sizes.rod_ratio or 0.0
         )
 
-    @abstractmethod
-    def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
-        """Return the mechanism of every cylinder from the numbers that all drives share."""
+    def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:  # noqa: ARG002
+        """Return the mechanism of every cylinder from the numbers that all drives share; these alone by default."""
+        return plain
 
 
 def radius_for_stroke(
