@@ -16,7 +16,7 @@ from laufruhe.physics.gas_cycle import OneChamber, pressure_at
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.shaking_loads import rotor_loads
-from laufruhe.physics.star_loads import square_of, star_loads
+from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.torque import swing_of
 
 
@@ -87,7 +87,7 @@ def inertia_coefficients(
     `rod_inertia_loads` multiply by the phase and place of each cylinder (L2-L4, L7).
     """
     effects = chain(*effects_of(part, fidelity))
-    found = [(effect.direction, effect.size * square_of(part, speed) * effect.series()) for effect in effects]
+    found = [(effect.direction, effect.size * (part.shaft.ratio * speed) ** 2 * effect.series()) for effect in effects]
     out = np.zeros((3, max((len(series) for _, series in found), default=1)), dtype=complex)
     for direction, series in found:
         out[direction, : len(series)] += series

@@ -84,10 +84,8 @@ class LoadCase:
     ----------
     times_weight
         The weight of the block so many times along x, y and z (C2).
-    force, place
-        A force [N], and where it acts [m].
-    moment
-        [N m].
+    force, place, moment
+        A force [N], where it acts [m], and a moment [N m].
     """
 
     name: str

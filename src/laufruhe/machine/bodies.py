@@ -8,14 +8,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Rod:
-    """Connecting rod as a rigid body.
+    """Connecting rod as a rigid body, of a mass [kg] and a length between the pins [m].
 
     Attributes
     ----------
-    length
-        Between the pins [m].
-    mass
-        [kg].
     centre_of_gravity
         Distance from the crank pin, on the line of the pins [m].
     inertia

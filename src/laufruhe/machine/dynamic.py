@@ -72,15 +72,7 @@ class FluidTrack:
 
 @dataclass(frozen=True)
 class MeasuredStiffness:
-    """Complex stiffness over frequency, straight between the rows, constant beyond them (E51).
-
-    Attributes
-    ----------
-    omegas
-        Angular frequencies, rising [rad/s].
-    values
-        Complex stiffness [N/m].
-    """
+    """Complex stiffness [N/m] over rising frequency [rad/s], straight between the rows, constant beyond them (E51)."""
 
     axis: int
     omegas: tuple[float, ...]

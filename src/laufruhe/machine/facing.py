@@ -24,12 +24,10 @@ STEPS = 720
 
 @dataclass(frozen=True)
 class Facing:
-    """The other piston of a cylinder.
+    """The other piston of a cylinder, with its crank radius and rod length [m].
 
     Attributes
     ----------
-    crank_radius, rod_length
-        Of it [m].
     ahead
         Crank angle by which it comes to its dead centre first [rad].
     """

@@ -88,11 +88,9 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
 
 
 def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
-    """Return the numbers of throws on every step with which the firing is even (S7).
+    """Return the numbers of throws on every step with which the firing is even, shape (patterns, R) (S7).
 
-    Returns
-    -------
-    Shape (patterns, R), the first throw on step 0.
+    The first throw is on step 0.
 
     Raises
     ------

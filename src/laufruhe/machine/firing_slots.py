@@ -62,10 +62,6 @@ class FiringSlots:
 
     Attributes
     ----------
-    cycle
-        Two- or four-stroke.
-    throws
-        How many there are.
     sides
         Share of bank angle plus split pin by which the dead centre of each cylinder of a throw is late.
     angle

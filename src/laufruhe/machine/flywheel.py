@@ -43,8 +43,6 @@ class Rim:
         [kg/m3].
     mass_ratio
         Mass of the whole flywheel over that of its rim; what is within the rim is not counted as inertia.
-    arms
-        That carry it; of a disc there are none.
     """
 
     mean_diameter: float

@@ -137,9 +137,7 @@ class PressureTrace:
     angles
         Crank angles after the firing dead centre [rad], ascending, one cycle; it may
         begin anywhere, and name its end as well as its beginning.
-    pressures
-        Absolute [Pa].
-    crankcase_pressure
+    pressures, crankcase_pressure
         Absolute [Pa].
     """
 

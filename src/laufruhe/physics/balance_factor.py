@@ -19,8 +19,6 @@ class BalanceFactor:
 
     Attributes
     ----------
-    cylinders
-        That work on it.
     factor
         Share of their reciprocating mass that the counterweights balance, beyond the rotating mass of the throw.
     """

@@ -48,11 +48,9 @@ def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the force of every rod on its pin, of a hinged one on its knuckle pin (B1-B3, B11).
+    """Return the force of every rod on its pin, shape (n, cylinders, 3) [N], in the axes of C2 (B1-B3, B11).
 
-    Returns
-    -------
-    Spectrum of shape (n, cylinders, 3) [N], in the axes of C2.
+    A hinged rod presses its knuckle pin.
 
     Raises
     ------

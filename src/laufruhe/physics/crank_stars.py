@@ -112,8 +112,7 @@ class StarSpace:
     phases
         Steps P of a turn.
     patterns
-        How many throws stand on each step, shape (patterns, P); the first throw is on
-        step 0.
+        How many throws stand on each step, shape (patterns, P); the first throw is on step 0.
     places
         Of the throws along x [m].
     mirror, reflect
@@ -179,10 +178,8 @@ class Partial:
         Shape (n, throws), steps; undefined where not yet placed.
     counts
         Shape (n, P): throws that each step still takes.
-    placed
-        Indices of the placed throws, in the order in which they were placed.
-    open
-        Indices of the others.
+    placed, open
+        Indices of the throws in the order in which they were placed, and of the others.
     """
 
     stars: Stars

@@ -89,7 +89,13 @@ class ElasticMounting:
     @cached_property
     def dynamic(self) -> DynamicSprings:
         """Frequency-dependent springs (E50, E51)."""
-        return dynamic_springs(self.mounts, self.motions)
+        springs = [(place, spring, law) for place, spring in every_spring(self.mounts) for law in spring.dynamic]
+        axes = np.array([spring.orientation[law.axis] for _, spring, law in springs]).reshape(-1, 3)
+        rows = [axis @ self.motions[place] for axis, (place, _, _) in zip(axes, springs, strict=True)]
+        directions = np.zeros((3 * len(self.mounts), len(springs)))
+        for n, (place, _, _) in enumerate(springs):
+            directions[3 * place : 3 * place + 3, n] = axes[n]
+        return DynamicSprings(tuple(law for _, _, law in springs), np.array(rows).reshape(-1, 6), directions)
 
     @cached_property
     def modes(self) -> Modes:
@@ -306,8 +312,6 @@ class DynamicSprings:
 
     Attributes
     ----------
-    laws
-        Of every one.
     rows
         Travel along its axis for each motion of the block, shape (n, 6).
     directions
@@ -339,14 +343,3 @@ class DynamicSprings:
     def forces(self, omegas: Array, shapes: Any) -> ComplexArray:
         """Return the added mount forces per coordinate of shapes (6, k), shape (frequencies, 3 mounts, k)."""
         return np.asarray(np.einsum("wn,rn,nj->wrj", self.added(omegas), self.directions, self.rows @ shapes))
-
-
-def dynamic_springs(mounts: Sequence[Mount], motions: Array) -> DynamicSprings:
-    """Return the frequency-dependent springs of mounts with motions G, shape (mounts, 3, 6)."""
-    springs = [(place, spring, law) for place, spring in every_spring(mounts) for law in spring.dynamic]
-    axes = np.array([spring.orientation[law.axis] for _, spring, law in springs]).reshape(-1, 3)
-    rows = np.array([axis @ motions[place] for axis, (place, _, _) in zip(axes, springs, strict=True)]).reshape(-1, 6)
-    directions = np.zeros((3 * len(mounts), len(springs)))
-    for n, (place, _, _) in enumerate(springs):
-        directions[3 * place : 3 * place + 3, n] = axes[n]
-    return DynamicSprings(tuple(law for _, _, law in springs), rows, directions)

@@ -83,15 +83,13 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[n
     """
     if isinstance(gas, Chambers):
         return chambers_breaks(gas, part)
-    return np.ravel(_breaks_of_one(gas, part, cycle)[:, None] + part.swept.late - np.array(part.swept.lags))
-
-
-def _breaks_of_one(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
     gas, piston, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
-        return np.array(gas.angles)
-    top, bottom = dead_centres(piston)
-    ends = [bottom - math.tau, top, bottom, top + math.tau]
-    if isinstance(gas, Seiliger):
-        return np.array([*ends, cut_off_angle(gas, piston, cycle)]) / pace
-    return np.array([*ends, gas.start, gas.start + gas.duration]) / pace
+        breaks = np.array(gas.angles)
+    else:
+        heat = (
+            [cut_off_angle(gas, piston, cycle)] if isinstance(gas, Seiliger) else [gas.start, gas.start + gas.duration]
+        )
+        top, bottom = dead_centres(piston)
+        breaks = np.array([bottom - math.tau, top, bottom, top + math.tau, *heat]) / pace
+    return np.ravel(breaks[:, None] + part.swept.late - np.array(part.swept.lags))

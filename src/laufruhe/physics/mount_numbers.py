@@ -57,12 +57,10 @@ class AxisResidual:
 
     Attributes
     ----------
-    left
-        Shape (6, 6).
-    right, mass
-        Shape (6,).
+    left, right, mass
+        Shapes (6, 6), (6,) and (6,).
     minimum, maximum
-        Of s.
+        Bounds of s.
     """
 
     left: Array

@@ -31,11 +31,9 @@ _Parts: TypeAlias = tuple[complex, ...]
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the wrench on the block from everything that moves (C7).
+    """Return the wrench (Fx, Fy, Fz, Mx, My, Mz) on the block from everything that moves, shape (n, 6) [N, N m] (C7).
 
-    Returns
-    -------
-    Spectrum of shape (n, 6): (Fx, Fy, Fz, Mx, My, Mz) about the origin of C2 [N, N m].
+    It is about the origin of C2.
 
     Raises
     ------

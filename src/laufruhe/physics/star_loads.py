@@ -34,12 +34,12 @@ def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Ef
     # load of equal effects of cylinders, by the orders of the cycle
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
-    sizes = np.array([member.size * square_of(part, speed) for part, (_, member) in zip(parts, members, strict=True)])
+    ratio = parts[0].shaft.ratio
+    sizes = np.array([member.size * (ratio * speed) ** 2 for _, member in members])
     weights = sizes[:, None] * np.array([_wrench_of(members[0][1].direction, part) for part in parts])
     turns = tuple([part.star_turn for part in parts])
     load = star_orders(weights, turns, len(series))
     load *= series[:, None]
-    ratio = parts[0].shaft.ratio
     # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
     return spread(load if ratio > 0.0 else load.conj(), order_index(engine.cycle, abs(ratio)))
 
@@ -57,11 +57,6 @@ def spread(load: NDArray[np.complex128], step: int) -> NDArray[np.complex128]:
 def order_index(cycle: Cycle, order: float) -> int:
     """Return the index of an order of crank speed among those of a cycle."""
     return int(as_order(order) / cycle.base_order)
-
-
-def square_of(part: SliderCrank, speed: float) -> float:
-    """Return the squared speed of a cylinder's own crank [rad2/s2]."""
-    return (part.shaft.ratio * speed) ** 2
 
 
 def _wrench_of(direction: Direction, part: SliderCrank) -> tuple[float, ...]:

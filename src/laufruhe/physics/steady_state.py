@@ -138,8 +138,6 @@ class TimeMounting:
 
     Attributes
     ----------
-    mounting
-        Block and mounts.
     samples
         Steps over the period at which the motion is read; orders above half of them are lost.
     """

@@ -38,16 +38,10 @@ FINE_WORK = 8
 
 @dataclass(frozen=True)
 class TorqueFacts:
-    """Key figures of the torque at one operating point.
+    """Key figures of the torque at one operating point: mean, which the load takes, and ends [N m], and power [W].
 
     Attributes
     ----------
-    mean
-        What the load takes [N m].
-    power
-        Mean torque times speed [W].
-    minimum, largest
-        Over the cycle [N m].
     excursion
         Work that is stored and given back within the cycle [J] (T2).
     irregularity

@@ -106,10 +106,8 @@ class LayoutKind(ABC):
         Of the keys `throws`, `firing_order`, `slider_cranks` and `shafts` those that it takes.
     openable
         Keys that may be left open.
-    cylinders_per_throw
-        Cylinders that share a throw.
     banks
-        Of which each has a cylinder at every place along the crank.
+        Number of banks, which each have a cylinder at every place along the crank.
     is_free
         Whether every slider-crank is listed, and nothing is placed.
     fires_evenly
