@@ -40,13 +40,10 @@ class Facing:
         """Return the piston in another size."""
         return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
 
-    def mirrors(self, part: SliderCrank) -> bool:
-        """Return True if a piston moves in step with it, so that each has half of the chamber."""
-        return self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0)
-
     def swept(self, part: SliderCrank) -> Swept:
         """Return the chamber that a piston shares with it."""
-        if self.mirrors(part):
+        if self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0):
+            # pistons in step have half of the chamber each
             return Swept(part)
         chamber = _chamber(part)
         return Swept(part, charge=chamber, late=chamber.fires_at * part.shaft.ratio)

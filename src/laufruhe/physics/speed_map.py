@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -38,47 +37,22 @@ class SpeedMap:
 
     Attributes
     ----------
-    speeds
-        Crank speeds [rad/s], shape (s,).
     orders
-        That the loads hold, shape (n,).
-    forces
-        Complex mount forces, shape (s, n, mounts, 3) [N].
-    growth, parts
-        Of inertia and gas over speed, shape (s,) each, and the mount forces of both if
-        the mounts gave no way, shape (n, mounts, 3) each.
+        Orders that the loads hold, shape (n,).
+    forces, firm
+        Complex forces on the mounts, and on the same mounts if rigid, shape (speeds, n, mounts, 3) [N].
     """
 
-    speeds: Array
     orders: Array
     forces: ComplexArray
-    growth: tuple[Array, ...]
-    parts: tuple[ComplexArray, ...]
-
-    @cached_property
-    def firm(self) -> ComplexArray:
-        """Mount forces on rigid mounts, shape (s, n, mounts, 3) [N]."""
-        return _over_speeds(self.growth, self.parts)
+    firm: ComplexArray
 
     @property
     def transmissibility(self) -> Array:
-        """Transmissibility over speed and order, shape (s, n); zero without excitation (E11)."""
+        """Transmissibility over speed and order, shape (speeds, n); zero without excitation (E11)."""
         over, under = (np.sqrt(np.sum(np.abs(f) ** 2, axis=(2, 3))) for f in (self.forces, self.firm))
         floor = 1e-12 * under.max(initial=0.0)
         return np.asarray(np.where(under > floor, over / np.where(under > floor, under, 1.0), 0.0))
-
-    @property
-    def total(self) -> Array:
-        """Transmissibility of all orders above zero together, shape (s,) (E11)."""
-        dynamic = self.orders > 0.0
-        over, under = (np.sqrt(np.sum(np.abs(f[:, dynamic]) ** 2, axis=(1, 2, 3))) for f in (self.forces, self.firm))
-        return np.asarray(np.where(under > 0.0, over / np.where(under > 0.0, under, 1.0), 0.0))
-
-    @property
-    def rms(self) -> Array:
-        """Root mean square of the alternating force over cycle and mounts, shape (s,) [N]."""
-        dynamic = self.forces[:, self.orders > 0.0]
-        return np.asarray(np.sqrt(0.5 * np.sum(np.abs(dynamic) ** 2, axis=(1, 2, 3)) / dynamic.shape[2]))
 
 
 def speed_map(
@@ -112,7 +86,7 @@ def speed_map(
     shape = (len(speeds), len(orders), len(mounting.mounts), 3)
     maps = rigid_mounting(mounting.mounts).maps
     firm = [np.einsum("mij,nj->nmi", maps, c) for c in parts]
-    return SpeedMap(np.asarray(speeds, dtype=float), orders, forces.reshape(shape), tuple(growth), tuple(firm))
+    return SpeedMap(orders, forces.reshape(shape), _over_speeds(growth, firm))
 
 
 def _over_speeds(growth: Sequence[Array], parts: Sequence[ComplexArray]) -> ComplexArray:

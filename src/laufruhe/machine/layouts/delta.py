@@ -65,17 +65,6 @@ class Triangle:
         return at if corner == bank else at + self.leads[bank]
 
 
-def closing_lead(ratios: tuple[int, int, int], first: Turn, second: Turn) -> Turn:
-    """Return the lead of the third bank that closes the angles round the triangle (K18)."""
-    half = Fraction(1, 2)
-    return reduced_turn(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
-
-
-def equal_lead(ratios: tuple[int, int, int]) -> Turn:
-    """Return the least lead that all three banks may share: 20 deg with one crank reversed, 60 with none (K18)."""
-    return -Fraction(sum(ratios), 18)
-
-
 # by the crank that is reversed; the crankshaft turns forward, so where it is that one the others turn back
 _RATIOS = ((1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1))
 
@@ -114,8 +103,12 @@ class Delta(LayoutKind):
         leads = inputs.options["crank_leads"]
         if leads is not None and len(leads) != 2:
             raise KeyedError("crank_leads", f"has {len(leads)} angles; give those of two banks, the third follows")
-        first, second = map(as_turn, leads) if leads is not None else (equal_lead(ratios),) * 2
-        return Triangle(inputs.crank_distance, ratios, (first, second, closing_lead(ratios, first, second)))
+        # the least lead that all banks may share is 20 deg with one crank reversed, and 60 deg with none (K18)
+        first, second = map(as_turn, leads) if leads is not None else (-Fraction(sum(ratios), 18),) * 2
+        # the lead of the third bank closes the angles round the triangle (K18)
+        half = Fraction(1, 2)
+        third = reduced_turn(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
+        return Triangle(inputs.crank_distance, ratios, (first, second, third))
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
