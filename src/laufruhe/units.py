@@ -81,10 +81,6 @@ def _factor(unit: str, si_unit: str) -> float:
         if unit not in COMMON[si_unit]:
             raise wrong_dimension
         return COMMON[si_unit][unit]
-    return _by_registry(unit, si_unit, wrong_dimension)
-
-
-def _by_registry(unit: str, si_unit: str, wrong_dimension: UnitError) -> float:
     unknown = UnitError(f"unit '{unit}' is not known; {_in_units(si_unit)}")
     if _PRODUCT.fullmatch(unit) is None:
         raise unknown

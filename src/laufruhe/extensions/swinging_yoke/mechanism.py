@@ -84,12 +84,6 @@ class SwingingYoke(SliderCrank):
         return 2.0 * self.lever_length * self.crank_radius / self.pivot
 
     @property
-    def return_ratio(self) -> float:
-        """Time of the slow stroke over that of the quick one (K15)."""
-        lean = math.asin(self.crank_radius / self.pivot)
-        return (math.pi + 2.0 * lean) / (math.pi - 2.0 * lean)
-
-    @property
     def counterweight_mass(self) -> float | None:
         """Mass of the weight behind the pivot [kg]; None without one."""
         return self.lever_weight if self.lever_weight_radius > 0.0 else None
