@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.mount import Matrix3, Vector3
+from laufruhe.numerics.arrays import Array
 
 _SLACK = 1e-9
 
@@ -63,12 +63,12 @@ class Block:
             )
 
     @property
-    def tensor(self) -> NDArray[np.float64]:
+    def tensor(self) -> Array:
         """Inertia without what turns at imposed speed, shape (3, 3) [kg m2] (E1a)."""
         return np.array(self.inertia, dtype=float) - np.diag([self.turning_inertia, 0.0, 0.0])
 
     @property
-    def mass_matrix(self) -> NDArray[np.float64]:
+    def mass_matrix(self) -> Array:
         """M of (u, theta) of the centre of gravity, shape (6, 6) (E1)."""
         matrix = np.zeros((6, 6))
         matrix[:3, :3] = self.mass * np.eye(3)

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.dynamic import Dynamic
+from laufruhe.numerics.arrays import Array
 
 Vector3 = tuple[float, float, float]
 Matrix3 = tuple[Vector3, Vector3, Vector3]
@@ -92,23 +92,23 @@ class Mount:
         return replace(changed, joined=tuple(map(change, self.joined))) if self.joined else changed
 
     @property
-    def stiffness_matrix(self) -> NDArray[np.float64]:
+    def stiffness_matrix(self) -> Array:
         """3 x 3 stiffness at rest in the axes of C2 (E2)."""
         return self._in_c2(lambda spring: spring.at_rest)
 
     @property
-    def loss_matrix(self) -> NDArray[np.float64]:
+    def loss_matrix(self) -> Array:
         """3 x 3 stiffness times loss factor in the axes of C2 (E2)."""
         return self._in_c2(lambda spring: tuple(spring.loss_factor * k for k in spring.stiffness))
 
     @property
-    def damping_matrix(self) -> NDArray[np.float64]:
+    def damping_matrix(self) -> Array:
         """3 x 3 viscous damping in the axes of C2 (E2, E48)."""
         return self._in_c2(
             lambda spring: tuple(c + spring.lag * k for c, k in zip(spring.damping, spring.stiffness, strict=True))
         )
 
-    def _in_c2(self, diagonal: Callable[[Mount], Sequence[float]]) -> NDArray[np.float64]:
+    def _in_c2(self, diagonal: Callable[[Mount], Sequence[float]]) -> Array:
         total = np.zeros((3, 3))
         for spring in self.springs:
             axes = np.array(spring.orientation)

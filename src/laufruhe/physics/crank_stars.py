@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.exact_angles import phasors
 
 Stars = NDArray[np.uint8]
@@ -28,7 +28,7 @@ _TABLE_ROWS = 300
 _CHUNK = 1 << 15
 
 
-def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> NDArray[np.complex128]:
+def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> ComplexArray:
     """Return F_h, and C_h in the unit of the places of throws, of many crank stars, shape (n, orders, 2) (S1).
 
     A star (throws,) has the step of every throw, 0 to phases - 1.
@@ -50,7 +50,7 @@ def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequen
     return out.view(complex).reshape(len(stars), len(orders), 2)
 
 
-def phase_waves(phases: int, orders: Sequence[int]) -> NDArray[np.complex128]:
+def phase_waves(phases: int, orders: Sequence[int]) -> ComplexArray:
     """Return e^{i h theta} of every step, shape (orders, phases), with the symmetries of the circle."""
     return phasors([Fraction(p, phases) for p in range(phases)], np.array(orders, dtype=np.int64))
 
@@ -183,7 +183,7 @@ class Partial:
     """
 
     stars: Stars
-    counts: NDArray[np.uint8]
+    counts: Stars
     placed: tuple[int, ...]
     open: tuple[int, ...]
 
@@ -213,7 +213,7 @@ def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
             waiting.append(Partial(stars[part], counts[part], placed, left))
 
 
-def _first_of_images(space: StarSpace, partial: Partial) -> NDArray[np.bool_]:
+def _first_of_images(space: StarSpace, partial: Partial) -> Mask:
     """Return a mask of stars of which no image is already known to come earlier (S2).
 
     Image and star compare throw by throw from the front, as far as the steps that both need are placed.

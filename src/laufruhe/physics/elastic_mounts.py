@@ -20,13 +20,12 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, UncarriedLoadError
 from laufruhe.machine.block import Block
 from laufruhe.machine.dynamic import Dynamic, FluidTrack
 from laufruhe.machine.mount import Mount, every_spring
-from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.modes import Modes, modes_of
@@ -107,7 +106,7 @@ class ElasticMounting:
         return self._modal(self.total(self.losses))
 
     @cached_property
-    def _met(self) -> NDArray[np.bool_]:
+    def _met(self) -> Mask:
         seen = np.abs(self.dynamic.rows @ self.modes.shapes)
         is_driven = (seen > UNDRIVEN * seen.max(axis=1, keepdims=True, initial=0.0)).astype(int)
         return np.asarray(is_driven.T @ is_driven > 0)
@@ -135,7 +134,7 @@ class ElasticMounting:
         return np.where((np.abs(drive) > floor) & self._answers, drive, 0.0)
 
     @cached_property
-    def _answers(self) -> NDArray[np.bool_]:
+    def _answers(self) -> Mask:
         modes = range(1, 7) if self.answering is None else self.answering
         return np.isin(np.arange(1, 7), list(modes))
 
@@ -235,7 +234,7 @@ class ElasticMounting:
             out += np.einsum("wrj,wj->wr", self.dynamic.forces(omegas, self.modes.shapes), amplitudes)
         return np.asarray(out.reshape(len(omegas), -1, 3))
 
-    def resonant(self, wrench: Spectrum, speed: float) -> tuple[NDArray[np.bool_], str]:
+    def resonant(self, wrench: Spectrum, speed: float) -> tuple[Mask, str]:
         """Return a mask of orders with an infinite response, shape (n,), and the first of them in words."""
         struck, why = np.zeros(len(wrench.coefficients), dtype=bool), ""
         for k in np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1)):

@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Chambers, Charge, Cycle, GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import dead_centres
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import cut_off_angle, seiliger_pressure
@@ -25,7 +25,7 @@ from laufruhe.physics.working_chambers import chambers_breaks, chambers_thrust
 OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
-def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Return the absolute cylinder pressure [Pa] at crank angles after firing [rad], shape of `angles`.
 
     Raises
@@ -60,7 +60,7 @@ def check_chamber(gas: GasModel, part: SliderCrank) -> None:
         )
 
 
-def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
     """Return the gas force on a piston rod along the axis, away from the crank [N], as `pressure_at` (B1, G14)."""
     if isinstance(gas, Chambers):
         return chambers_thrust(gas, part, angles)
@@ -76,7 +76,7 @@ def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
     )
 
 
-def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
+def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> Array:
     """Return the angles after firing at which a derivative of the pressure jumps [rad] (G13).
 
     Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.

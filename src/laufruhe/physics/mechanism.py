@@ -14,12 +14,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.bodies import Motion
-from laufruhe.numerics.arrays import ComplexArray
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.rigid_body import plane_wrench
@@ -165,7 +164,7 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
     """
     radius = part.crank_radius
 
-    def rows(alpha: NDArray[np.float64]) -> tuple[Any, ...]:
+    def rows(alpha: Array) -> tuple[Any, ...]:
         force, roll, rods = momentum_loads(part, part.motion(np, alpha), 1.0)
         return np.real(force), np.imag(force), roll, rods
 
@@ -176,7 +175,7 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
     return table
 
 
-def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale: Any, name: str) -> ComplexArray:
+def resolved_orders(rows: Callable[[Array], Sequence[Any]], scale: Any, name: str) -> ComplexArray:
     """Return the coefficients (functions, orders) of periodic functions of the crank's own angle.
 
     As many orders are taken as matter beside the scale of each function, shape (functions, 1).

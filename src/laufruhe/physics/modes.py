@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine.block import Block
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 
 GRAVITY = 9.80665
 MOTIONS = ("fore-aft", "lateral", "bounce", "roll", "pitch", "yaw")
@@ -46,7 +45,7 @@ class Modes:
         return np.asarray(np.sqrt(self.squares) / math.tau)
 
     @property
-    def free(self) -> NDArray[np.bool_]:
+    def free(self) -> Mask:
         """Mask of modes that no mount resists, shape (6,)."""
         return np.asarray(self.squares == 0.0)
 

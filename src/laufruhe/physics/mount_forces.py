@@ -37,8 +37,8 @@ class RigidMounting:
         Length that makes moments comparable with forces [m].
     """
 
-    maps: NDArray[np.float64]
-    free: NDArray[np.float64]
+    maps: Array
+    free: Array
     arm: float
 
     def forces(self, wrench: Spectrum, speed: float = 0.0) -> Spectrum:  # noqa: ARG002
@@ -51,7 +51,7 @@ class RigidMounting:
         return np.asarray((loads @ self._columns).swapaxes(0, 1))
 
     @cached_property
-    def _columns(self) -> NDArray[np.float64]:
+    def _columns(self) -> Array:
         return np.ascontiguousarray(self.maps.swapaxes(1, 2))
 
     def check_carried(self, wrench: Spectrum) -> None:
@@ -99,7 +99,7 @@ def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
     return RigidMounting(maps, right[rank:], arm)
 
 
-def _scales(arm: float) -> NDArray[np.float64]:
+def _scales(arm: float) -> Array:
     return np.array([1.0, 1.0, 1.0, arm, arm, arm])
 
 

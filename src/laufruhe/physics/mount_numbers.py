@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Block, Mount
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrench
@@ -28,7 +27,7 @@ def transmitted(forces: Spectrum, firm: Spectrum, orders: Sequence[float] | None
     return max(_ratio(forces.at(order), firm.at(order)) for order in orders)
 
 
-def _ratio(forces: NDArray[np.complex128], firm: NDArray[np.complex128]) -> float:
+def _ratio(forces: ComplexArray, firm: ComplexArray) -> float:
     below = float(np.linalg.norm(firm))
     return float(np.linalg.norm(forces)) / below if below > 0.0 else 0.0
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -45,7 +45,7 @@ def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed
     return Spectrum(wrench.base, np.zeros((1, len(engine.mounts), 3), dtype=complex))
 
 
-def mount_maps(mounting: Mounting, order: float, speed: float) -> NDArray[np.complex128]:
+def mount_maps(mounting: Mounting, order: float, speed: float) -> ComplexArray:
     """Return the mount forces per wrench at one order and speed, shape (mounts, 3, 6)."""
     if isinstance(mounting, RigidMounting):
         return mounting.maps.astype(complex)

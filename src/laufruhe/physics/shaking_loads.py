@@ -13,9 +13,9 @@ from itertools import chain
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import cancelling_sums
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -110,7 +110,7 @@ def added_rotor_loads(
     return rotor_loads(rotors, point.speed, engine.cycle)
 
 
-def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
+def rotor_wrench(rotor: Rotor, speed: float) -> ComplexArray:
     """Return the coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
     return np.array(_wrenches((rotor,), speed)[0], dtype=complex)
 

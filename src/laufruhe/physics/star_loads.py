@@ -7,9 +7,9 @@ from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, cis, star_orders
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.mechanism import Direction, Effect
@@ -30,7 +30,7 @@ def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], It
     return Spectrum(cycle.base_order, total)
 
 
-def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> NDArray[np.complex128]:
+def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> ComplexArray:
     # load of equal effects of cylinders, by the orders of the cycle
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
@@ -44,7 +44,7 @@ def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Ef
     return spread(load if ratio > 0.0 else load.conj(), order_index(engine.cycle, abs(ratio)))
 
 
-def spread(load: NDArray[np.complex128], step: int) -> NDArray[np.complex128]:
+def spread(load: ComplexArray, step: int) -> ComplexArray:
     """Spread a load by order of its own crank angle, shape (n, d), to orders of the cycle, `step` to one of its own."""
     if step == 1:
         return load

@@ -16,10 +16,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.time_model import TimeModel, time_model
@@ -123,7 +122,7 @@ def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: flo
     raise SolverError(f"{why} repeat itself in one period; integrate a run-up instead")
 
 
-def static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
+def static_size(model: TimeModel, loads: ComplexArray) -> float:
     """Return a typical coordinate of the block under loads; never zero."""
     stiffness = float(np.linalg.norm(model.stiffness)) or 1.0
     return float(np.abs(loads).max(initial=0.0)) / stiffness or 1e-9

@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import DynamicSprings, ElasticMounting
 from laufruhe.physics.mount_numbers import mass_root
@@ -50,7 +49,7 @@ class TimeModel:
     gaps: Array
     stops: Array
     turns: Array
-    places: NDArray[np.intp]
+    places: Indices
     roll: Array
 
     @property

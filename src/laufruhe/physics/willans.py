@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.numerics.arrays import Array
 
 FEWEST = 3
 """Points that a line and its deviation take."""
@@ -93,7 +93,7 @@ def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: flo
     return Friction(friction, math.sqrt(max(float(by @ covariance @ by), 0.0)))
 
 
-def _line(x: Sequence[float], y: Sequence[float], what: str) -> tuple[float, float, NDArray[np.float64]]:
+def _line(x: Sequence[float], y: Sequence[float], what: str) -> tuple[float, float, Array]:
     """Return intercept and slope of a line by least squares, and their covariances by its scatter."""
     if len(x) < FEWEST:
         raise ModelError(f"a line and its deviation take {FEWEST} points, and there are {len(x)}; measure more")
