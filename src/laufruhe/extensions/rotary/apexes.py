@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.problem.channels import Need, NumberChannel
@@ -16,17 +15,7 @@ ROTORS = Need(
 )
 
 
-@dataclass(frozen=True, eq=False)
-class ApexChannel(NumberChannel):
-    """Largest value of all apexes at the selected operating points."""
-
-    keys: tuple[str, ...] = ("operating_points",)
-    needs: Need = ROTORS
-    minimised: bool = False
-    depends_on_loads: bool = False
-
-
-def _maximum(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:
+def _maximum(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> NumberChannel:
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         speeds = [
             at.point.speed for at in evaluation.loads if measure.points is None or at.point.name in measure.points
@@ -34,7 +23,9 @@ def _maximum(name: str, unit: str, power: int, number: Callable[[RotaryUnit], fl
         rotors = [part for part in evaluation.engine.slider_cranks if isinstance(part, RotaryUnit)]
         return [max((number(part) * speed**power for part in rotors for speed in speeds), default=0.0)]
 
-    return ApexChannel(name, unit, values=values)
+    return NumberChannel(
+        name, unit, ("operating_points",), ROTORS, minimised=False, depends_on_loads=False, values=values
+    )
 
 
 APEX_SPEED = _maximum("apex speed", "m/s", 1, lambda part: part.apex_speed)
