@@ -23,8 +23,7 @@ class Block:
     mass
         Everything that the mounts carry, moving parts included [kg].
     inertia
-        Tensor about the centre of gravity in the axes of C2 [kg m2]; off the diagonal
-        stand its entries, xy = - integral of x y dm.
+        Tensor about the centre of gravity in the axes of C2 [kg m2]; xy = - integral of x y dm.
     centre_of_gravity
         (x, y, z) [m] (C2).
     turning_inertia

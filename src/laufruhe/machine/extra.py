@@ -15,7 +15,7 @@ class Extra(ABC):
     Attributes
     ----------
     name
-        Of the kind of decision that moves its numbers.
+        Name of the kind of decision that moves its numbers.
     """
 
     name: ClassVar[str]

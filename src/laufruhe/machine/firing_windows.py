@@ -36,7 +36,7 @@ class CylinderAngles:
     Attributes
     ----------
     throws
-        Of every own angle, its throw.
+        Throw of every own angle.
     shares
         What an open angle adds to every own angle, shape (own angles, open angles).
     """

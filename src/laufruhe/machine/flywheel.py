@@ -22,7 +22,7 @@ class Arms:
     at_rim, at_hub
         Width across the plane of rotation, and depth along the direction of motion [m].
     hub_diameter
-        Where they begin [m].
+        Diameter at which the arms begin [m].
     """
 
     count: int

@@ -23,8 +23,7 @@ class Charge:
     compression_ratio
         Largest over smallest volume.
     intake_pressure, exhaust_pressure
-        Absolute [Pa]; of the gas exchange and the start of compression. A two-stroke
-        cycle has no exhaust stroke and makes no use of the exhaust pressure.
+        Absolute pressures of the gas exchange [Pa]; compression starts at the first. Two strokes need no second.
     crankcase_pressure
         Absolute [Pa], on the underside of the piston.
     """
@@ -85,8 +84,7 @@ class Wiebe(Charge):
     Attributes
     ----------
     imep
-        Wanted of the whole cycle, gas exchange included [Pa]; the heat released is
-        solved for it.
+        As of `Seiliger` [Pa]; the heat released follows from it.
     start, duration
         Of combustion, crank angle from the firing dead centre [rad].
     shape
@@ -94,8 +92,7 @@ class Wiebe(Charge):
     completeness
         Fraction burnt at the end; a = -ln(1 - completeness).
     heat_ratio
-        Ratio of specific heats of the charge, from the start of compression to the end
-        of expansion.
+        Ratio of specific heats of the charge, from the start of compression to the end of expansion.
     """
 
     imep: float
@@ -135,8 +132,7 @@ class PressureTrace:
     Attributes
     ----------
     angles
-        Crank angles after the firing dead centre [rad], ascending, one cycle; it may
-        begin anywhere, and name its end as well as its beginning.
+        Ascending crank angles of one cycle after the firing dead centre [rad]; the end may repeat the beginning.
     pressures, crankcase_pressure
         Absolute [Pa].
     """

@@ -26,13 +26,11 @@ class Mount:
     position
         (x, y, z) [m] (C2).
     stiffness
-        Along its own three axes [N/m]; a rigid mounting uses only the ratios, and
-        zero marks a direction that the mount does not carry.
+        Along its own three axes [N/m]; a rigid mounting uses the ratios; zero where the mount carries nothing.
     orientation
         Rows are the mount's own axes in the axes of C2.
     loss_factor
-        Hysteretic: K becomes K (1 + i eta); damping work over work of deformation
-        over 2 pi (eq. 40).
+        Hysteretic: K becomes K (1 + i eta); damping work over work of deformation over 2 pi (eq. 40).
     damping
         Viscous, along its own three axes [N s/m].
     lag

@@ -94,7 +94,7 @@ class Bearing:
     Attributes
     ----------
     x
-        Middle of it along the crank axis [m] (C2).
+        Middle along the crank axis [m] (C2).
     diameter, width
         Of its journal [m]; needed for a pressure, the diameter for friction too.
     friction
@@ -144,7 +144,7 @@ class GearedInertia:
     ratio
         Speed over crank speed; negative runs against the crank (C3).
     share
-        Of the inertia of all that turns, reduced to the crank: n^2 J_n over the sum of all (L8).
+        Part of the inertia of all that turns, reduced to the crank: n^2 J_n over the sum of all (L8).
     """
 
     name: str

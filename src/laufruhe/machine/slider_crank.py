@@ -111,9 +111,9 @@ class SliderCrank:
     big_end: tuple[float, float] | None = None
     facing: Shared | None = None
     noun: ClassVar[str] = "cylinder"
-    """What messages call it."""
+    """Noun in its name."""
     has_pin_loads: ClassVar[bool] = True
-    """Whether it is known what it presses its crank pin with."""
+    """Whether the force on its crank pin is known."""
     has_rod: ClassVar[bool] = True
     """Whether a rod leans on a cylinder wall."""
     is_balanced_by_share: ClassVar[bool] = True
@@ -230,10 +230,7 @@ class SliderCrank:
         return Swept(self) if self.facing is None else self.facing.swept(self)
 
     def lean(self, lib: Any, angles: Any) -> Any:
-        """Return crank-pin force over gas force at crank angles after firing, in the plane of the cylinder axis (B2).
-
-        In the plane turned to the cylinder axis: the rod leans on the wall.
-        """
+        """Return crank-pin force over gas force at crank angles after firing, turned to the cylinder axis (B2)."""
         sine, cosine = self.rod_lean(lib, self.fires_at + self.shaft.ratio * angles)
         return 1.0 - 1j * sine / cosine
 
@@ -250,7 +247,7 @@ class SliderCrank:
     def on_pin(self, _lib: Any, _alpha: Any, force: Any, _with_masses: bool) -> Any:
         """Return the force on the rod's pin for a force on its piston pin, in the plane of its axis (B11).
 
-        With the pull of what moves with that pin but does not turn with the crank, at unit speed of the crank.
+        It may include the pull of masses at that pin that do not turn with the crank, at unit speed of the crank.
         """
         return force
 

@@ -184,7 +184,7 @@ def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | Non
 def _pin_load(
     cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, reaction: PinReaction
 ) -> Spectrum:
-    """Return what `seen` takes of the masses and gas of one cylinder, shape (n, d) (B1, B2)."""
+    """Return a reaction to the masses and the gas of one cylinder, shape (n, d) (B1, B2)."""
     if not part.has_pin_loads:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
