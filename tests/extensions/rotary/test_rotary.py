@@ -122,7 +122,7 @@ class TestGas:
         """Of a rotor with its centre of gravity on the eccentric, and what turns with it."""
         total = MASS * E * SPEED**2 * cmath.exp(1j * phi)
         for at, pressure in self._pressures(phi):
-            line = UNIT._flank() * cmath.exp(1j * at / 3.0)
+            line = (UNIT.outlines(0.0)[1].points[:31] - E) * cmath.exp(1j * at / 3.0)
             outward = -1j * np.diff(line)
             total -= pressure * B * complex(outward.sum())
             about_the_centre = (np.conj(0.5 * (line[1:] + line[:-1])) * outward).imag.sum()
