@@ -289,6 +289,6 @@ class SliderCrank:
         return 4.0 * self.rod_length * self.crank_radius / (top + bottom)
 
 
-def as_kind(kind: type[P], part: SliderCrank, **own: Any) -> P:
+def as_kind(kind: type[P], part: SliderCrank, **numbers: Any) -> P:
     """Return a slider-crank as a mechanism of another class, with the fields that only this has."""
-    return kind(**{shared.name: getattr(part, shared.name) for shared in fields(part)}, **own)
+    return kind(**{shared.name: getattr(part, shared.name) for shared in fields(part)}, **numbers)

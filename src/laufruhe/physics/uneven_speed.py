@@ -98,14 +98,14 @@ def _compute_turning(engine: Engine, point: OperatingPoint, fidelity: Fidelity) 
 
 @lru_cache(maxsize=64)
 def _motion_at(turning: _Turning, times: bytes) -> CrankMotion:
-    torque, asked = turning.torque, np.frombuffer(times)
+    torque, instants = turning.torque, np.frombuffer(times)
     # crank angles at these times: the inverse of t(phi), whose derivative is the pace, by Newton's method
     shift = turning.pace.integral.coefficients
     series = Spectrum(turning.pace.base, np.stack([shift, turning.pace.coefficients], axis=1))
-    origin, angle = float(shift.sum().real), asked.copy()
+    origin, angle = float(shift.sum().real), instants.copy()
     for _ in range(_ROUNDS):
         values = series.values(angle)
-        step = (asked - (angle + values[:, 0] - origin)) / values[:, 1]
+        step = (instants - (angle + values[:, 0] - origin)) / values[:, 1]
         angle = angle + step
         if float(np.abs(step).max()) <= 1e-13:
             break

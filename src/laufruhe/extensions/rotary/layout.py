@@ -45,10 +45,16 @@ class Rotary(Inline):
             limit = units.quantity_text(shortest, "m")
             rule = f"does not let the rotor turn, it must be over three eccentricities, {limit}"
             raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.quantity_text(radius, "m"))
-        own = {key: options[key] for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
+        rotor_numbers = {key: options[key] for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
         mass = options["rotor_mass"]
         return Mechanism(
-            options["eccentricity"], math.inf, 0.0, rod_rotating_mass=mass, kind=RotaryUnit, own=own, **shared
+            options["eccentricity"],
+            math.inf,
+            0.0,
+            rod_rotating_mass=mass,
+            kind=RotaryUnit,
+            numbers=rotor_numbers,
+            **shared,
         )
 
 

@@ -55,15 +55,15 @@ class SwingingYokeDrive(DriveKind):
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
         if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:
             raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
-        own: dict[str, Any] = {
+        lever_numbers: dict[str, Any] = {
             "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
             "lever_weight": numbers["lever_weight"] or 0.0,
             "lever_weight_radius": numbers["lever_weight_radius"] or 0.0,
         }  # fmt: skip
         if numbers["lever"] is not None:
             names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
-            own |= {name: numbers["lever"][key] for key, name in names.items()}
-        return replace(plain, offset=0.0, kind=SwingingYoke, own=own)
+            lever_numbers |= {name: numbers["lever"][key] for key, name in names.items()}
+        return replace(plain, offset=0.0, kind=SwingingYoke, numbers=lever_numbers)
 
 
 SWINGING_YOKE = SwingingYokeDrive()

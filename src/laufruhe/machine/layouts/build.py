@@ -34,7 +34,7 @@ class Mechanism:
         [kg m2] (eq. 10).
     kind
         Class of the slider-cranks.
-    own
+    numbers
         Fields that only this class has.
     """
 
@@ -48,7 +48,7 @@ class Mechanism:
     bore: float | None = None
     big_end: tuple[float, float] | None = None
     kind: type[SliderCrank] = SliderCrank
-    own: Mapping[str, Any] = field(default_factory=dict)
+    numbers: Mapping[str, Any] = field(default_factory=dict)
 
     def cylinder(
         self,
@@ -76,7 +76,7 @@ class Mechanism:
             firing_angle=firing_angle,
             shaft=shaft,
             big_end=self.big_end,
-            **self.own,
+            **self.numbers,
         )
 
 
