@@ -19,7 +19,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.witness import is_over
-from laufruhe.prove.witness import Witness, check_near_witness, thin_box
+from laufruhe.prove.witness import Witness, thin_box
 
 P = TypeVar("P")
 
@@ -330,28 +330,9 @@ class BatchBisection(BoxBisection):
         results = zip(boxes, *self._bounder.bounds(lower, upper), strict=True)
         return [(float(bound), Box(*box, int(side))) for box, bound, side in results]
 
-
-@dataclass(frozen=True, eq=False)
-class ThinBoxBounder:
-    """Bounds of thin boxes around known designs, to check a `BoxBounds` between `lower` and `upper`."""
-
-    bounder: BoxBounds
-    lower: Array
-    upper: Array
-
-    @property
-    def what(self) -> str:
-        """Name of the boxes."""
-        return self.bounder.what
-
-    def around(self, place: Array) -> tuple[Array, Array]:
-        """Return the bounds of a thin box around open numbers of shape (n,)."""
-        return thin_box(place, self.lower, self.upper)
-
-    def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the lower bound of the objective in a box (lower, upper) [SI]."""
-        low, high = box
-        return float(self.bounder.bounds(low[None], high[None])[0][0])
+    def check_near(self, lower: Array, upper: Array, witness: Witness) -> None:
+        """Check the bound of a thin box around the witness, within the root box between `lower` and `upper`."""
+        witness.check_near(self.what, self.bound_boxes([thin_box(witness.place, lower, upper)])[0][0])
 
 
 def bisect_box(
@@ -391,5 +372,5 @@ def bisect_in_stages(
             else bisection.run(bisection.bound_boxes([(lower, upper)])[0], count)
         )
         if witness is not None and not k:
-            check_near_witness(ThinBoxBounder(bounder, lower, upper), witness.place, witness)
+            bisection.check_near(lower, upper, witness)
         yield result

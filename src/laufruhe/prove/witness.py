@@ -9,15 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeVar
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import check_bound, is_over
-
-D = TypeVar("D", contravariant=True)
-P = TypeVar("P")
 
 THIN = 1e-6
 """Distance from a design to either end of a thin part, as a share of each side."""
@@ -51,43 +47,9 @@ class Witness:
         if is_over(bound, self.value) and is_over(bound, self.upper_value):
             check_bound(what, bound, self.upper_value)
 
-
-class Bounder(Protocol[D, P]):
-    """Method that bounds parts of the set of designs."""
-
-    @property
-    def what(self) -> str:
-        """Name of the parts in messages."""
-
-    def around(self, design: D) -> P | None:
-        """Return a thin part that contains a design, or None if the method cannot state one."""
-
-    def bound(self, part: P) -> float:
-        """Return the lower bound of the objective in a part [SI]; infinite if the part has no feasible design."""
-
-
-def check_near_witness(bounder: Bounder[D, P], design: D, witness: Witness) -> bool:
-    """Bound a thin part around a known design, and report a bound above the objective of the design.
-
-    Parameters
-    ----------
-    bounder
-        Method to check.
-    design
-        Known design in the terms of the method.
-    witness
-        Objective of that design.
-
-    Returns
-    -------
-    bool
-        False if the method can state no part around the design, so that nothing was checked.
-    """
-    part = bounder.around(design)
-    if part is None:
-        return False
-    witness.check(f"{bounder.what}, around the known design", bounder.bound(part))
-    return True
+    def check_near(self, what: str, bound: float) -> None:
+        """Report a bound [SI] of a thin part around the design that exceeds its objective; `what` names the parts."""
+        self.check(f"{what}, around the known design", bound)
 
 
 def thin_box(place: Array, lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -30,12 +30,12 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import real_bounds
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult, ThinBoxBounder
+from laufruhe.prove.branch_and_bound import BatchBisection, Box, BoxResult
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.subdivision import EVEN, is_stiffness_problem
-from laufruhe.prove.witness import Witness, check_near_witness
+from laufruhe.prove.witness import Witness
 
 MAX_OPEN = 5
 """Largest number n of open numbers of mounts: a box has 2^n vertices and 4^n coefficients."""
@@ -361,7 +361,7 @@ def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | 
         return BoxResult(0.0, 0)
     result = branching.run(branching.bound_boxes([(boxes.lower, boxes.upper)])[0], maximum)
     if witness is not None:
-        check_near_witness(ThinBoxBounder(boxes, boxes.lower, boxes.upper), witness.place, witness)
+        branching.check_near(boxes.lower, boxes.upper, witness)
     return result
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,7 +32,7 @@ from laufruhe.prove.branch_and_bound import (
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
-from laufruhe.prove.witness import Witness, check_near_witness, thin_box
+from laufruhe.prove.witness import Witness, thin_box
 
 # relative gaps to prove, one after the other
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
@@ -125,26 +125,6 @@ def spring_bound(
         return BoxResult(0.0, 0)
 
 
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """Bounds of thin boxes around the best design, all mode shapes in them, to check the relaxation."""
-
-    relaxation: SdpRelaxation
-    witness: Witness
-    what: str = "spring forces"
-
-    def around(self, place: Array) -> tuple[Array, Array]:
-        """Return a thin box about numbers of mounts; the sides of modes keep their bounds."""
-        lower, upper = self.relaxation.lower.copy(), self.relaxation.upper.copy()
-        sides = slice(0, len(place))
-        lower[sides], upper[sides] = thin_box(place, lower[sides], upper[sides])
-        return lower, upper
-
-    def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the lower bound over designs of a box that are not worse than the best by more than rounding."""
-        return self.relaxation.up_to(self.witness.upper_value * (1.0 + EXCESS)).bound(*box)[0]
-
-
 def _prove_levels(
     relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, witness: Witness | None
 ) -> BoxResult:
@@ -184,7 +164,11 @@ def _prove_levels(
             break
     if witness is not None and 0.0 < bound < relaxation.cutoff:
         # at the last level the best design checked the bounds of its boxes
-        check_near_witness(_Around(root_search, witness), witness.place, witness)
+        # a thin box around the numbers of its mounts, all mode shapes in it
+        lower, upper, sides = root_search.lower.copy(), root_search.upper.copy(), slice(0, len(witness.place))
+        lower[sides], upper[sides] = thin_box(witness.place, lower[sides], upper[sides])
+        thin = root_search.up_to(witness.upper_value * (1.0 + EXCESS)).bound(lower, upper)[0]
+        witness.check_near("spring forces", thin)
     count = relaxation.mount_numbers
     candidates = (*relaxation.candidates, *places) if bound < relaxation.cutoff else ()
     return BoxResult(bound, spent, tuple(place[:count] for place in candidates))

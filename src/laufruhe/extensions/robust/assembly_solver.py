@@ -32,7 +32,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, OpenNode
 from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate, unproven_certificate
-from laufruhe.prove.witness import Witness, check_near_witness
+from laufruhe.prove.witness import Witness
 from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
@@ -177,7 +177,8 @@ class _Search(BranchAndBound[Chosen]):
         """Return a lower bound of the objective over all assemblies."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
         bound = self.divide((self.bound(free), free), MAX_NODES)
-        check_near_witness(self, self.best, Witness(self._mass(self.best), self.value))
+        near = self.bound(self.around(self.best))
+        Witness(self._mass(self.best), self.value).check_near(self.what, near)
         return bound
 
     def around(self, chosen: Chosen) -> Chosen:

@@ -23,7 +23,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.witness import is_over, report
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
-from laufruhe.prove.witness import THIN, Witness, check_near_witness
+from laufruhe.prove.witness import THIN, Witness
 
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
 """Weights, and norms as functions of the errors."""
@@ -101,27 +101,10 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
 
 def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
     """Report a bound of a thin node around the worst errors that is below their value."""
-    check_near_witness(_Around(terms, columns), worst.errors, Witness(worst.errors, -worst.value))
-
-
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """Bounds of thin nodes around known errors; it minimises the negative sum."""
-
-    terms: Terms
-    columns: Sequence[slice]
-    what: str = "errors that no engine exceeds"
-
-    def around(self, errors: Array) -> tuple[Array, list[ErrorBlock]]:
-        """Return the centre and the blocks of a search node of half-width `THIN` that contains the errors."""
-        return (1.0 - THIN) * errors, [
-            ErrorBlock(error_columns, THIN * np.eye(error_columns.stop - error_columns.start))
-            for error_columns in self.columns
-        ]
-
-    def bound(self, part: tuple[Array, list[ErrorBlock]]) -> float:
-        """Return a lower bound of the negative sum over a node."""
-        return -bound_node(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
+    sides = [ErrorBlock(part, THIN * np.eye(part.stop - part.start)) for part in columns]
+    thin = bound_node(terms, (1.0 - THIN) * worst.errors, sides, -math.inf, [{} for _ in terms])
+    # the sum is maximised, and a witness bounds a minimum
+    Witness(worst.errors, -worst.value).check_near("errors that no engine exceeds", -thin.bound)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,6 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +25,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
-from laufruhe.prove.witness import Witness, check_near_witness, thin_box
+from laufruhe.prove.witness import Witness, thin_box
 
 MAX_BOXES = 3000
 # relative tolerance of limits; halvings to find the end of a cut, rounds of cuts, and most tangents of a load
@@ -317,26 +316,6 @@ class _Sizes(BoxBisection):
         return [self.bound_box(*half, getattr(box, "multipliers", ())) for box in boxes for half in halves(box)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """Bounds of thin boxes around the best design, to check the proof."""
-
-    boxes: SizeBoxes
-    witness: Witness
-    what: str = _Sizes.what
-
-    def around(self, place: Array) -> tuple[Array, Array]:
-        """Return a thin box around sizes."""
-        return thin_box(place, self.boxes.model.lower, self.boxes.model.upper)
-
-    def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the bound of a box by its own multipliers; infinite if it violates a limit."""
-        self.boxes.add_tangents(*box)
-        if self.boxes.violates_limit(*box):
-            return math.inf
-        return self.boxes.objective(*box, self.boxes.multipliers_of(*box, self.witness.value, ()))
-
-
 def divided_sizes(
     boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MAX_BOXES, witness: Witness | None = None
 ) -> BoxResult:  # fmt: skip
@@ -344,5 +323,9 @@ def divided_sizes(
     bisection = _Sizes(boxes, value, gap_tolerance, witness)
     result = bisection.run(bisection.bound_box(boxes.model.lower, boxes.model.upper), maximum)
     if witness is not None:
-        check_near_witness(_Around(boxes, witness), witness.place, witness)
+        thin = thin_box(witness.place, boxes.model.lower, boxes.model.upper)
+        boxes.add_tangents(*thin)
+        violates = boxes.violates_limit(*thin)
+        multipliers = () if violates else boxes.multipliers_of(*thin, witness.value, ())
+        witness.check_near(bisection.what, math.inf if violates else boxes.objective(*thin, multipliers))
     return result

@@ -17,7 +17,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import bisect_property
 from laufruhe.numerics.witness import EXCESS
 from laufruhe.prove.branch_and_bound import Box, BoxBisection, BoxResult, FathomedPart, halves, widest
-from laufruhe.prove.witness import Witness, check_near_witness, thin_box
+from laufruhe.prove.witness import Witness, thin_box
 
 MAX_BOXES = 4000
 # bisections of a side that is cut
@@ -106,24 +106,6 @@ class _MonotoneBoxes(BoxBisection):
         return [self.bound_box(*half) for box in boxes for half in halves(box)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Around:
-    """Thin boxes, to check bounds around a known design."""
-
-    problem: MonotoneProblem
-    witness: Witness
-    what: str = _MonotoneBoxes.what
-
-    def around(self, place: Array) -> tuple[Array, Array]:
-        """Return a thin box around a place."""
-        return thin_box(place, self.problem.lower, self.problem.upper)
-
-    def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the lower bound of a box; infinite if limits cut off all of it."""
-        result = _MonotoneBoxes(self.problem, self.witness.value * (1.0 + EXCESS), 0.0).bound_box(*box)
-        return math.inf if isinstance(result, FathomedPart) else result[0]
-
-
 def bisect_monotone(
     problem: MonotoneProblem, value: float, gap_tolerance: float, max_boxes: int = MAX_BOXES,
     witness: Witness | None = None,
@@ -145,7 +127,9 @@ def bisect_monotone(
     """
     boxes = _MonotoneBoxes(problem, value, gap_tolerance, witness)
     if witness is not None:
-        check_near_witness(_Around(problem, witness), witness.place, witness)
+        around = _MonotoneBoxes(problem, witness.value * (1.0 + EXCESS), 0.0)
+        thin = around.bound_box(*thin_box(witness.place, problem.lower, problem.upper))
+        witness.check_near(boxes.what, math.inf if isinstance(thin, FathomedPart) else thin[0])
     return boxes.run(boxes.bound_box(problem.lower, problem.upper), max_boxes)
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -15,7 +14,7 @@ from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
 from laufruhe.prove.certificate import gap_of
-from laufruhe.prove.witness import Bounder, Witness, check_near_witness
+from laufruhe.prove.witness import Witness
 
 # share of the tolerance at which the gap counts as closed
 GAP_SAFETY = 0.99
@@ -176,25 +175,10 @@ def divide_boxes(
         boxes = _Branching(search, best, zero_level, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), maximum)
     if boxes.witness is not None:
-        around: Bounder[D, B | FathomedPart] = _ThinBoxes(search, what)
-        check_near_witness(around, boxes.best, boxes.witness)
+        thin = search.around(boxes.best)
+        if thin is not None:
+            boxes.witness.check_near(what, thin.level if isinstance(thin, FathomedPart) else thin.bound)
     return boxes.best, bound, boxes.node_count
-
-
-@dataclass(frozen=True, eq=False)
-class _ThinBoxes(Generic[B, D]):
-    """Thin boxes of a search, to check bounds around a known design."""
-
-    search: BoxSearch[B, D]
-    what: str
-
-    def around(self, design: D) -> B | FathomedPart | None:
-        """Return a thin box around a design, with its bound, or None."""
-        return self.search.around(design)
-
-    def bound(self, box: B | FathomedPart) -> float:
-        """Return the bound of a box."""
-        return box.level if isinstance(box, FathomedPart) else box.bound
 
 
 def _split_box(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:
