@@ -76,10 +76,6 @@ class BranchAndBound(Generic[P]):
         Number of parts that are divided together.
     value
         Objective of the incumbent [SI]; infinite without one.
-    cutoff
-        Bound from which a part is not divided [SI].
-    level
-        Lower bound of the objective of designs that bounds cut off from their parts [SI].
     witness
         Known design that checks the bound of every part that contains it, or None.
     reports_bounds
@@ -277,15 +273,11 @@ class BoxBisection(BranchAndBound[Box]):
         for k, half in enumerate(self.halve([node.part for node in nodes])):
             yield half if isinstance(half, FathomedPart) else (max(nodes[k // 2].bound, half[0]), half[1])
 
-    def run(self, root: tuple[float, Box] | FathomedPart, max_boxes: int) -> BoxResult:
-        """Divide the root box into at most `max_boxes` boxes, and return the result."""
-        return self.result(self.divide(root, max_boxes))
-
-    def result(self, bound: float) -> BoxResult:
-        """Return a result with this lower bound [SI], the number of boxes, and the midpoints of the lowest ones."""
+    def run(self, root: tuple[float, Box] | FathomedPart | None, max_boxes: int) -> BoxResult:
+        """Divide the root box, or without one the remaining boxes, into at most `max_boxes` boxes in total."""
+        bound = self.resume(max_boxes) if root is None else self.divide(root, max_boxes)
         lowest = [node.part for node in self.next_nodes(MAX_PLACES) if node.bound < self.cutoff]
-        places = tuple(0.5 * (box.lower + box.upper) for box in lowest)
-        return BoxResult(bound, self.node_count, places)
+        return BoxResult(bound, self.node_count, tuple(0.5 * (box.lower + box.upper) for box in lowest))
 
 
 class BoxBounds(Protocol):
@@ -298,17 +290,9 @@ class BoxBounds(Protocol):
         """Number of boxes that are bounded together."""
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return a lower bound of the objective for every box, and the index of the side to halve.
+        """Return the lower bounds of boxes [SI], infinite without a feasible design, and the sides to halve.
 
-        Parameters
-        ----------
-        lower, upper
-            Bounds of the boxes, shape (boxes, n).
-
-        Returns
-        -------
-        tuple
-            Bounds [SI] and sides, both of shape (boxes,). A bound is infinite if the box has no feasible design.
+        Boxes have bounds `lower` and `upper` of shape (boxes, n), and the results the shape (boxes,).
         """
 
 
@@ -366,11 +350,7 @@ def bisect_in_stages(
     """Yield the result of `bisect_box` after each of these increasing numbers of boxes, in one continued search."""
     bisection = BatchBisection(bounder, value, gap_tolerance, witness)
     for k, count in enumerate(max_boxes):
-        result = (
-            bisection.result(bisection.resume(count))
-            if k
-            else bisection.run(bisection.bound_boxes([(lower, upper)])[0], count)
-        )
+        result = bisection.run(None if k else bisection.bound_boxes([(lower, upper)])[0], count)
         if witness is not None and not k:
             bisection.check_near(lower, upper, witness)
         yield result

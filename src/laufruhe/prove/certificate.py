@@ -174,25 +174,6 @@ class Multipliers:
 
 
 @dataclass(frozen=True, eq=False)
-class Bound:
-    """Lower bound of the objective from an affine lower bound.
-
-    Attributes
-    ----------
-    value
-        Minimum of the affine lower bound over the sets of the decisions [SI], at least zero.
-    gradient
-        Its gradient in the decision vector, shape (n,).
-    multipliers
-        Dual rows that give it.
-    """
-
-    value: float
-    gradient: Array
-    multipliers: Multipliers
-
-
-@dataclass(frozen=True, eq=False)
 class Minorant:
     """Affine function constant + gradient . x that no feasible design's objective is below.
 
@@ -209,6 +190,13 @@ class Minorant:
     constant: float
     gradient: Array
     multipliers: Multipliers
+
+
+@dataclass(frozen=True, eq=False)
+class Bound(Minorant):
+    """Affine lower bound of the objective, and its minimum over the sets of the decisions [SI], at least zero."""
+
+    value: float
 
 
 def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
@@ -247,19 +235,11 @@ def is_moved(norm: AffineNorm) -> bool:
 
 
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
-    """Return the lower bound of the objective that multipliers give (P4).
-
-    Parameters
-    ----------
-    problem
-        Norms on the grid of samples on which the bound is to hold.
-    multipliers
-        Any dual rows on that grid; the rows of terms are scaled into the dual unit ball.
-    """
+    """Return the lower bound of the objective that multipliers give (P4); `minorant` has the same parameters."""
     affine = minorant(problem, multipliers)
     minimum = affine.constant + sum(domain.minimum(affine.gradient) for domain in problem.domains)
     # a sum of norms is never negative
-    return Bound(max(minimum, 0.0), affine.gradient, affine.multipliers)
+    return Bound(affine.constant, affine.gradient, affine.multipliers, max(minimum, 0.0))
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
@@ -283,7 +263,7 @@ def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound
     x
         Decision vector of the solution, shape (n,).
     solution
-        Dual rows of the solution, on its own grid.
+        Its dual rows, on its own grid.
     """
     interpolated = interpolate_duals(problem, solution)
     aligned = Multipliers(
@@ -314,12 +294,10 @@ def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound:
         Name of the bound in messages.
     value
         Lower bound over all feasible designs that the dual rows are said to prove [SI].
-    problem
-        Norms on the grid of the dual rows.
+    problem, bound
+        Norms, and the dual rows on their grid.
     x
         Decision vector, inside the sets of the decisions except for rounding, shape (n,).
-    bound
-        Dual rows and gradient.
     """
     maximum = problem.objective(x)
     if not is_over(value, maximum):
@@ -356,14 +334,17 @@ def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipli
 
     Parameters
     ----------
-    problem
-        Norms on the grid of the dual rows.
+    problem, bound
+        Norms on the grid of the dual rows; dual rows to correct, and their gradient.
     x
         Decision vector, shape (n,).
-    bound
-        Dual rows to correct, and their gradient.
     """
-    interior = _interior_directions(problem, x)
+    columns = [np.zeros((problem.size, 0))]
+    for domain in problem.domains:
+        embedding = np.zeros((problem.size, domain.width))
+        embedding[domain.columns] = np.eye(domain.width)
+        columns.append(embedding @ domain.set.inside(x[domain.columns]))
+    interior = np.concatenate(columns, axis=1)
     slopes = [norm.slope @ interior for _, norm in problem.terms]
     weighted = [
         norm.grid.weights[:, None, None] * slope for (_, norm), slope in zip(problem.terms, slopes, strict=True)
@@ -376,16 +357,6 @@ def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipli
     steps = np.linalg.lstsq(gram / np.outer(sizes, sizes), -(bound.gradient @ interior) / sizes)[0] / sizes
     terms = zip(bound.multipliers.terms, weighted, strict=True)
     return replace(bound.multipliers, terms=tuple(z + rows @ steps for z, rows in terms))
-
-
-def _interior_directions(problem: AffineProblem, x: Array) -> Array:
-    # directions in which no decision is on a bound of its set, shape (n, m)
-    columns = [np.zeros((problem.size, 0))]
-    for domain in problem.domains:
-        embedding = np.zeros((problem.size, domain.width))
-        embedding[domain.columns] = np.eye(domain.width)
-        columns.append(embedding @ domain.set.inside(x[domain.columns]))
-    return np.concatenate(columns, axis=1)
 
 
 def _interpolate(fine: AffineNorm, z: Array) -> Array:
@@ -411,19 +382,21 @@ def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, scale: float | 
 
     Parameters
     ----------
-    problem
-        Norms on the grid of the dual rows.
+    problem, bound
+        Norms, and the dual rows on their grid.
     x
         Decision vector, shape (n,).
-    bound
-        Dual rows and gradient.
     scale
         Objective to which violations are relative [SI], given where the objective itself may be zero, as of a
         perfectly balanced engine; the objective at x if None.
     """
     scales = problem.scales
     violations = [0.0]
-    gradient_scale = float(np.abs(_gradient_size(problem, bound) * scales).max(initial=0.0)) or 1.0
+    # sum of the absolute parts of the gradient
+    gradient_size = np.zeros(problem.size)
+    for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
+        gradient_size += weight * np.einsum("kd,kdn->n", np.abs(z), np.abs(norm.slope))
+    gradient_scale = float(np.abs(gradient_size * scales).max(initial=0.0)) or 1.0
     for domain in problem.domains:
         columns = domain.columns
         # a step against the gradient, projected back, must not move: P_D(x - g) = x
@@ -441,11 +414,3 @@ def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, scale: float | 
         violations.append(max(0.0, value - maximum) / (maximum or 1.0))
         violations.append(price * abs(maximum - value) / scale)
     return max(violations)
-
-
-def _gradient_size(problem: AffineProblem, bound: Bound) -> Array:
-    # sum of the absolute parts of the gradient, shape (n,)
-    total = np.zeros(problem.size)
-    for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
-        total += weight * np.einsum("kd,kdn->n", np.abs(z), np.abs(norm.slope))
-    return total

@@ -32,12 +32,18 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, line_weights, norm_under
+from laufruhe.prove.mounts.box_norms import (
+    LinearBound,
+    counted_rows,
+    is_ratio,
+    line_weights,
+    norm_under,
+    ratio_under,
+)
 from laufruhe.prove.mounts.box_response import LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, Sides, balanced, mapped, rest_of
 from laufruhe.prove.mounts.named import is_named
 from laufruhe.prove.mounts.ranges import SLACK
-from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Witness
 
 MAX_NUMBERS = 8
@@ -187,18 +193,9 @@ class LoadBoxes:
         """Box budget: as requested, or for some seconds."""
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)))
 
+    @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes, infinite without a feasible design, and the index of the side of each to halve.
-
-        Parameters
-        ----------
-        lower, upper
-            Open numbers, shape (boxes, n).
-        """
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            return self._bounds(lower, upper)
-
-    def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
+        """Return lower bounds of boxes of shape (boxes, n), infinite without a feasible design, and sides to halve."""
         box = self._box(lower, upper)
         points = self._nearest(box)
         lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
@@ -252,8 +249,7 @@ class LoadBoxes:
             return box.affine_under(measure, points, averaged and measure.norm.averages)
         if is_ratio(measure):
             running, resting = (box.response(FORCE, at_rest) for at_rest in (False, True))
-            groups = groups_of(measure, self.problem.points, self._orders)
-            ratio, scores = ratio_under(running, resting, groups)
+            ratio, scores = ratio_under(running, resting, measure, self.problem.points, self._orders)
             return LinearBound(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
         response = _counted(box.response(measure), measure.counted(self._orders.orders))
         if averaged and measure.norm.averages:

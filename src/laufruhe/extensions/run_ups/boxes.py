@@ -20,7 +20,7 @@ from laufruhe.physics.time_model import time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_norms import LinearBound
+from laufruhe.prove.mounts.box_norms import PARTS, LinearBound, choose
 from laufruhe.prove.mounts.box_response import BoxModel
 
 # fewest long steps of a run
@@ -83,7 +83,7 @@ class RunBoxes:
                 box_equations if len(indices) == len(lower) else self._equations(lower[indices], upper[indices])
             )
             bounds = self._under(measure, box_equations)
-            for name in ("value", "slopes", "remainder", "scores"):
+            for name in PARTS:
                 getattr(result, name)[indices] = getattr(bounds, name)
         return result
 
@@ -94,12 +94,8 @@ class RunBoxes:
         maps_of, d = self._rows[measure]
         maps = mapped(maps_of, box_equations.above, box_equations.halves, box_equations.turn, box_equations.roots)
         run_bounds = [_RunBounds(box_equations, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
-        best, boxes = np.argmax(bounds, axis=0), np.arange(box_equations.count)
-        parts = ("value", "slopes", "remainder", "scores")
-        return LinearBound(
-            *(np.array([getattr(run_bound, part) for run_bound in run_bounds])[best, boxes] for part in parts)
-        )
+        minima = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
+        return choose(run_bounds, np.argmax(minima, axis=0))
 
 
 def bounds_runs(problem: Problem) -> bool:

@@ -86,7 +86,7 @@ def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array
     is_restrained = lower_eigenvalues[:, 0] > MIN_STIFFNESS * upper_eigenvalues[:, -1]
     turn = np.zeros((len(lower), n, n)) + np.eye(n)
     turn[:, :6, :6] = modes
-    slopes = np.swapaxes(modes, 1, 2)[:, None] @ (halves[:, :, None, None] * model.stiffness_slopes) @ modes[:, None]
+    slopes = np.swapaxes(modes, 1, 2)[:, None] @ (halves[:, :, None, None] * model.slopes["stiffness"]) @ modes[:, None]
     root_maps = roots(np.where(is_restrained[:, None], squares, 1.0), slopes, n)
     maps = mapped(matrices.motion, above, halves, turn, root_maps, True)
     uneven_maps = mapped(matrices.uneven_loss, above, halves, turn, root_maps, True)

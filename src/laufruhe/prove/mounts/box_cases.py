@@ -79,7 +79,7 @@ def _with_stops(
     pushed = load + np.einsum("bk,ki->bi", signs * stops.stiffness * stops.gaps, stops.rows)
     inverse = np.linalg.inv(np.asarray(matrices + stops.added(on), dtype=np.float64))
     expansion = series(
-        centres, halves, inverse[:, None], model.sides, model.sides.inside(model.stiffness_slopes),
+        centres, halves, inverse[:, None], model.sides, model.sides.inside(model.slopes["stiffness"]),
         np.einsum("bij,bj->bi", inverse, pushed)[:, None],
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))

@@ -1,19 +1,27 @@
-"""Linear lower bounds of norms of mount forces and travel over boxes (E38)."""
+"""Linear lower bounds of norms of mount forces and travel over boxes (E38), and of transmissibility (E40).
+
+Transmissibility is the ratio of mount forces to those on rigid mounts.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array, Indices, Mask
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse
 
 PARTS = ("value", "slopes", "remainder", "scores")
+# halvings of the interval of a ratio
+HALVINGS = 45
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +56,13 @@ class LinearBound:
 
     def or_else(self, other: LinearBound) -> LinearBound:
         """Return for every box the bound with the larger minimum."""
-        better = self.minimum >= other.minimum
-        first, second = self.where(better), other.where(~better)
-        return LinearBound(*(getattr(first, part) + getattr(second, part) for part in PARTS))
+        return choose([self, other], np.where(self.minimum >= other.minimum, 0, 1))
+
+
+def choose(bounds: Sequence[LinearBound], numbers: Indices) -> LinearBound:
+    """Return for every box the bound with a number, shape (boxes,)."""
+    parts = (np.array([getattr(bound, part) for bound in bounds]) for part in PARTS)
+    return LinearBound(*(part[numbers, np.arange(len(numbers))] for part in parts))
 
 
 def zero_bound(lower: Array) -> LinearBound:
@@ -83,13 +95,7 @@ def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines
     if not by_point:
         return zero_bound(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
     if not measure.norm.sums_lengths:
-        best = np.argmax([bound.value for bound in by_point], axis=0)
-        pick = np.arange(len(best))
-        parts = (
-            np.array([getattr(bound, part) for bound in by_point])
-            for part in ("value", "slopes", "remainder", "scores")
-        )
-        largest = LinearBound(*(part[best, pick] for part in parts))
+        largest = choose(by_point, np.argmax([bound.value for bound in by_point], axis=0))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
         squares = 2.0 * weights * (lines.orders > 0.0) if measure.norm.is_diameter else weights
@@ -102,7 +108,7 @@ def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines
     return LinearBound(np.asarray(value), np.asarray(slopes), remainder, scores)
 
 
-def counted_rows(problem: Problem, measure: Measure) -> tuple[NDArray[np.intp], Array]:
+def counted_rows(problem: Problem, measure: Measure) -> tuple[Indices, Array]:
     """Return the rows of the mounts that a measure counts, and the factors on them."""
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
@@ -170,10 +176,8 @@ def _lengths(rows: Array) -> Array:
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
     """Return a linear lower bound of a weighted root sum of squares; orders whose series may diverge count as zero."""
     is_finite = np.isfinite(answer.remainder)
-    value, slopes = (
-        np.where(is_finite[..., None], answer.value, 0.0),
-        np.where(is_finite[..., None, None], answer.slopes, 0.0),
-    )
+    value = np.where(is_finite[..., None], answer.value, 0.0)
+    slopes = np.where(is_finite[..., None, None], answer.slopes, 0.0)
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
     remainder = root_of(weights, np.where(is_finite, answer.remainder, 0.0))
@@ -185,3 +189,46 @@ def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
 def root_of(weights: Array, parts: Array) -> Array:
     """Return the root of a weighted sum of squares over orders, (boxes, lines, ...) to (boxes, ...)."""
     return np.asarray(np.sqrt(np.tensordot(parts**2, weights, axes=(1, 0))))
+
+
+def is_ratio(measure: Measure) -> bool:
+    """Return True if a measure is a transmissibility."""
+    return measure.channel is channels.TRANSMISSIBILITY
+
+
+def ratio_under(
+    elastic: LinearResponse, rigid: LinearResponse, measure: Measure, points: Sequence[OperatingPoint],
+    lines: LoadedOrders,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return lower bounds of the largest ratio, shape (boxes,), and branching scores, shape (boxes, n) (E40).
+
+    Parameters
+    ----------
+    elastic, rigid
+        Mount forces by order on elastic mounts, and on rigid mounts under the same loads.
+    measure, points, lines
+        Transmissibility, operating points of the problem, and orders of the forces. Each named order, or all orders
+        above zero together, has a ratio at each point.
+    """
+    groups: list[Mask] = []
+    for p in (p for p in np.unique(lines.points) if measure.includes_point(points[p])):
+        moving = (lines.points == p) & (lines.orders > 0.0)
+        orders = measure.orders
+        groups += [moving] if orders is None else [moving & orders_equal(lines.orders, order) for order in orders]
+    best, scores = np.zeros(len(elastic.value)), np.zeros(elastic.scores[:, 0].shape)
+    for group in (group for group in groups if group.any()):
+        weights = group.astype(float)
+        top, bottom = root_under(elastic, weights), root_under(rigid, weights)
+        square = np.einsum("k,bk->b", weights, np.linalg.norm(rigid.slopes, axis=-1).sum(axis=-1) ** 2)
+        is_bounded = np.all(np.isfinite(rigid.remainder[:, group]), axis=1) & (bottom.value > 0.0)
+        curvature = square / (2.0 * np.where(is_bounded, bottom.value, 1.0))
+        over = bottom.value + (bottom.remainder + curvature)
+        # largest t with top - t bottom >= 0 all over the box
+        minimum, high = np.zeros(len(best)), top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
+        for _ in range(HALVINGS):
+            t = 0.5 * (minimum + high)
+            least = top.value - top.remainder - t * over - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1)
+            minimum, high = np.where(least >= 0.0, t, minimum), np.where(least >= 0.0, high, t)
+        best = np.maximum(best, np.where(is_bounded, minimum, 0.0))
+        scores = np.maximum(scores, (top.scores + minimum[:, None] * bottom.scores) / bottom.value[:, None])
+    return best, scores

@@ -36,7 +36,7 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
     stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
     y = np.linalg.solve(np.where(stable[:, None, None], matrices, np.eye(6)), pull)
-    slopes = halves * np.einsum("bi,nij,bj->bn", y, model.stiffness_slopes, y) / weight[2]
+    slopes = halves * np.einsum("bi,nij,bj->bn", y, model.slopes["stiffness"], y) / weight[2]
     return LinearBound(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
 
 
@@ -45,7 +45,7 @@ def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array)
     assert measure.channel.axis_residual is not None
     axis = measure.channel.axis_residual(model.mounting(model.lower).block, measure.frequency)
     bounds = np.zeros(len(lower))
-    slopes = axis.left @ model.stiffness_slopes @ axis.right
+    slopes = axis.left @ model.slopes["stiffness"] @ axis.right
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
         rows = axis.rows(matrix)
         y, constant = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))

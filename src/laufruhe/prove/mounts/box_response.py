@@ -76,24 +76,10 @@ class LoadedOrders:
         return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
 
 
-@dataclass(frozen=True, eq=False)
-class MountMatrices:
-    """Matrices of a mounting in coordinates with unit mass.
-
-    Attributes
-    ----------
-    stiffness, loss, damping
-        A, and the parts of B without and with frequency as a factor, shape (6, 6).
-    springs, losses, dampers
-        Maps from motion to the forces of the mounts, shape (3 mounts, 6).
-    """
-
-    stiffness: Array
-    loss: Array
-    damping: Array
-    springs: Array
-    losses: Array
-    dampers: Array
+SQUARE = ("stiffness", "loss", "damping")
+"""Matrices A, and the parts of B without and with frequency as a factor, in coordinates with unit mass, (6, 6)."""
+MAPS = ("springs", "losses", "dampers")
+"""Maps from motion to the forces of the mounts, shape (3 mounts, 6)."""
 
 
 def is_travel(channel: Channel) -> bool:
@@ -116,7 +102,7 @@ class BoxModel:
     root
         Inverse square root of the mass matrix, shape (6, 6); it takes wrenches to coordinates with unit mass.
     slopes
-        Derivatives of `MountMatrices` by every open number, shape (n, ...).
+        Derivatives of the matrices `SQUARE` and `MAPS` by every open number, shape (n, ...), by name.
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
@@ -129,32 +115,28 @@ class BoxModel:
         self._base, self._dynamic = self._parts(base), base.dynamic
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
         end_matrices = [self._parts(self.mounting(end)) for end in ends]
+        pairs = list(zip(end_matrices, self.upper - self.lower, strict=True))
         self.slopes = {
-            name: np.array(
-                [
-                    (getattr(matrices, name) - getattr(self._base, name)) / width
-                    for matrices, width in zip(end_matrices, self.upper - self.lower, strict=True)
-                ]
-            )
-            for name in ("stiffness", "loss", "damping", "springs", "losses", "dampers")
+            name: np.array([(matrices[name] - at_lower) / width for matrices, width in pairs])
+            for name, at_lower in self._base.items()
         }
         self.sides = directions_of([[slopes[j] for slopes in self.slopes.values()] for j in range(len(decisions))])
-        self._inside = [self.sides.inside(self.slopes[name]) for name in ("stiffness", "loss", "damping")]
-        self._along = [self.sides.along(self.slopes[name]) for name in ("springs", "losses", "dampers")]
-        self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
+        self._inside = [self.sides.inside(self.slopes[name]) for name in SQUARE]
+        self._along = [self.sides.along(self.slopes[name]) for name in MAPS]
+        self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper))["stiffness"])[-1])
 
     def mounting(self, x: Array) -> ElasticMounting:
         """Return the mounting at stiffnesses [N/m], shape (n,)."""
         return mounting_in(self.problem.design([float(v) for v in x], self.problem.mount_decisions))
 
-    def _parts(self, mounting: ElasticMounting) -> MountMatrices:
+    def _parts(self, mounting: ElasticMounting) -> dict[str, Array]:
         parts, motions = (mounting.springs, mounting.losses, mounting.dampers), mounting.motions @ self.root.T
         totals = (self.root @ mounting.total(part) @ self.root.T for part in parts)
         maps = ((part @ motions).reshape(-1, 6) for part in parts)
-        return MountMatrices(*totals, *maps)
+        return dict(zip((*SQUARE, *MAPS), (*totals, *maps), strict=True))
 
-    def lines(self, measure: Measure | None = None) -> LoadedOrders:
-        """Return all loaded orders, or those that a measure counts."""
+    def lines(self, measure: Measure) -> LoadedOrders:
+        """Return the loaded orders that a measure counts."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         base, samples = self.problem.engine.cycle.base_order, self.evaluation.samples
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
@@ -172,48 +154,22 @@ class BoxModel:
             np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
             np.array(omegas, dtype=float), np.array(wrenches, dtype=complex).reshape(-1, 6), samples,
         )  # fmt: skip
-        if measure is None:
-            return lines
-        keep = np.isin(lines.points, self.counted(measure.points))
-        return lines.subset(keep & measure.counted(lines.orders))
-
-    def counted(self, names: tuple[str, ...] | None) -> list[int]:
-        """Return the indices of operating points by name; all for None."""
-        return [k for k, point in enumerate(self.problem.points) if names is None or point.name in names]
-
-    @property
-    def stiffness_slopes(self) -> Array:
-        """Derivatives of A by every open number, shape (n, 6, 6)."""
-        return self.slopes["stiffness"]
+        counted = [measure.points is None or point.name in measure.points for point in self.problem.points]
+        return lines.subset(np.array(counted)[lines.points] & measure.counted(lines.orders))
 
     def stiffness(self, x: Array) -> Array:
         """Return A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self.at("stiffness", x)
 
-    def added(self, omegas: Array) -> ComplexArray:
-        """Return the impedance of springs with frequency-dependent stiffness (E50), shape (lines, 6, 6)."""
-        return self._dynamic.impedance(omegas, self.root.T)
-
-    def added_forces(self, omegas: Array) -> ComplexArray:
-        """Return the map from motion to forces of these springs, shape (lines, 3 mounts, 6)."""
-        return self._dynamic.forces(omegas, self.root.T)
-
-    def rise(self, omegas: Array) -> Array:
-        """Return an upper bound of the rise of the largest eigenvalue by these springs, shape (lines,)."""
-        if not self._dynamic:
-            return np.zeros(len(omegas))
-        return np.asarray(np.maximum(np.linalg.eigvalsh(self.added(omegas).real)[..., -1], 0.0))
-
     def at(self, name: str, x: Array) -> Array:
-        """Return a matrix of `MountMatrices` at many designs, shape (boxes, n) to (boxes, ...)."""
-        base: Array = getattr(self._base, name)
-        return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
+        """Return a matrix of `SQUARE` or `MAPS` at many designs, shape (boxes, n) to (boxes, ...)."""
+        return np.asarray(self._base[name] + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
     def expanded(self, lines: LoadedOrders, lower: Array, upper: Array) -> Expansion:
         """Return the series of motion over boxes of stiffness, shape (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        stiffness, loss, damping = (self.at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
-        impedance: ComplexArray = _dynamic(lines, stiffness, loss, damping) + self.added(lines.omegas)
+        matrices = (self.at(name, centres)[:, None] for name in SQUARE)
+        impedance = _dynamic(lines, *matrices) + self._dynamic.impedance(lines.omegas, self.root.T)
         impedance = impedance - lines.omegas[:, None, None] ** 2 * np.eye(6)
         inverse = inverses(np.asarray(impedance, dtype=np.complex128))
         motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
@@ -233,10 +189,8 @@ class BoxModel:
         if is_travel(channel):
             flat = self.travels[rows].astype(complex)
             return np.broadcast_to(flat, (len(expansion.centres), len(lines.omegas), *flat.shape)), None
-        springs, losses, dampers = (
-            self.at(name, expansion.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
-        )
-        value = _dynamic(lines, springs, losses, dampers) + self.added_forces(lines.omegas)[:, rows]
+        maps = (self.at(name, expansion.centres)[:, None, rows] for name in MAPS)
+        value = _dynamic(lines, *maps) + self._dynamic.forces(lines.omegas, self.root.T)[:, rows]
         slopes = _dynamic(lines, *(matrix[rows] for matrix in self._along))
         return value, slopes * expansion.halves[:, None, None, self.sides.number_of_column]
 
@@ -245,7 +199,11 @@ class BoxModel:
 
         Orders that are not above all natural frequencies have an infinite bound.
         """
-        margin = lines.omegas**2 - self.highest - self.rise(lines.omegas)
+        margin = lines.omegas**2 - self.highest
+        if self._dynamic:
+            # springs with frequency-dependent stiffness raise the largest eigenvalue (E50)
+            added = np.linalg.eigvalsh(self._dynamic.impedance(lines.omegas, self.root.T).real)[..., -1]
+            margin = margin - np.maximum(added, 0.0)
         motion = np.linalg.norm(lines.loads, axis=1) / np.where(margin > 0.0, margin, 1.0)
         motion = np.where(margin > 0.0, motion, np.inf)
         if is_travel(channel):
@@ -254,9 +212,9 @@ class BoxModel:
         # springs that share a mount count one by one, since their sum may be smaller
         separate = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
         maximum, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
-        static = math.sqrt(maximum) * float(np.linalg.norm(top.springs + 1j * top.losses))
-        static = static + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
-        return np.asarray(motion * (static + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top.dampers))))
+        static = math.sqrt(maximum) * float(np.linalg.norm(top["springs"] + 1j * top["losses"]))
+        static = static + np.linalg.norm(self._dynamic.forces(lines.omegas, self.root.T), axis=(1, 2))
+        return np.asarray(motion * (static + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top["dampers"]))))
 
 
 def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:

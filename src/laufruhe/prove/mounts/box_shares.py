@@ -88,7 +88,7 @@ class BoxModes:
 def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
     """Return the modes of boxes of stiffness [N/m], shape (boxes, n)."""
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
-    slopes = np.einsum("bji,njk,bkl->bnil", modes, model.stiffness_slopes, modes, optimize=True)
+    slopes = np.einsum("bji,njk,bkl->bnil", modes, model.slopes["stiffness"], modes, optimize=True)
     slopes = slopes * (0.5 * (upper - lower))[:, :, None, None]
     change, rounding = _change(slopes, squares), _rounding(squares)[:, :, 0]
     low, high = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))

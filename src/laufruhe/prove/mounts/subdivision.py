@@ -26,12 +26,11 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
-from laufruhe.prove.mounts.box_norms import LinearBound, lower_bound_of_norm
+from laufruhe.prove.mounts.box_norms import LinearBound, is_ratio, lower_bound_of_norm, ratio_under
 from laufruhe.prove.mounts.box_numbers import BOUNDED_LINEARLY, LINEAR_BOUNDS, RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
-from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Witness
 
 # open numbers up to which boxes are the default, and work of all boxes together
@@ -98,15 +97,6 @@ class SimulatedBoxes(Protocol):
         """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or only on those of a mask."""
 
 
-def simulated_boxes(model: BoxModel) -> SimulatedBoxes | None:
-    """Return the bounds of the simulated measures of a problem; None if they have none."""
-    measures = simulated_measures(model.problem)
-    if not measures:
-        return None
-    boxes: SimulatedBoxes | None = call_by_name(f"{measures[0].channel.simulation}:boxes", model, measures)
-    return boxes
-
-
 class StiffnessBoxes:
     """Lower bounds of objective and limits over boxes of stiffness.
 
@@ -149,7 +139,10 @@ class StiffnessBoxes:
         ]
         numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
         self._priced = [limit for limit in numbers if limit.measure.channel in LINEAR_BOUNDS]
-        self.simulated = simulated_boxes(self.model)
+        measures = simulated_measures(problem)
+        self.simulated: SimulatedBoxes | None = (
+            call_by_name(f"{measures[0].channel.simulation}:boxes", self.model, measures) if measures else None
+        )
 
     @property
     def is_sampled_fully(self) -> bool:
@@ -176,25 +169,24 @@ class StiffnessBoxes:
         is_tractable = len(self.problem.mount_decisions) <= MAX_OPEN
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)) if is_tractable else 0)
 
+    @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes, infinite without a feasible design, and the sides to halve.
+        """Return lower bounds of boxes of stiffness [N/m], shape (boxes, n), and the sides to halve.
 
-        Parameters
-        ----------
-        lower, upper
-            Stiffnesses [N/m], shape (boxes, n).
+        A bound is infinite if no design of its box is feasible.
         """
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            return self._bounds(lower, upper)
-
-    def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         boxes, scores, size = LinearRelaxation.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, measure, lines, left_out in self._terms:
             expansion = self.model.expanded(lines, lower, upper)
             minimum = lower_bound_of_norm(self.model, measure, lines, expansion)
             boxes.add(weight, minimum, left_out)
             scores, size = scores + weight * minimum.scores, size + weight * minimum.value
-        self._add_limits(boxes, lower, upper)
+        for maximum, measure, lines, left_out in self._limits:
+            minimum = lower_bound_of_norm(self.model, measure, lines, self.model.expanded(lines, lower, upper))
+            boxes.add_limit(minimum, left_out, maximum)
+        for limit in self._priced:
+            minimum = LINEAR_BOUNDS[limit.measure.channel](self.model, limit.measure, lower, upper)
+            boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
         numbers, score = self._numbers(lower, upper)
         violated = self._violated(lower, upper)
         bounds = self.constant + numbers + boxes.minimum
@@ -213,14 +205,6 @@ class StiffnessBoxes:
             scores = boxes.pull
         sides = np.argmax(np.nan_to_num(scores) + EVEN * (upper - lower) / upper.max(), axis=1)
         return np.where(violated, np.inf, bounds), np.asarray(sides)
-
-    def _add_limits(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> None:
-        for maximum, measure, lines, left_out in self._limits:
-            minimum = lower_bound_of_norm(self.model, measure, lines, self.model.expanded(lines, lower, upper))
-            boxes.add_limit(minimum, left_out, maximum)
-        for limit in self._priced:
-            minimum = LINEAR_BOUNDS[limit.measure.channel](self.model, limit.measure, lower, upper)
-            boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
 
     def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
         """Add bounds of simulated measures (E65), and return branching scores, shape (boxes, n)."""
@@ -274,7 +258,7 @@ class StiffnessBoxes:
             self.model.answer(orders, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for orders, expansion in zip(loads, expansions, strict=True)
         )
-        return ratio_under(elastic, rigid, groups_of(measure, self.problem.points, lines))
+        return ratio_under(elastic, rigid, measure, self.problem.points, lines)
 
 
 def _relevant_lines(model: BoxModel, measure: Measure, budget: float) -> tuple[LoadedOrders, float]:
