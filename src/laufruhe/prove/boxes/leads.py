@@ -170,16 +170,14 @@ class LeadBoxes:
         for k, (angles, slopes, jumps) in enumerate(derivative.kinks):
             used = np.flatnonzero(size[k])
             if len(used) and len(angles) and lead_norm.angles is not None:
-                rows = lead_norm.angles[0 if len(lead_norm.angles) == 1 else self._point_of_signal(measure, k)]
+                counted = np.flatnonzero(measure.shares(self.model.problem.points) > 0.0)
+                point = int(counted[k * len(counted) // len(derivative.maximum)])
+                rows = lead_norm.angles[0 if len(lead_norm.angles) == 1 else point]
                 period = float(self.model.shares(measure)[0].bare[0].period)
                 distance = np.abs(np.mod(rows[used, None] + change - angles + 0.5 * period, period) - 0.5 * period)
                 kinks = np.maximum(half - distance, 0.0) @ slopes + (distance <= half) @ jumps
                 total += float(size[k][used] @ kinks)
         return total
-
-    def _point_of_signal(self, measure: Measure, signal: int) -> int:
-        counted = np.flatnonzero(measure.shares(self.model.problem.points) > 0.0)
-        return int(counted[signal * len(counted) // len(self._curvatures[measure][0].maximum)])
 
     def _second_derivative(self, measure: Measure, s: int) -> _SecondDerivative:
         shares = measure.shares(self.model.problem.points)

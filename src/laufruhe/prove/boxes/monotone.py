@@ -140,26 +140,21 @@ def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, A
     lower, upper = lower.copy(), upper.copy()
     for k in range(len(lower)):
         # a falling function is large at the lower end, even with all other numbers where it is least
-        lower[k] = _cut_side(_violates(problem, lower, upper, k, -1.0), lower[k], upper[k])
-        upper[k] = _cut_side(_violates(problem, lower, upper, k, 1.0), upper[k], lower[k])
+        lower[k] = _cut_side(problem, lower, upper, k, -1.0)
+        upper[k] = _cut_side(problem, lower, upper, k, 1.0)
     return lower, upper
 
 
-def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> Callable[[float], bool]:
-    # tests whether the slice at a value of number k violates a limit everywhere
+def _cut_side(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> float:
+    """Return the lower end of side k without slices in which a falling function violates its limit (sign -1).
+
+    For sign 1 it is the upper end, without slices in which a rising function does.
+    """
     limits = [(maximum, f, f.lowest_corner(lower, upper)) for maximum, f in problem.limits if f.signs[k] == sign]
+    start, end = (lower[k], upper[k]) if sign < 0.0 else (upper[k], lower[k])
 
     def is_violated(position: float) -> bool:
-        slices = (
-            (maximum, function, np.where(np.arange(len(lower)) == k, position, corner))
-            for maximum, function, corner in limits
-        )
-        return any(function.value(x) > maximum for maximum, function, x in slices)
+        is_side = np.arange(len(lower)) == k
+        return any(f.value(np.where(is_side, position, corner)) > maximum for maximum, f, corner in limits)
 
-    return is_violated
-
-
-def _cut_side(is_violated: Callable[[float], bool], start: float, end: float) -> float:
-    if start == end or not is_violated(start):
-        return start
-    return bisect_property(is_violated, start, end, CUTS)[0]
+    return start if start == end or not is_violated(start) else bisect_property(is_violated, start, end, CUTS)[0]

@@ -80,7 +80,8 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(facing, Facing)
     count = CELLS * cycle.turns
-    near, far, ahead = _Travel(part.crank_radius, part.rod_ratio), _Travel(*_size(facing)), facing.ahead
+    near, ahead = _Travel(part.crank_radius, part.rod_ratio), facing.ahead
+    far = _Travel(facing.crank_radius, facing.crank_radius / facing.rod_length)
     gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
     (m1, m2, _), (n1, n2, n3) = near.maximum, far.maximum
     top, bottom = (ratio * angle for angle in chamber.dead_centres)
@@ -103,10 +104,6 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     over, steep = _pressed(gas, cycle, np.maximum(swept - wide, 0.0) + small, swept + wide + small,
                            _strokes(gamma, top, bottom, g + half, cycle))  # fmt: skip
     return half * part.piston_area * (steep * moved * opening + over * (np.abs(bend) + (g + half) * n3))
-
-
-def _size(facing: Facing) -> tuple[float, float]:
-    return facing.crank_radius, facing.crank_radius / facing.rod_length
 
 
 def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:
@@ -153,7 +150,7 @@ class SharedGasBoxes:
         motored = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
         self._model = PhaseLeadModel(motored)
         self._names = self._model.names
-        if not all(_has_formula(point.gas) for point in problem.points):
+        if not all(point.gas is None or isinstance(point.gas, Seiliger) for point in problem.points):
             raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")
         self._fixed = self._fixed_pistons(problem.engine)
         self._masses = {m: [self._slope(m, s) for s in range(len(self._names))] for m in self._measures}
@@ -191,21 +188,17 @@ class SharedGasBoxes:
     def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
         # load of a unit roll moment at every counted place, shape (places,)
         engine, fidelity = self.problem.engine, self.problem.fidelity
-        wrench, mounting = Spectrum(engine.cycle.base_order, np.stack([0.0 * ROLL, ROLL]).astype(complex)), None
-        if engine.mounts:
-            mounting = mounting_of(engine, fidelity)
+        wrench = Spectrum(engine.cycle.base_order, np.stack([0.0 * ROLL, ROLL]).astype(complex))
+        mounting = mounting_of(engine, fidelity) if engine.mounts else None
         forces = mounting.forces(wrench, point.speed) if mounting is not None else None
         loads = PointLoads(point, wrench, forces, None, engine, fidelity)
         signal = narrow_signal(measure.with_all_orders, measure.load.signal(loads), engine)
         return lengths(signal.coefficients[1].real)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return the lower bound of every box, infinite without a feasible design, and the side to halve.
+        """Return lower bounds of boxes of leads [rad], shape (boxes, leads), and the sides to halve.
 
-        Parameters
-        ----------
-        lower, upper
-            Leads [rad], shape (boxes, leads).
+        A bound is infinite if no design of its box is feasible.
         """
         bounds = [self._bound(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
         return np.array(bounds), np.argmax(upper - lower, axis=1)
@@ -264,7 +257,3 @@ class SharedGasBoxes:
         ]
         twice = norm.value(Grid(np.ones(2), 2), np.array([[1.0], [-1.0]]))
         return twice * max((float(k.max()) * t for w, k, t in zip(shares, gains, tops, strict=True) if w), default=0.0)
-
-
-def _has_formula(gas: object) -> bool:
-    return gas is None or isinstance(gas, Seiliger)

@@ -34,6 +34,7 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 }
 
 
+@np.errstate(invalid="ignore", over="ignore")
 def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
     mounting, best = model.mounting(model.lower), zero_bound(lower)
@@ -46,27 +47,20 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
         all_stops.stiffness[used],
         all_stops.directions[:, used],
     )
-    for case in counted_cases(measure, model.problem.engine):
-        load = model.root @ case_wrench(mounting.block, case)
-        with np.errstate(invalid="ignore", over="ignore"):
-            best = best.or_else(_bound_case(model, measure, stops, load, lower, upper))
-    return best
-
-
-def _bound_case(
-    model: BoxModel, measure: Measure, stops: Stops, load: Array, lower: Array, upper: Array
-) -> LinearBound:
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
     stable = np.linalg.eigvalsh(soft)[:, 0] > 0.0
     matrices, soft = (np.where(stable[:, None, None], matrix, np.eye(6)) for matrix in (matrices, soft))
-    travel = _equilibrium(matrices, stops, load) @ stops.rows.T
-    signs, best = np.sign(stops.beyond(travel)), zero_bound(lower)
-    for _ in range(2):
-        bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
-        best = best.or_else(bound.where(stable))
-        # a stop close to contact may count as a spring too
-        signs = np.where(np.abs(travel) + NEXT * np.nan_to_num(reach) > stops.gaps, np.sign(travel), signs)
+    for case in counted_cases(measure, model.problem.engine):
+        load = model.root @ case_wrench(mounting.block, case)
+        travel = _equilibrium(matrices, stops, load) @ stops.rows.T
+        signs, best_of_case = np.sign(stops.beyond(travel)), zero_bound(lower)
+        for _ in range(2):
+            bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
+            best_of_case = best_of_case.or_else(bound.where(stable))
+            # a stop close to contact may count as a spring too
+            signs = np.where(np.abs(travel) + NEXT * np.nan_to_num(reach) > stops.gaps, np.sign(travel), signs)
+        best = best.or_else(best_of_case)
     return best
 
 

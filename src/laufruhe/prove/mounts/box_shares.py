@@ -35,54 +35,23 @@ class BoxModes:
 
     Attributes
     ----------
-    modes, squares
-        Modes of the middles as columns, shape (boxes, 6, 6), and squares of their frequencies, shape (boxes, 6).
-    slopes
-        Slopes of the stiffness in these modes over half a box, shape (boxes, n, 6, 6).
+    modes
+        Modes of the middles as columns, shape (boxes, 6, 6).
     parts
         Upper bounds of parts |v_j| of mode i, shape (boxes, i, j).
     deficits
         Upper bounds of 1 - |v_i|, shape (boxes, i).
-    square_changes
-        Upper bounds of the change of the square of mode i, shape (boxes, i).
+    first
+        Slopes of E_ij / (s_i - s_j) over half a box, shape (boxes, n, i, j).
+    rests
+        Upper bounds of the difference of v_j and its first order, shape (boxes, i, j).
     """
 
     modes: Array
-    squares: Array
-    slopes: Array
     parts: Array
     deficits: Array
-    square_changes: Array
-
-    @property
-    def change(self) -> Array:
-        """Upper bound of |E|, shape (boxes, 6, 6)."""
-        return np.asarray(_change(self.slopes, self.squares))
-
-    @property
-    def differences(self) -> Array:
-        """Differences s_i - s_j, infinite where they are zero, shape (boxes, i, j)."""
-        differences = self.squares[:, :, None] - self.squares[:, None, :]
-        return np.where(_EYE | (differences == 0.0), np.inf, differences)
-
-    @property
-    def first(self) -> Array:
-        """Slopes of E_ij / (s_i - s_j) over half a box, shape (boxes, n, i, j)."""
-        return np.asarray(self.slopes / self.differences[:, None])
-
-    @property
-    def rests(self) -> Array:
-        """Upper bounds of the difference of v_j and its first order, shape (boxes, i, j)."""
-        change = self.change
-        coupling = np.einsum("bjk,bik->bij", change, np.where(_EYE, 0.0, self.parts))
-        rest = (
-            change * self.deficits[:, :, None]
-            + coupling
-            + self.square_changes[:, :, None] * self.parts
-            + _rounding(self.squares)
-        )
-        equal = self.squares[:, :, None] == self.squares[:, None, :]
-        return np.where(_EYE, 0.0, np.where(equal, np.inf, rest / np.abs(self.differences)))
+    first: Array
+    rests: Array
 
 
 def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
@@ -90,14 +59,14 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
     slopes = np.einsum("bji,njk,bkl->bnil", modes, model.slopes["stiffness"], modes, optimize=True)
     slopes = slopes * (0.5 * (upper - lower))[:, :, None, None]
-    change, rounding = _change(slopes, squares), _rounding(squares)[:, :, 0]
+    rounding = ROUNDING * np.abs(squares[:, -1, None, None])
+    # upper bound of |E|
+    change = np.abs(slopes).sum(axis=1) + rounding
     low, high = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
-    low, high = np.minimum(low, squares) - rounding, np.maximum(high, squares) + rounding
+    low, high = np.minimum(low, squares) - rounding[:, :, 0], np.maximum(high, squares) + rounding[:, :, 0]
     diagonal = np.einsum("bjj->bj", change)
-    over, under = (
-        low[:, :, None] - (squares + diagonal)[:, None, :],
-        (squares - diagonal)[:, None, :] - high[:, :, None],
-    )
+    over = low[:, :, None] - (squares + diagonal)[:, None, :]
+    under = (squares - diagonal)[:, None, :] - high[:, :, None]
     gaps = np.maximum(np.maximum(over, under), 0.0)
     across = np.where(_EYE, 0.0, change)
     parts, maximum = np.ones_like(across), np.linalg.norm(across, axis=2)[:, None, :]
@@ -105,59 +74,50 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
         coupling = np.minimum(np.einsum("bjk,bik->bij", across, parts), maximum)
         bound = np.where(gaps > 0.0, coupling / np.where(gaps > 0.0, gaps, 1.0), 1.0)
         parts = np.where(_EYE, 1.0, np.minimum(parts, bound))
-    square_sum = np.sum(np.where(_EYE, 0.0, parts) ** 2, axis=2)
-    deficits = 1.0 - np.sqrt(np.maximum(1.0 - square_sum, 0.0))
-    return BoxModes(modes, squares, slopes, parts, deficits, np.maximum(high - squares, squares - low))
-
-
-def _change(slopes: Array, squares: Array) -> Array:
-    return np.asarray(np.abs(slopes).sum(axis=1) + _rounding(squares))
-
-
-def _rounding(squares: Array) -> Array:
-    return np.asarray(ROUNDING * np.abs(squares[:, -1, None, None]))
+    others = np.where(_EYE, 0.0, parts)
+    deficits = 1.0 - np.sqrt(np.maximum(1.0 - np.sum(others**2, axis=2), 0.0))
+    square_changes = np.maximum(high - squares, squares - low)
+    coupling = np.einsum("bjk,bik->bij", change, others)
+    rest = change * deficits[:, :, None] + coupling + square_changes[:, :, None] * parts + rounding
+    differences = squares[:, :, None] - squares[:, None, :]
+    is_equal = differences == 0.0
+    differences = np.where(_EYE | is_equal, np.inf, differences)
+    rests = np.where(_EYE, 0.0, np.where(is_equal, np.inf, rest / np.abs(differences)))
+    return BoxModes(modes, parts, deficits, slopes / differences[:, None], rests)
 
 
 def maximum_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return upper bounds of the largest share of each motion in a mode, shape (motions, boxes) (E7, E39)."""
     box = box_modes(model, lower, upper)
-    return np.array([_shares(model, box, motion).maximum.max(axis=1) for motion in motion_indices(measure)])
+    return np.array([_shares(model, box, motion)[2].max(axis=1) for motion in motion_indices(measure)])
 
 
 def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return lower bounds of the decoupling shortfall, shape (boxes,) (E47, E64)."""
     box = box_modes(model, lower, upper)
-    total, slopes = np.zeros(len(lower)), np.zeros_like(lower)
+    total, slopes, boxes = np.zeros(len(lower)), np.zeros_like(lower), np.arange(len(lower))
     alone = np.zeros(len(lower))
     for motion in motion_indices(measure):
-        value, slope, maximum = _largest_share(_shares(model, box, motion))
-        alone += np.maximum(measure.wanted - maximum, 0.0)
+        values, share_slopes, maximum = _shares(model, box, motion)
+        alone += np.maximum(measure.wanted - maximum.max(axis=1), 0.0)
+        # the largest share is at most that of one mode, and the most by which another mode exceeds it
+        best = np.argmax(values, axis=1)
+        value, slope = values[boxes, best], share_slopes[boxes, best]
+        above = values - value[:, None] + np.abs(share_slopes - slope[:, None]).sum(axis=2)
+        above[boxes, best] = 0.0
         # a shortfall is at least zero, and at least its linear bound
-        linear = measure.wanted - value
+        linear = measure.wanted - (value + np.maximum(above, 0.0).max(axis=1))
         counts = (linear > 0.0) & (linear + np.abs(slope).sum(axis=1) > 0.0)
         total += np.where(counts, linear, 0.0)
         slopes += np.where(counts[:, None], slope, 0.0)
     return np.asarray(np.maximum(alone, total - np.abs(slopes).sum(axis=1)))
 
 
-@dataclass(frozen=True, eq=False)
-class _Shares:
-    """Upper bounds of the share of a motion in every mode: value + slopes . s, and constants.
+def _shares(model: BoxModel, box: BoxModes, motion: int) -> tuple[Array, Array, Array]:
+    """Return upper bounds of the share of a motion in every mode: value + slopes . s, and constants.
 
-    Attributes
-    ----------
-    value, slopes
-        Shapes (boxes, modes) and (boxes, modes, n).
-    maximum
-        Constant bounds, shape (boxes, modes).
+    Their shapes are (boxes, modes), (boxes, modes, n) and (boxes, modes).
     """
-
-    value: Array
-    slopes: Array
-    maximum: Array
-
-
-def _shares(model: BoxModel, box: BoxModes, motion: int) -> _Shares:
     shape, momentum = model.root[:, motion], np.linalg.inv(model.root)[motion]
     a, b = shape @ box.modes, momentum @ box.modes
     near = _projection_bounds(a, box.parts) * _projection_bounds(b, box.parts)
@@ -173,17 +133,7 @@ def _shares(model: BoxModel, box: BoxModes, motion: int) -> _Shares:
     # use constants where the linear function is no better
     poor = ~(value + reach < near)
     value, slopes = np.where(poor, near, value), np.where(poor[:, :, None], 0.0, slopes)
-    return _Shares(value, slopes, np.minimum(near, value + np.abs(slopes).sum(axis=2)))
-
-
-def _largest_share(shares: _Shares) -> tuple[Array, Array, Array]:
-    # upper bounds of the largest share: linear (value, slopes), and constant
-    boxes = np.arange(len(shares.value))
-    best = np.argmax(shares.value, axis=1)
-    value, slope = shares.value[boxes, best], shares.slopes[boxes, best]
-    above = shares.value - value[:, None] + np.abs(shares.slopes - slope[:, None]).sum(axis=2)
-    above[boxes, best] = 0.0
-    return value + np.maximum(above, 0.0).max(axis=1), slope, shares.maximum.max(axis=1)
+    return value, slopes, np.minimum(near, value + np.abs(slopes).sum(axis=2))
 
 
 def _projection_bounds(components: Array, parts: Array) -> Array:

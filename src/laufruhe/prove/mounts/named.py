@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from laufruhe.numerics.norms import Norm
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence
@@ -30,7 +29,9 @@ def named_part(problem: Problem) -> Problem:
 
 def is_named(measure: Measure, problem: Problem) -> bool:
     """Return True if a measure is constant, affine in unbalances, or has a formula over boxes of mounts."""
-    if measure.is_load and not (measure in problem.known_rows or _is_bounded(measure.norm)):
+    norm = measure.norm
+    is_bounded = norm.is_euclidean or norm.sums_lengths or norm.is_largest or norm.is_largest_mean or norm.is_diameter
+    if measure.is_load and not (measure in problem.known_rows or is_bounded):
         return False
     for kind in {decision.kind for decision in problem.decisions}:
         depends = dependence(measure.channel, kind, problem)
@@ -39,7 +40,3 @@ def is_named(measure: Measure, problem: Problem) -> bool:
         if not (depends is Dependence.NONE or affine or has_formula):
             return False
     return True
-
-
-def _is_bounded(norm: Norm) -> bool:
-    return norm.is_euclidean or norm.sums_lengths or norm.is_largest or norm.is_largest_mean or norm.is_diameter

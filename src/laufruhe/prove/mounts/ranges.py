@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import TypeAlias
 
 import numpy as np
 
@@ -40,10 +39,7 @@ def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | N
     return low, high
 
 
-Band: TypeAlias = tuple[float, float]
-
-
-def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[Band]]:
+def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[tuple[float, float]]]:
     """Return matrices L <= A by lowest frequency and sag (E31), U >= A (E43), and excluded bands (E53).
 
     A is the stiffness in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are squares

@@ -14,7 +14,7 @@ from operator import add
 
 from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine import Engine
-from laufruhe.numerics.spectrum import Spectrum, as_order
+from laufruhe.numerics.spectrum import as_order
 from laufruhe.problem.evaluation import Evaluation, with_common_base
 from laufruhe.problem.measure import load_rows
 from laufruhe.problem.problem import Problem
@@ -44,16 +44,14 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
         signals = with_common_base(engine.cycle.base_order, design.signals(measure.load))
         if any(signal.base != engine.cycle.base_order for signal in signals):
             return 0.0
-        shared = [_averaged(signal, len(engine.cylinders)) for signal in signals]
+        count = len(engine.cylinders)
+        # the mean over shifts by whole firing intervals
+        shifted = ([x.shift(Fraction(k, count), k * x.period / count) for k in range(count)] for x in signals)
+        shared = [reduce(add, shifts).mapped(lambda values: values / len(engine.cylinders)) for shifts in shifted]
         if measure.norm.averages:
             shared = [signal.averaged(signal.period / design.samples) for signal in shared]
         total += term.weight * load_rows(measure, problem.points, shared, engine, design.samples).value
     return total
-
-
-def _averaged(signal: Spectrum, count: int) -> Spectrum:
-    shifted = [signal.shift(Fraction(k, count), k * signal.period / count) for k in range(count)]
-    return reduce(add, shifted).mapped(lambda values: values / count)
 
 
 def _is_alike(engine: Engine) -> bool:
