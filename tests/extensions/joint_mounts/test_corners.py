@@ -91,7 +91,9 @@ def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> 
     boxes, near_rest = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0.0
     for lower, upper in boxes_of(problem, generator, 5, 0.25):
         pairing = boxes.corner(lower).pairing
-        columns, told, rest = boxes.expanded(pairing, lower, upper)
+        columns = boxes.corner(lower).columns
+        loaded = boxes.loaded(boxes.balanced_loop(lower, upper), columns)
+        told, rest = boxes.expanded(pairing, loaded, columns)
         if not np.isfinite(rest).all():
             continue
         for mounts in generator.uniform(lower, upper, (8, len(lower))):

@@ -134,16 +134,10 @@ class DesignBoxes:
         """Largest number of vertices with multipliers."""
         return int(min(MAX_CORNERS, ROWS / max(self.loads.rows, 1)))
 
+    @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes, shape (boxes,), and the index of the side of each to halve.
-
-        Parameters
-        ----------
-        lower, upper
-            Open numbers of the mounts, shape (boxes, n).
-        """
-        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            pairs = [self._bound(*box) for box in zip(lower, upper, strict=True)]
+        """Return lower bounds of boxes of mounts, shape (boxes, n), and the index of the side of each to halve."""
+        pairs = [self._bound(*box) for box in zip(lower, upper, strict=True)]
         return np.array([bound for bound, _ in pairs]), np.array([side for _, side in pairs], dtype=np.intp)
 
     def corner(self, mounts: Array) -> Corner:
@@ -175,8 +169,7 @@ class DesignBoxes:
         violations = self._rest.over(lower, upper)
         if any(corner.min() > 0.0 for corner in violations):
             return math.inf, 0
-        loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
-        balanced_loop = _BalancedLoop.from_loop(loop, len(lower))
+        balanced_loop = self.balanced_loop(lower, upper)
         if not (balanced_loop.maximum[self._counted] < WORTH).all():
             # halve until the series of all orders converge
             return 0.0, int(
@@ -202,11 +195,11 @@ class DesignBoxes:
     def _mixed(self, loop: _BalancedLoop, violations: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
         """Return the bound by multipliers of all vertices, and the index of the side to halve."""
         centre = np.mean([corner.columns for corner in corners], axis=0)
-        loaded_loop = self._loaded(loop, centre)
+        loaded_loop = self.loaded(loop, centre)
         ends = np.array([domain.ends for domain in self.loads.domains for _ in range(domain.width)]).reshape(-1, 2)
         reach = np.append(1.0, np.abs(ends - centre[:, None]).max(axis=1))
         quadratics, rests = zip(
-            *(self._expanded(corner.pairing, loaded_loop, centre) for corner in corners), strict=True
+            *(self.expanded(corner.pairing, loaded_loop, centre) for corner in corners), strict=True
         )
         remainder = np.array(rests) @ reach
         if not (np.isfinite(remainder).all() and np.isfinite(quadratics).all()):
@@ -220,23 +213,24 @@ class DesignBoxes:
         )
         return max(float(minimum.min()), 0.0), int(np.argmax(scores))
 
-    def expanded(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-        """Return the unbalances at the lower vertex of a box, and the bound about these as `_expanded` does."""
+    def balanced_loop(self, lower: Array, upper: Array) -> _BalancedLoop:
+        """Return the feedback loop of a box, with balanced channels."""
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
-        centre = self.corner(lower).columns
-        return centre, *self._expanded(pairing, self._loaded(_BalancedLoop.from_loop(loop, len(lower)), centre), centre)
+        return _BalancedLoop(loop, len(lower), *balanced(loop.gain))
 
-    def _loaded(self, loop: _BalancedLoop, centre: Array) -> _LoadedLoop:
+    def loaded(self, loop: _BalancedLoop, centre: Array) -> _LoadedLoop:
+        """Return the loop under the loads at unbalances `centre` and under those of each column."""
         loads = self.loads.orders.loads
         fixed = loads[:, :1] + np.einsum("q,wqi->wi", centre, loads[:, 1:])[:, None]
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
-    def _expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, centre: Array) -> tuple[Array, Array]:
-        # bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)
-        powers, remainder = (
-            np.zeros((1 + len(centre), 1 + loaded_loop.count + loaded_loop.count**2)),
-            np.zeros(loaded_loop.loads.shape[:2]),
-        )
+    def expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, centre: Array) -> tuple[Array, Array]:
+        """Return the bound about `centre` by (1, s, s s') and columns, (1 + columns, p), and its remainder.
+
+        The remainder has the shape (w, 1 + columns).
+        """
+        powers = np.zeros((1 + len(centre), 1 + loaded_loop.count + loaded_loop.count**2))
+        remainder = np.zeros(loaded_loop.loads.shape[:2])
         if pairing is None:
             return powers, remainder
         powers[0, 0], powers[1:, 0] = pairing.constant + pairing.slopes @ centre, pairing.slopes
@@ -272,11 +266,6 @@ class _BalancedLoop:
     balance: Array
     gain: ComplexArray
     maximum: Array
-
-    @classmethod
-    def from_loop(cls, loop: Loop, count: int) -> _BalancedLoop:
-        """Return a loop with balanced channels."""
-        return cls(loop, count, *balanced(loop.gain))
 
     @property
     def incidence(self) -> Array:
@@ -341,21 +330,17 @@ def _concavity(values: Array) -> Array:
     return np.array(distances)
 
 
-class _VertexBranching(BatchBisection):
-    """Branch and bound with designs at vertices as incumbents."""
-
-    def __init__(self, search: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> None:
-        super().__init__(search, search.value, gap_tolerance, witness)
-        self._boxes = search
-
-    def propose(self, _: Box) -> None:
-        """Lower the objective of the incumbent to that of the best vertex."""
-        self.value = min(self.value, self._boxes.value)
-
-
 def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> BoxResult:
     """Return the bound of a problem that `mixes_corners`, by boxes until the gap tolerance or the budget is reached."""
-    branching = _VertexBranching(boxes, gap_tolerance, witness)
+
+    class Branching(BatchBisection):
+        """Branch and bound with designs at vertices as incumbents."""
+
+        def propose(self, _: Box) -> None:
+            """Lower the objective of the incumbent to that of the best vertex."""
+            self.value = min(self.value, boxes.value)
+
+    branching = Branching(boxes, boxes.value, gap_tolerance, witness)
     maximum = boxes.max_boxes
     if not maximum:
         return BoxResult(0.0, 0)

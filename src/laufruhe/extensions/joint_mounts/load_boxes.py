@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult, bisect_in_stages
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import (
+    PARTS,
     LinearBound,
     counted_rows,
     is_ratio,
@@ -147,9 +149,6 @@ class LoadBoxes:
         self._rest = RestLimits(problem) if self._numbers else None
         self._left_out = self._drop_small_orders(left_out)
 
-    def _box(self, lower: Array, upper: Array) -> _Boxes:
-        return _Boxes(self.loads, self._orders, self._numbers, lower, upper, self._ratios)
-
     def _drop_small_orders(self, budget: float) -> dict[Measure, float]:
         """Omit orders that add up to less than a budget, and return their largest effect on each measure (E41)."""
         budgets = {measure: budget / weight for weight, measure in self._terms if measure.on_mounts}
@@ -157,7 +156,7 @@ class LoadBoxes:
         if not budgets or self._ratios:
             return {}
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            box = self._box(self.lower[None], self.upper[None])
+            box = _Boxes(self.loads, self._orders, self._numbers, self.lower[None], self.upper[None], self._ratios)
             size = np.array([np.nan_to_num(box.response(measure).maximum[0], nan=np.inf) for measure in budgets])
             share = np.max(size / np.array([*budgets.values()])[:, None], axis=0)
         order = np.argsort(share, kind="stable")
@@ -196,7 +195,7 @@ class LoadBoxes:
     @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes of shape (boxes, n), infinite without a feasible design, and sides to halve."""
-        box = self._box(lower, upper)
+        box = _Boxes(self.loads, self._orders, self._numbers, lower, upper, self._ratios)
         points = self._nearest(box)
         lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
         scores, size = np.zeros_like(lower), np.zeros(len(lower))
@@ -251,17 +250,11 @@ class LoadBoxes:
             running, resting = (box.response(FORCE, at_rest) for at_rest in (False, True))
             ratio, scores = ratio_under(running, resting, measure, self.problem.points, self._orders)
             return LinearBound(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
-        response = _counted(box.response(measure), measure.counted(self._orders.orders))
+        factors = measure.counted(self._orders.orders).astype(float)
         if averaged and measure.norm.averages:
             # averages are lower bounds of means by few samples (P7)
-            factors = np.sinc(self._orders.places / self.loads.samples) ** 2
-            row_factors, slope_factors = factors[:, None], factors[:, None, None]
-            response = LinearResponse(
-                response.value * row_factors,
-                response.slopes * slope_factors,
-                response.remainder * factors,
-                response.scores * row_factors,
-            )
+            factors = factors * np.sinc(self._orders.places / self.loads.samples) ** 2
+        response = _scaled(box.response(measure), factors)
         value = response.value + np.einsum("bwkr,bk->bwr", response.slopes, points)
         bound = norm_under(self.problem, measure, replace(response, value=value), self._orders)
         return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, points))
@@ -344,11 +337,8 @@ class _Boxes:
 
     def _together(self, responses: list[LinearResponse]) -> LinearResponse:
         """Return the sum of responses to fixed loads, columns, and remainders of throws, as one linear function."""
-        fixed, column_responses, throw_remainders = (
-            responses[0],
-            responses[1 : 1 + self.columns],
-            responses[1 + self.columns :],
-        )
+        fixed, *column_responses = responses[: 1 + self.columns]
+        throw_remainders = responses[1 + self.columns :]
         value, (boxes, orders, rows) = fixed.value, fixed.value.shape
         by_column = np.array([response.value for response in column_responses]).reshape(
             self.columns, boxes, orders, rows
@@ -373,10 +363,8 @@ class _Boxes:
 
     def affine_under(self, measure: Measure, points: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
-        norm, columns = (
-            self._loads.norm_without_mounts(measure, averaged),
-            slice(self._numbers, self._numbers + self._unbalances),
-        )
+        norm = self._loads.norm_without_mounts(measure, averaged)
+        columns = slice(self._numbers, self._numbers + self._unbalances)
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]
         value, slopes = np.zeros(len(points)), np.zeros((len(points), self.count))
         for k, t in enumerate(points[:, columns]):
@@ -394,20 +382,13 @@ def _shared(expansion: Expansion, response: LinearResponse) -> LinearResponse:
     return replace(response, scores=response.scores + np.maximum(excess, 0.0)[..., None] * pull)
 
 
-def _counted(response: LinearResponse, is_counted: Mask) -> LinearResponse:
-    # set all other orders to zero
-    if is_counted.all():
-        return response
-    value, slopes = (
-        np.where(is_counted.reshape(-1, *(1,) * n), coefficients, 0.0)
-        for n, coefficients in ((1, response.value), (2, response.slopes))
-    )
-    return LinearResponse(
-        value,
-        slopes,
-        np.where(is_counted, response.remainder, 0.0),
-        np.where(is_counted[:, None], response.scores, 0.0),
-    )
+def _scaled(response: LinearResponse, factors: Array) -> LinearResponse:
+    # multiply every order by a factor; an order with a factor of zero has no remainder, even of a diverging series
+    def times(part: ComplexArray | Array) -> Any:
+        by_order = factors.reshape(-1, *(1,) * (part.ndim - 2))
+        return np.where(by_order > 0.0, part * by_order, 0.0)
+
+    return LinearResponse(*(times(getattr(response, part)) for part in PARTS))
 
 
 def _least_squares(gram: Array, gradient: Array) -> Array:
