@@ -114,14 +114,14 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
 
 def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["mean"])
-    search = StiffnessBoxes(problem, 0.0)
+    search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     centre = np.array([d.start for d in problem.mount_decisions])
-    value = objective_value(problem, evaluate(problem))
+    value, lines = objective_value(problem, evaluate(problem)), search.model.lines(measure)
     lacking = []
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)
-        at = search.model.expanded(search.model.lines(), low[None], high[None])
-        found = lower_bound_of_norm(search.model, problem.objective[0].measure, search.model.lines(), at)
+        at = search.model.expanded(lines, low[None], high[None])
+        found = lower_bound_of_norm(search.model, measure, lines, at)
         assert float(found.value[0]) == pytest.approx(value, abs=float(found.remainder[0]))
         lacking.append(float(found.remainder[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]

@@ -98,7 +98,7 @@ def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> N
     mounts = open_mounts(problem, model.lower, model.upper)
     half = 0.5 * (boxes.upper - boxes.lower)
     for j, follows in enumerate(mounts.decisions):
-        own = model.stiffness_slopes[follows[0]] * half[follows[0]]
+        own = model.slopes["stiffness"][follows[0]] * half[follows[0]]
         assert np.allclose(mounts.slopes[j], own, rtol=1e-9, atol=1e-9 * np.abs(own).max())
 
 
