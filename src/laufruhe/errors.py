@@ -17,7 +17,7 @@ def printed(text: str, maximum: int = 2000) -> str:
 
 def plural(name: str, count: int) -> str:
     """Return a noun in the singular for one and in the plural for other numbers."""
-    return name if count == 1 else f"{name}s"
+    return name if count == 1 else f"{name}{'es' if name.endswith('x') else 's'}"
 
 
 def counted(count: int, name: str) -> str:

@@ -7,21 +7,22 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from laufruhe.errors import counted
 from laufruhe.extensions.run_ups.boxes import bounds_runs
 from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.machine.mount import every_spring
-from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result, violated_limits
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result
 from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
-from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
+from laufruhe.solvers.mounts.nonlinear import failed_search
+from laufruhe.solvers.mounts.search import NEAR, MountSearch
 from laufruhe.solvers.mounts.starts import start_of_result
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 
 STARTS, STOPPED_STARTS = 6, 3
@@ -58,15 +59,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     if best is None or best.design.violation > FEASIBILITY_TOL:
         conflict = minimal_conflict(problem) if box_result.bound == math.inf else ()
         result = infeasible_result(problem, initial, conflict, timing)
-        return result if conflict else _infeasible(problem, search, best, result)
-    return _best_result(problem, search, best, initial, relaxed, box_result, timing)
-
-
-def _best_result(
-    problem: Problem, search: MountSearch, best: SearchResult, initial: Evaluation, relaxed: Result | None,
-    box_result: BoxResult, timing: dict[str, float],
-) -> Result:  # fmt: skip
-    """Return the result of the best design, with the larger of both bounds."""
+        return result if conflict else failed_search(search, result)
     certificate = None if relaxed is None else relaxed.certificate
     relaxed_bound = 0.0 if certificate is None else certificate.lower_bound
     optimum = best.optimum
@@ -77,26 +70,15 @@ def _best_result(
         method=_method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, box_result),
         prices={} if optimum is None else best.joint.prices(optimum),
     )
-    design = replace(best.design, problem=problem)
-    return build_result(design, initial, proof, timing)
+    return build_result(replace(best.design, problem=problem), initial, proof, timing)
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, box_result: BoxResult) -> str:
     ends = describe_starts(optima, len(distinct_optima(optima, scale, 1e-3)))
     if box_result.bound > relaxed_bound:
-        bound = f"; bounds of mounts and run-ups on {box_result.boxes} box{'es' if box_result.boxes > 1 else ''}"
+        bound = f"; bounds of mounts and run-ups on {counted(box_result.boxes, 'box')}"
     elif relaxed_bound > 0.0:
         bound = "; bound of the problem without run-ups"
     else:
         bound = "; no bound of a run-up alone"
     return f"{ends}, with run-ups integrated{bound}"
-
-
-def _infeasible(problem: Problem, search: MountSearch, best: SearchResult | None, result: Result) -> Result:
-    names, nearest = "the limits", ""
-    if best is not None:
-        names = " and ".join(f"'{name}'" for name in violated_limits(problem.limits, best.design.evaluation))
-        nearest = f" (nearest misses by {best.design.violation:.3g} of a limit)"
-    starts = sum(optimum.starts for optimum in search.optima)
-    message = f"no design found: from {starts} starts none satisfies {names}{nearest}; relax it, or open more"
-    return replace(result, status=Status.FAILED, message=message)

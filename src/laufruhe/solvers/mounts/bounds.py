@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from laufruhe.errors import counted
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, until_time_limit
 from laufruhe.problem.measure import Limit
@@ -39,8 +40,6 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
 
     Parameters
     ----------
-    problem
-        Problem with open mounts.
     search
         Search of the problem, already run.
     defer_bounds
@@ -96,40 +95,20 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
     division = run_provers(question)
     if division.bound <= certificate.lower_bound:
         return result
-    text = f"{certificate.method}; bounds of mounts from {division.boxes} box{'es' if division.boxes > 1 else ''}"
-    certificate = make_certificate(
-        result.objective.value,
-        division.bound,
-        zero_level,
-        problem.tolerance,
-        ProofStrength.PARTIAL,
-        certificate.kkt_residual,
-        text,
-    )
+    text = f"{certificate.method}; bounds of mounts from {counted(division.boxes, 'box')}"
+    value, residual = result.objective.value, certificate.kkt_residual
+    strength = ProofStrength.PARTIAL
+    certificate = make_certificate(value, division.bound, zero_level, problem.tolerance, strength, residual, text)
     return replace(result, certificate=certificate)
 
 
 def are_contradictory(problem: Problem, limits: Sequence[Limit]) -> bool:
-    """Return True if branch and bound over stiffness proves that these limits contradict each other.
-
-    Parameters
-    ----------
-    problem
-        Problem that `is_stiffness_problem` accepts.
-    limits
-        Limits of the problem.
-    """
+    """Return True if boxes prove that these limits of an `is_stiffness_problem` contradict each other."""
     without_terms = replace(problem, objective=(), limits=tuple(limits))
     divisions = stiffness_bounds(without_terms, math.inf, 0.0, (CONFLICT_SHARE,))
     return bool(limits) and any(division.bound == math.inf for division in divisions)
 
 
 def minimal_conflict(problem: Problem) -> tuple[str, ...]:
-    """Return the names of a minimal set of limits that contradict each other.
-
-    Parameters
-    ----------
-    problem
-        Problem that `is_stiffness_problem` accepts, proven to be infeasible.
-    """
+    """Return the names of a minimal set of contradicting limits of an infeasible `is_stiffness_problem`."""
     return smallest_conflict(problem.limits, lambda limits: are_contradictory(problem, limits))

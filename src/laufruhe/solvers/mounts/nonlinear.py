@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from laufruhe.errors import counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
@@ -38,7 +39,7 @@ from laufruhe.solvers.conclusion import (
     unbalance_values,
 )
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
-from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict
+from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict, mount_numbers
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.places import StartPoint, evaluate_design_at
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
@@ -46,7 +47,6 @@ from laufruhe.solvers.mounts.starts import evaluation_count, start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
-from laufruhe.solvers.smooth.program import SmoothProgram
 
 NOTABLE_RATIO = 1.01
 # evaluated operating points from which a search takes longer than the start of workers
@@ -59,24 +59,10 @@ def solve_mounts(
     defer_bounds: bool = False,
     start_mounts: Sequence[float] | None = None,
 ) -> Result:
-    """Solve a problem on elastic mounts: a convex program if possible, else the multistart search of `solve_joint`.
-
-    Parameters
-    ----------
-    problem
-        Problem on elastic mounts.
-    workers
-        Number of processes; by default the number of processors.
-    defer_bounds
-        True to leave bounds to `with_mount_bounds`, for one of several problems.
-    start_mounts
-        Numbers of the mounts of the first start [SI], shape (n,).
-    """
-    return (
-        solve_convex_mounts(problem)
-        if is_convex(problem)
-        else solve_joint(problem, workers, defer_bounds, start_mounts)
-    )
+    """Solve by a convex program if possible, else by `solve_joint`, which has the same parameters."""
+    if is_convex(problem):
+        return solve_convex_mounts(problem)
+    return solve_joint(problem, workers, defer_bounds, start_mounts)
 
 
 def solve_joint(
@@ -151,20 +137,12 @@ def _search_and_bound(
             if best is None or best.design.violation > FEASIBILITY_TOL:
                 return _without_design(problem, search, initial, division, timing), search.turns
             balance = ahead.result(best.design.values, _share(best.design))
-    rebalanced = None if balance is None else _rebalanced(best.design, *balance)
-    design = best.design if rebalanced is None or rebalanced[0].value >= best.design.value else rebalanced[0]
-    return _result(
-        search, initial, replace(best, design=design), rebalanced, division, timing, defer_bounds
-    ), search.turns
-
-
-def _mounts(design: Design) -> list[float]:
-    pairs = zip(design.problem.decisions, design.values, strict=True)
-    return [value.real for decision, value in pairs if not decision.is_affine]
+    best, gap = _rebalanced(best, *balance) if balance is not None else (best, None)
+    return _result(search, initial, best, gap, division, timing, defer_bounds), search.turns
 
 
 def _share(design: Design) -> tuple[Problem, Sequence[float]]:
-    return design.problem, _mounts(design)
+    return design.problem, mount_numbers(design).tolist()
 
 
 def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
@@ -182,11 +160,15 @@ def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], flo
     return unbalance_values(problem, result), result.certificate.gap
 
 
-def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
-    mounts, columns = iter(_mounts(design)), iter(unbalances)
+def _rebalanced(best: SearchResult, unbalances: Sequence[complex], gap: float) -> tuple[SearchResult, float | None]:
+    """Return the better of a result and its design with these unbalances; the gap is None if that is infeasible."""
+    design, columns = best.design, iter(unbalances)
+    mounts = iter(mount_numbers(design).tolist())
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
     rebalanced = evaluate_design_at(design.problem, values)
-    return None if rebalanced is None or rebalanced.violation > FEASIBILITY_TOL else (rebalanced, gap)
+    if rebalanced is None or rebalanced.violation > FEASIBILITY_TOL:
+        return best, None
+    return best if rebalanced.value >= design.value else replace(best, design=rebalanced), gap
 
 
 def _convex_part(problem: Problem) -> Problem | None:
@@ -259,7 +241,7 @@ def _result(
     search: MountSearch,
     initial: Evaluation,
     best: SearchResult,
-    rebalanced: tuple[Design, float] | None,
+    balance_gap: float | None,
     division: BoxResult,
     timing: dict[str, float],
     defer_bounds: bool,
@@ -274,7 +256,7 @@ def _result(
         bound=bound,
         strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
-        method=_method(search.optima, max(design.value, zero_level), rebalanced, division),
+        method=_method(search.optima, max(design.value, zero_level), balance_gap, division),
         prices=best.joint.prices(optimum) if optimum is not None else {},
     )
     if search.moves is not None:
@@ -283,18 +265,14 @@ def _result(
     return build_result(design, initial, proof, timing)
 
 
-def _method(
-    optima: Sequence[LocalOptimum], scale: float, rebalanced: tuple[Design, float] | None, division: BoxResult
-) -> str:
+def _method(optima: Sequence[LocalOptimum], scale: float, balance_gap: float | None, division: BoxResult) -> str:
     ends = distinct_optima(optima, scale)
     text = describe_starts(optima, len(ends))
     if len(ends) > 1 and ends[-1].value > NOTABLE_RATIO * ends[0].value > 0.0:
         text += f", up to {ends[-1].value / ends[0].value:.3g} times the best"
-    if rebalanced is not None:
-        text += f"; balance on these mounts proven within {rebalanced[1]:.0e}"
-    if division.boxes:
-        text += f"; bounds of mounts from {division.boxes} box{'es' if division.boxes > 1 else ''}"
-    return text
+    if balance_gap is not None:
+        text += f"; balance on these mounts proven within {balance_gap:.0e}"
+    return f"{text}; bounds of mounts from {counted(division.boxes, 'box')}" if division.boxes else text
 
 
 def _without_design(
@@ -305,24 +283,22 @@ def _without_design(
     if not conflict and division.bound == math.inf:
         conflict = minimal_conflict(problem)
     result = infeasible_result(problem, initial, conflict, timing)
-    if conflict:
-        return result
-    nearest = min(search.optima, key=lambda o: o.violation)
-    names = _violated_limits(search.joint, nearest)
+    return result if conflict else failed_search(search, result)
+
+
+def failed_search(search: MountSearch, result: Result) -> Result:
+    """Return the result of a search without a feasible design, with a message that names limits of the nearest one."""
+    nearest, program = min(search.optima, key=lambda o: o.violation), search.joint.program
+    names = ""
+    if len(nearest.constraints) == len(program.constraint_names):
+        values = nearest.constraints
+        excess = np.maximum(program.constraint_lower - values, values - program.constraint_upper)
+        violated = [program.constraint_names[k] for k in np.flatnonzero(excess > 1e-6)]
+        names = " and ".join(f"'{name}'" for name in dict.fromkeys(violated) if name != "modes")
     message = (
         f"no design found: from {sum(o.starts for o in search.optima)} starts none keeps {names or 'the limits'} "
         f"(the nearest violates one by {nearest.violation:.3g} of the limit); relax it, or open more numbers"
     )
     design = search.best.design if search.best else None
-    nearest_design = nearest_record(problem, design.evaluation, priced_decisions(design)) if design else None
+    nearest_design = nearest_record(search.problem, design.evaluation, priced_decisions(design)) if design else None
     return replace(result, status=Status.FAILED, message=message, nearest=nearest_design)
-
-
-def _violated_limits(joint: SmoothProgram, optimum: LocalOptimum) -> str:
-    program = joint.program
-    values = optimum.constraints
-    if len(values) != len(program.constraint_names):
-        return ""
-    excess = np.maximum(program.constraint_lower - values, values - program.constraint_upper)
-    names = [program.constraint_names[k] for k in np.flatnonzero(excess > 1e-6)]
-    return " and ".join(f"'{name}'" for name in dict.fromkeys(names) if name != "modes")

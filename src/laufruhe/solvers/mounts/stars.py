@@ -249,7 +249,7 @@ def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], desig
     best = replace(best, result=result)
     method = details.method
     if division.boxes:
-        method += f"; {division.boxes} box{'es' if division.boxes > 1 else ''} of throws, mounts and unbalances"
+        method += f"; {counted(division.boxes, 'box')} of throws, mounts and unbalances"
     certificate = best.result.certificate
     if certificate is not None:
         text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
