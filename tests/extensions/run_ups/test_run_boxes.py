@@ -20,7 +20,7 @@ from laufruhe.extensions.run_ups.linear_run import LinearRun
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.matrices import RunMatrices
 from laufruhe.extensions.run_ups.moments import RunMoments
-from laufruhe.extensions.run_ups.motion import Steps, _force, equations
+from laufruhe.extensions.run_ups.motion import MotionEquations, Steps, _force
 from laufruhe.extensions.run_ups.peaks import RunPeaks
 from laufruhe.extensions.run_ups.runs import run_loads, run_through
 from laufruhe.files.reader import load_tables, tables_of
@@ -207,7 +207,7 @@ def test_long_steps_end_where_short_ones_do() -> None:
     """Motion at the middle from moments is that of the exact model, from whichever short step they are counted."""
     boxes = of_seed(1)
     whole = (boxes.model.lower[None], boxes.model.upper[None])
-    of = equations(boxes.model, RunMatrices(boxes.model), 80.0, *whole)
+    of = MotionEquations(boxes.model, RunMatrices(boxes.model), 80.0, *whole)
     model = time_model(boxes.model.mounting(0.5 * (whole[0][0] + whole[1][0])))
     for sweep, wrenches in zip(boxes.peaks.sweeps, boxes.peaks.wrenches, strict=True):
         exact = LinearRun(model, sweep).response(wrenches)
@@ -248,7 +248,7 @@ def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
 def test_losses_drive_no_more_than_is_told(seed: int) -> None:
     """The damping of every design in a box takes energy, or gives no more than the rate that is known."""
     boxes = of_seed(seed)
-    of = equations(boxes.model, RunMatrices(boxes.model), 80.0, boxes.lower, boxes.upper)
+    of = MotionEquations(boxes.model, RunMatrices(boxes.model), 80.0, boxes.lower, boxes.upper)
     for box in range(len(SIZES)):
         for x in boxes.designs(box, 20):
             damping = time_model(boxes.model.mounting(x)).damping
@@ -262,7 +262,7 @@ def test_losses_drive_no_more_than_is_told(seed: int) -> None:
 def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> None:
     """z' = A z of every design in a box: A to the second order, and no entry of the rest over what is told."""
     boxes, scale = of_seed(seed), 80.0
-    of = equations(boxes.model, RunMatrices(boxes.model), scale, boxes.lower, boxes.upper)
+    of = MotionEquations(boxes.model, RunMatrices(boxes.model), scale, boxes.lower, boxes.upper)
     n, pairs = of.turn.shape[1], pairs_of(of.halves.shape[1])
     bent = 0.0
     for box, turn in enumerate(of.turn):

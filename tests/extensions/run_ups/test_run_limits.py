@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.run_ups.cones import RunRows
 from laufruhe.extensions.run_ups.machine import Run
-from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.extensions.run_ups.runs import run_through, runs_of
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.simulated import simulated_measures

@@ -12,5 +12,5 @@ EXTENSION = Extension(
     keys=(f"{_HERE}.file:KEY",),
     reductions=(f"{_HERE}.reduction:REDUCTION",),
     sections=(f"{_HERE}.section:SECTION",),
-    pictures=(f"{_HERE}.pictures:PICTURE",),
+    pictures=(f"{_HERE}.section:PICTURE",),
 )

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.extensions.run_ups.dampers import Maps, mapped, pairs_of
 from laufruhe.extensions.run_ups.matrices import Rows, RunMatrices
 from laufruhe.extensions.run_ups.moments import RunMoments
-from laufruhe.extensions.run_ups.motion import FARTHEST, REACH, MotionEquations, RunMotion, Steps, equations, motion_of
+from laufruhe.extensions.run_ups.motion import FARTHEST, REACH, MotionEquations, RunMotion, Steps, motion_of
 from laufruhe.extensions.run_ups.peaks import RunPeaks, parabola_tops
 from laufruhe.extensions.run_ups.stopped_run import QUICKEST, quickest
 from laufruhe.load_models.simulated import simulated_measures
@@ -79,16 +79,15 @@ class RunBoxes:
             np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower)
         )
         if len(indices):
-            box_equations = (
-                box_equations if len(indices) == len(lower) else self._equations(lower[indices], upper[indices])
-            )
+            if len(indices) < len(lower):
+                box_equations = self._equations(lower[indices], upper[indices])
             bounds = self._under(measure, box_equations)
             for name in PARTS:
                 getattr(result, name)[indices] = getattr(bounds, name)
         return result
 
     def _equations(self, lower: Array, upper: Array) -> MotionEquations:
-        return equations(self._model, self._matrices, self._scale, lower, upper)
+        return MotionEquations(self._model, self._matrices, self._scale, lower, upper)
 
     def _under(self, measure: Measure, box_equations: MotionEquations) -> LinearBound:
         maps_of, d = self._rows[measure]
@@ -106,10 +105,12 @@ def bounds_runs(problem: Problem) -> bool:
 
 
 def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
-    # True if no design within the limits meets a stop, so that its run-up is that without stops.
-    # Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
-    # push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
-    # steps.
+    """Return True if no design within the limits meets a stop, so that its run-up is that without stops.
+
+    Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
+    push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
+    steps.
+    """
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
     maximum = min((limit.maximum for limit in limits), default=math.inf)
@@ -117,11 +118,6 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
     gaps = model.gaps[model.stops > 0.0]
     is_too_stiff = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
     return not is_too_stiff and maximum * (1.0 + MARGIN) < float(gaps.min())
-
-
-def _tops(squares: Array) -> Array:
-    tops = parabola_tops(squares[..., :-2], squares[..., 1:-1], squares[..., 2:])
-    return np.concatenate([tops, squares[..., -1:]], axis=-1)
 
 
 class _RunBounds:
@@ -154,7 +150,9 @@ class _RunBounds:
         rows = steps.moments.reshape(-1, steps.count)
         moments = np.broadcast_to(rows, (box_equations.count, *rows.shape))
         middle = self._steps.middle(moments)
-        peak_step = 1 + _tops(self._lengths(middle) ** 2).max(axis=1).argmax(axis=1)
+        squares = self._lengths(middle) ** 2
+        tops = parabola_tops(squares[..., :-2], squares[..., 1:-1], squares[..., 2:])
+        peak_step = 1 + np.concatenate([tops, squares[..., -1:]], axis=-1).max(axis=1).argmax(axis=1)
         boxes, start = np.arange(box_equations.count), run.times * (peak_step - 1)
         places = start[:, None] + np.arange(2 * run.times)
         short = Steps(box_equations, run.sweep.step, orders=False)

@@ -8,12 +8,13 @@ so that its lower bound is valid.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.extensions.run_ups.rows import RunRows
+from laufruhe.extensions.run_ups.peaks import RunPeaks
+from laufruhe.extensions.run_ups.runs import STRETCHES
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import until_time_limit
@@ -21,7 +22,7 @@ from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import decision_vector, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import KnownRows, Problem
 from laufruhe.solvers.conclusion import infeasible_result, unbalance_values, with_constant_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import smallest_conflict
@@ -29,6 +30,61 @@ from laufruhe.solvers.result import Result, Status
 
 _ROUNDS, _COARSE, _AGAIN = 40, 48, 4
 Decide = Callable[[Problem], Result]
+NEAR = 0.98
+"""Share of a limit above which a row joins the program."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunRows:
+    """Rows of each step of run-up and shut-down, affine in the unbalances.
+
+    Attributes
+    ----------
+    constants, slopes
+        By measure, shapes (steps, places, d) and (steps, places, d, n).
+    """
+
+    constants: dict[Measure, Array]
+    slopes: dict[Measure, Array]
+
+    @classmethod
+    def from_problem(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
+        """Return the rows of measures; None if run-ups are not linear in the loads."""
+        count = sum(domain.width for domain in domains_of(problem.unbalances))
+        signals = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
+        if signals is None:
+            return None
+        constants, *unit_signals = signals
+        slopes = {
+            measure: np.stack([signal[measure] - constant for signal in unit_signals], axis=-1)
+            for measure, constant in constants.items()
+        }
+        return cls(constants, slopes)
+
+    def worst(self, measure: Measure, x: Array) -> float:
+        """Return the largest length of a row at unbalances `x`, shape (n,)."""
+        return float(self._lengths(measure, x).max())
+
+    def near(self, measure: Measure, x: Array, height: float) -> NDArray[np.intp]:
+        """Return flat indices of the longest row of each interval and place, if above NEAR times `height` at `x`."""
+        sizes = self._lengths(measure, x)
+        interval_length = -(-len(sizes) // (2 * STRETCHES))
+        places = []
+        for start in range(0, len(sizes), interval_length):
+            interval = sizes[start : start + interval_length]
+            longest = interval.argmax(axis=0)
+            is_near = interval[longest, np.arange(interval.shape[1])] >= NEAR * height
+            places.append((start + longest[is_near]) * sizes.shape[1] + np.flatnonzero(is_near))
+        return np.concatenate(places)
+
+    def known(self, measure: Measure, places: NDArray[np.intp]) -> KnownRows:
+        """Return the rows with these flat indices."""
+        constant, slope = self.constants[measure], self.slopes[measure]
+        d, n = slope.shape[2:]
+        return KnownRows(constant.reshape(-1, d)[places], slope.reshape(-1, d, n)[places])
+
+    def _lengths(self, measure: Measure, x: Array) -> Array:
+        return np.asarray(np.linalg.norm(self.constants[measure] + self.slopes[measure] @ x, axis=-1))
 
 
 def solve_run_cones(
@@ -41,15 +97,12 @@ def solve_run_cones(
         return infeasible_result(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
     for _ in until_time_limit(range(_AGAIN)):
         result = decide(steps.problem)
-        x = (
-            decision_vector(domains_of(problem.decisions), unbalance_values(problem, result))
-            if result.decisions
-            else None
-        )
-        fidelity = result.problem.fidelity
-        if fidelity != problem.fidelity:
+        x, domains = None, domains_of(problem.decisions)
+        if result.decisions:
+            x = decision_vector(domains, unbalance_values(problem, result))
+        if result.problem.fidelity != problem.fidelity:
             # compute the rows again with the fidelity that the accuracy needs
-            refined = problem.at(fidelity)
+            refined = problem.at(result.problem.fidelity)
             refined_rows = RunRows.from_problem(refined, [*rows.constants])
             return solve_run_cones(refined, limits, terms, refined_rows or rows, decide)
         if x is not None and result.status is Status.FEASIBLE:

@@ -64,16 +64,16 @@ class RunMatrices:
     def uneven_loss(self) -> LinearMaps:
         """Loss less that of the common loss factor."""
         loss, stiffness = self.motion.lossy, self._square("stiffness")
-        beyond = (
-            getattr(loss, k) - self.loss_factor * getattr(stiffness, k) for k in ("lowest", "slopes")
-        )  # fmt: skip
-        zero = Linear(np.zeros_like(loss.lowest), np.zeros_like(loss.slopes))
-        return LinearMaps(zero, Linear(*beyond), zero)
+        lowest, slopes = (
+            loss.lowest - self.loss_factor * stiffness.lowest,
+            loss.slopes - self.loss_factor * stiffness.slopes,
+        )
+        zero = Linear(np.zeros_like(lowest), np.zeros_like(slopes))
+        return LinearMaps(zero, Linear(lowest, slopes), zero)
 
     def maps_of(self, measure: Measure) -> Rows:
         """Return the maps of a measure, place by place, and the count of rows for each place."""
         no_drag = np.zeros_like(self.base.drag)
-        count = len(self._model.lower)
 
         def at_rest(forces: Array) -> Array:
             return self._signal_rows(measure, forces, no_drag, False)
@@ -83,22 +83,19 @@ class RunMatrices:
 
         def linear(name: str) -> Linear:
             zero = moving(np.zeros((len(no_drag), 6)))
-            by_side = [moving(self._model.slopes[name][j]) - zero for j in range(count)]
+            by_side = [moving(slope) - zero for slope in self._model.slopes[name]]
             return Linear(moving(self._lowest(name)), np.array(by_side))
 
         springs = [at_rest(self._padded(slope)) - at_rest(no_drag) for slope in self._model.slopes["springs"]]
         maps = LinearMaps(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
-        return maps, self._shape(measure)[-1]
+        zero = np.zeros((self.size, 1))
+        return maps, signal_of(measure, RunResponse(self.base, zero, zero)).shape[-1]
 
     def _signal_rows(self, measure: Measure, forces: Array, drag: Array, is_rate: bool) -> Array:
         identity, zero = np.eye(self.size), np.zeros((self.size, self.size))
         model = replace(self.base, forces=forces, drag=drag)
         signal = signal_of(measure, RunResponse(model, *((zero, identity) if is_rate else (identity, zero))))
         return np.asarray(signal.reshape(self.size, -1).T)
-
-    def _shape(self, measure: Measure) -> tuple[int, ...]:
-        zero = np.zeros((self.size, 1))
-        return signal_of(measure, RunResponse(self.base, zero, zero)).shape
 
     def _lowest(self, name: str) -> Array:
         return np.asarray(self._model.at(name, self._model.lower[None])[0])

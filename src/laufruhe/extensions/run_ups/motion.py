@@ -21,7 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.dampers import Maps, Roots, mapped, pairs_of, roots
+from laufruhe.extensions.run_ups.dampers import mapped, pairs_of, roots
 from laufruhe.extensions.run_ups.matrices import RunMatrices
 from laufruhe.extensions.run_ups.moments import MOMENTS
 from laufruhe.numerics.arrays import Array, Mask
@@ -36,7 +36,6 @@ MIN_STIFFNESS = 1e3 * FREE_STIFFNESS
 MAX_CONDITION = 1e8
 
 
-@dataclass(frozen=True, eq=False)
 class MotionEquations:
     """Equations of motion on boxes, in the modes of their middles; y has the unit 1 / `scale`.
 
@@ -54,80 +53,51 @@ class MotionEquations:
         K at the lower vertex, shape (boxes, n, n).
     growth_rates
         Largest growth rate of a motion by negative damping [1/s], shape (boxes,).
-    known
-        Mask of the boxes with valid bounds, shape (boxes,).
+    known, count
+        Mask of the boxes with valid bounds, shape (boxes,), and count of boxes.
+
+    Parameters
+    ----------
+    lower, upper
+        Bounds of the boxes, shape (boxes, open numbers).
     """
 
-    scale: float
-    above: Array
-    halves: Array
-    turn: Array
-    roots: Roots
-    maps: Maps
-    matrix: Array
-    first: Array
-    second: Array
-    load: Array
-    softest: Array
-    growth_rates: Array
-    known: Mask
-
-    @property
-    def count(self) -> int:
-        """Count of boxes."""
-        return len(self.halves)
-
-
-def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> MotionEquations:
-    """Return the equations of motion on boxes with bounds of shape (boxes, open numbers)."""
-    above, halves, n = 0.5 * (lower + upper) - model.lower, 0.5 * (upper - lower), matrices.size
-    squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
-    lower_eigenvalues, upper_eigenvalues = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
-    is_restrained = lower_eigenvalues[:, 0] > MIN_STIFFNESS * upper_eigenvalues[:, -1]
-    turn = np.zeros((len(lower), n, n)) + np.eye(n)
-    turn[:, :6, :6] = modes
-    slopes = np.swapaxes(modes, 1, 2)[:, None] @ (halves[:, :, None, None] * model.slopes["stiffness"]) @ modes[:, None]
-    root_maps = roots(np.where(is_restrained[:, None], squares, 1.0), slopes, n)
-    maps = mapped(matrices.motion, above, halves, turn, root_maps, True)
-    uneven_maps = mapped(matrices.uneven_loss, above, halves, turn, root_maps, True)
-    corner = np.swapaxes(modes, 1, 2) @ model.stiffness(lower) @ modes
-    first = -np.concatenate([maps.positions / scale, maps.rates], axis=-1)
-    second = -np.concatenate([np.zeros_like(maps.bends), maps.bends], axis=-1)
-    zeros = np.zeros((len(lower), n, n))
-    matrix = np.block([[zeros, zeros + scale * np.eye(n)], [-maps.position / scale, -maps.rate]])
-    softest = maps.position - maps.positions.sum(axis=1)
-    is_restrained &= np.linalg.eigvalsh(softest)[:, 0] > 0.0
-    load = np.swapaxes(turn, 1, 2) @ matrices.base.load
-    drives = _drives(uneven_maps, matrices.loss_factor * _root(corner))
-    return MotionEquations(
-        scale, above, halves, turn, root_maps, maps, matrix, _force_rows(first), _force_rows(second),
-        np.pad(load, [(0, 0), (n, 0), (0, 0)]), softest, drives, is_restrained & _is_resolved(matrix, scale),
-    )  # fmt: skip
+    def __init__(self, model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> None:
+        self.scale, self.above, self.halves = scale, 0.5 * (lower + upper) - model.lower, 0.5 * (upper - lower)
+        self.count, n, halves = len(lower), matrices.size, self.halves
+        squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
+        lower_eigenvalues, upper_eigenvalues = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
+        is_restrained = lower_eigenvalues[:, 0] > MIN_STIFFNESS * upper_eigenvalues[:, -1]
+        self.turn = turn = np.zeros((len(lower), n, n)) + np.eye(n)
+        turn[:, :6, :6] = modes
+        change = halves[:, :, None, None] * model.slopes["stiffness"]
+        slopes = np.swapaxes(modes, 1, 2)[:, None] @ change @ modes[:, None]
+        self.roots = roots(np.where(is_restrained[:, None], squares, 1.0), slopes, n)
+        self.maps = maps = mapped(matrices.motion, self.above, halves, turn, self.roots, True)
+        zeros = np.zeros((len(lower), n, n))
+        self.matrix = np.block([[zeros, zeros + scale * np.eye(n)], [-maps.position / scale, -maps.rate]])
+        self.first = _force_rows(-np.concatenate([maps.positions / scale, maps.rates], axis=-1))
+        self.second = _force_rows(-np.concatenate([np.zeros_like(maps.bends), maps.bends], axis=-1))
+        self.load = np.pad(np.swapaxes(turn, 1, 2) @ matrices.base.load, [(0, 0), (n, 0), (0, 0)])
+        self.softest = maps.position - maps.positions.sum(axis=1)
+        uneven_maps = mapped(matrices.uneven_loss, self.above, halves, turn, self.roots, True)
+        corner, corner_modes = np.linalg.eigh(np.swapaxes(modes, 1, 2) @ model.stiffness(lower) @ modes)
+        root = (corner_modes * np.sqrt(np.maximum(corner, 0.0))[:, None]) @ np.swapaxes(corner_modes, 1, 2)
+        uneven = uneven_maps.rate[:, :6, :6]
+        common = matrices.loss_factor * root
+        smallest = np.linalg.eigvalsh(0.5 * (uneven + np.swapaxes(uneven, 1, 2)) + common)[:, 0]
+        changes = np.linalg.norm(uneven_maps.rates, axis=(-2, -1)).sum(axis=1)
+        changes = changes + np.linalg.norm(uneven_maps.bent, axis=(-2, -1))
+        self.growth_rates = np.maximum(changes - smallest, 0.0)
+        # the exact model takes steps in modes only if they are distinct
+        units = np.repeat([scale, 1.0], n)
+        shapes = np.linalg.eig(self.matrix / units[:, None] * units)[1]
+        is_resolved = np.linalg.cond(shapes) <= MAX_CONDITION
+        self.known: Mask = is_restrained & (np.linalg.eigvalsh(self.softest)[:, 0] > 0.0) & is_resolved
 
 
 def _force_rows(forces: Array) -> Array:
     return np.concatenate([np.zeros_like(forces), forces], axis=-2)
-
-
-def _root(matrices: Array) -> Array:
-    squares, modes = np.linalg.eigh(matrices)
-    return np.asarray((modes * np.sqrt(np.maximum(squares, 0.0))[:, None]) @ np.swapaxes(modes, 1, 2))
-
-
-def _drives(uneven_maps: Maps, common_loss: Array) -> Array:
-    uneven = uneven_maps.rate[:, :6, :6]
-    smallest = np.linalg.eigvalsh(0.5 * (uneven + np.swapaxes(uneven, 1, 2)) + common_loss)[:, 0]
-    change = np.linalg.norm(uneven_maps.rates, axis=(-2, -1)).sum(axis=1) + np.linalg.norm(
-        uneven_maps.bent, axis=(-2, -1)
-    )
-    return np.asarray(np.maximum(change - smallest, 0.0))
-
-
-def _is_resolved(matrix: Array, scale: float) -> Mask:
-    n = matrix.shape[-1] // 2
-    units = np.repeat([scale, 1.0], n)
-    shapes = np.linalg.eig(matrix / units[:, None] * units)[1]
-    return np.asarray(np.linalg.cond(shapes) <= MAX_CONDITION)
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,11 +124,8 @@ class Steps:
     def __init__(self, box_equations: MotionEquations, step: float, orders: bool = True) -> None:
         self.equations, self.step = box_equations, step
         self.pairs = pairs_of(box_equations.halves.shape[1]) if orders else []
-        first, second = (
-            (box_equations.first, box_equations.second)
-            if orders
-            else (box_equations.first[:, :0], box_equations.second[:, :0])
-        )
+        count = None if orders else 0
+        first, second = box_equations.first[:, :count], box_equations.second[:, :count]
         identity = np.zeros_like(box_equations.matrix) + np.eye(box_equations.matrix.shape[-1])
         powers = [identity, np.zeros_like(first), np.zeros_like(second)]
         moves = [np.zeros_like(power) for power in powers]
@@ -167,24 +134,20 @@ class Steps:
             for load_powers, sums, power in zip(loads, moves, powers, strict=True):
                 sums += power * (step**k / math.factorial(k))
                 load_powers.append(power @ (box_equations.load if power.ndim == 3 else box_equations.load[:, None]))
-            powers = self._next(powers, first, second)
+            power, first_power, second_power = powers
+            a = box_equations.matrix[:, None]
+            powers = [
+                box_equations.matrix @ power,
+                a @ first_power + first @ power[:, None],
+                a @ second_power + second @ power[:, None],
+            ]
+            for number, (i, j) in enumerate(self.pairs):
+                powers[2][:, number] += first[:, i] @ first_power[:, j]
+                if i != j:
+                    powers[2][:, number] += first[:, j] @ first_power[:, i]
         self.moves = moves
         # columns: components of the wrench for each moment
         self.loads = [np.concatenate(power, axis=-1) for power in loads]
-
-    def _next(self, powers: list[Array], first: Array, second: Array) -> list[Array]:
-        power, first_power, second_power = powers
-        a = self.equations.matrix[:, None]
-        next_powers = [
-            self.equations.matrix @ power,
-            a @ first_power + first @ power[:, None],
-            a @ second_power + second @ power[:, None],
-        ]
-        for number, (j, k) in enumerate(self.pairs):
-            next_powers[2][:, number] += first[:, j] @ first_power[:, k]
-            if j != k:
-                next_powers[2][:, number] += first[:, k] @ first_power[:, j]
-        return next_powers
 
     def middle(self, moments: Array) -> Array:
         """Return z0 from rest under moments of shape (boxes, moments x 6, steps), shape (boxes, 2 n, steps + 1)."""
@@ -259,16 +222,14 @@ def _between(
     A curve leaves its chord by at most an eighth of the squared step times its largest second derivative. |y'| of the
     middle, whose load jumps, differs from that of the nearer end by at most half a step times its derivative.
     """
-    matrix_norm, first_norm = (
-        np.linalg.norm(matrix, 2, axis=(-2, -1)).reshape(box_equations.count, -1)
-        for matrix in (box_equations.matrix, box_equations.first)
+    spectral, frobenius = (
+        (box_equations.matrix, box_equations.first),
+        (box_equations.second, box_equations.maps.remainder),
     )
-    second_norm, rest_norm = (
-        np.linalg.norm(matrix, axis=(-2, -1)).reshape(box_equations.count, -1)
-        for matrix in (box_equations.second, box_equations.maps.remainder)
-    )
+    norms = [np.linalg.norm(matrix, 2, axis=(-2, -1)) for matrix in spectral]
+    norms += [np.linalg.norm(matrix, axis=(-2, -1)) for matrix in frobenius]
     matrix_norm, first_norm, second_norm, rest_norm = (
-        matrix.sum(axis=1)[:, None] for matrix in (matrix_norm, first_norm, second_norm, rest_norm)
+        norm.reshape(box_equations.count, -1).sum(axis=1)[:, None] for norm in norms
     )
     sizes = [np.linalg.norm(matrix[..., :-1], axis=-2) for matrix in (middle, first, second)]
     grown = np.exp(matrix_norm * step)

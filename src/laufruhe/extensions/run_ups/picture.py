@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
-from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_of_design, runs_up
+from laufruhe.extensions.run_ups.section import run_of, run_point, runs_of_design, runs_up
 from laufruhe.plots.speed_axis import LIMIT, limits_on
 from laufruhe.plots.style import entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import INK

@@ -1,4 +1,4 @@
-"""Report section of run-up and shut-down: largest force, travel and roll."""
+"""Report section and picture of run-up and shut-down: largest force, travel and roll."""
 
 from __future__ import annotations
 
@@ -7,16 +7,54 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_of_design, runs_up
 from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import RunUp, point_of, runs_of
+from laufruhe.machine import OperatingPoint
 from laufruhe.present.measures import designs_with_loads, has_loads
+from laufruhe.present.mounting import critical_speed, excited_frequencies, facts_of, is_elastic, main_order
 from laufruhe.present.numbers import RPM, figure
+from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 from laufruhe.units import quantity_text
 
+SECONDS = 3.0
+"""Default time of run-up and of shut-down [s]."""
+# largest critical speed in a run, over the highest operating speed; end speed of a run, over its last critical speed
+REACH_OVER, BEYOND = 5.0, 1.5
 HEAD = ("", "time", "largest force", "largest travel", "largest roll")
+
+
+def runs_up(result: Result) -> bool:
+    """Return True if the design has elastic mounts with a time model, so that it can run up."""
+    return is_elastic(result) and mounting_in(result.final.engine).dynamic.has_law
+
+
+def run_of(result: Result) -> Run:
+    """Return the run of the problem; by default one of SECONDS each way, beyond all critical speeds near the points."""
+    run = result.problem.engine.extra(Run)
+    if run is not None:
+        return run
+    facts = facts_of(result.final)
+    highest_speed = max(point.speed for point in result.problem.points)
+    critical = [critical_speed(frequency, main_order(facts)) for frequency in excited_frequencies(facts)]
+    end_speed = BEYOND * max(
+        (speed for speed in critical if speed <= REACH_OVER * highest_speed), default=highest_speed
+    )
+    return Run(end_speed, SECONDS, SECONDS)
+
+
+def run_point(result: Result) -> OperatingPoint:
+    """Return the operating point whose gas drives the run."""
+    return point_of(run_of(result), result.problem.points)
+
+
+def runs_of_design(result: Result, design: Evaluation) -> tuple[RunUp, RunUp]:
+    """Return run-up and shut-down of a design of a result."""
+    return runs_of(design.engine, run_point(result), design.fidelity, run_of(result))
 
 
 def _tables(result: Result) -> list[Table]:
@@ -68,3 +106,8 @@ SECTION = Section(
     "run_up", runs_up, _tables, _record, ("through-resonance",),
     {"run-up": (lambda result: runs_up(result) and has_loads(result), _over_speed)},
 )  # fmt: skip
+PICTURE = ResultPicture(
+    "run_up",
+    "Largest force and travel on any mount, and roll, while the engine runs up and is shut down.",
+    "laufruhe.extensions.run_ups.picture",
+)

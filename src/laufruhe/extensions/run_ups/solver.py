@@ -8,24 +8,22 @@ of a run (E28a). With open mounts or bump stops, a smooth program has the peaks 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.run_ups.cones import solve_run_cones
-from laufruhe.extensions.run_ups.rows import RunRows
+from laufruhe.extensions.run_ups.cones import Decide, RunRows, solve_run_cones
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import quote_names, violated_limits, with_constant_limits
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 
 _LINEAR = frozenset({Kind.UNBALANCE, Kind.SHARE})
 _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
-Decide = Callable[[Problem], Result]
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
@@ -82,8 +80,14 @@ def _run_result(
     decide: Decide,
 ) -> Result | None:  # fmt: skip
     """Return the result of a method for run-ups; None if there is no such method."""
-    if problem.phasing is not None:
-        return _solve_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
+    phasing = problem.phasing
+    if phasing is not None:
+        has_stops = any(spring.stop_gap < math.inf for _, spring in every_spring(problem.engine.mounts))
+        if phasing.continuous or has_stops or not kinds <= _LINEAR | {Kind.STAR}:
+            return None
+        return solve_every_order(
+            problem, phasing, even_stars(phasing), lambda star_problem, _: decide(replace(star_problem, phasing=None))
+        )
     rows = RunRows.from_problem(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)
@@ -92,11 +96,3 @@ def _run_result(
     from laufruhe.extensions.run_ups.mounts import solve_run_mounts
 
     return solve_run_mounts(problem, relaxed)
-
-
-def _solve_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
-    if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
-        return None
-    return solve_every_order(
-        problem, phasing, even_stars(phasing), lambda star_problem, _: decide(replace(star_problem, phasing=None))
-    )
