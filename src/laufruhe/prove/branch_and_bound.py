@@ -32,18 +32,9 @@ MAX_PLACES = 3
 
 
 class OpenNode(NamedTuple, Generic[P]):
-    """A part that may be divided.
+    """Set of designs that may be divided, with its lower bound [SI] and a sequence number.
 
     Nodes are ordered by bound, then by number, so that the earlier of two nodes with equal bounds comes first.
-
-    Attributes
-    ----------
-    bound
-        Lower bound of the objective over the part [SI].
-    number
-        Sequence number, which identifies the node.
-    part
-        Set of designs.
     """
 
     bound: float
@@ -140,8 +131,7 @@ class BranchAndBound(Generic[P]):
         Returns
         -------
         float
-            Lower bound of the objective over all designs [SI]: the lowest bound of all parts that remain or were
-            fathomed. Nothing lowers it to the value of the incumbent.
+            The lowest bound of all parts that remain or were fathomed [SI]. Nothing lowers it to that of the incumbent.
         """
         self.open_nodes, self.node_count, self._minimum = [], 1, math.inf
         if isinstance(root, FathomedPart):
@@ -186,14 +176,10 @@ class BranchAndBound(Generic[P]):
 
 
 class Box(NamedTuple):
-    """Box of open numbers.
+    """Box of open numbers between bounds of shape (n,), with the index of the side to halve.
 
     Attributes
     ----------
-    lower, upper
-        Bounds, shape (n,).
-    side
-        Index of the side to halve.
     narrows
         Whether the halves are worth narrowing before they are bounded.
     """
@@ -207,12 +193,7 @@ class Box(NamedTuple):
 def halves(box: Box, cut: float | None = None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
     """Cut a box across its side, and return the bounds (lower, upper) of both parts.
 
-    Parameters
-    ----------
-    box
-        Box with the side to cut.
-    cut
-        Position of the cut on the side, moved at least `CUT_MARGIN` away from its ends; the middle if None.
+    The cut is the middle, or a position moved at least `CUT_MARGIN` away from the ends of the side.
     """
     is_side, low, high = np.arange(len(box.lower)) == box.side, box.lower[box.side], box.upper[box.side]
     margin = CUT_MARGIN * (high - low)

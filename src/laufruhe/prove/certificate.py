@@ -155,15 +155,7 @@ class Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Dual rows of an affine problem.
-
-    Attributes
-    ----------
-    terms
-        Z of every term of the objective, shape (k, d) each.
-    limits
-        Multiplier times Z, mu Z, of every limit, shape (k, d) each.
-    """
+    """Dual rows of an affine problem: Z of terms, and mu Z of limits with multipliers mu, shape (k, d) each."""
 
     terms: tuple[Array, ...]
     limits: tuple[Array, ...]
@@ -175,17 +167,7 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class Minorant:
-    """Affine function constant + gradient . x that no feasible design's objective is below.
-
-    Attributes
-    ----------
-    constant
-        Value at the zero decision vector [SI].
-    gradient
-        Gradient in the decision vector, shape (n,).
-    multipliers
-        Dual rows that give the function.
-    """
+    """Affine function constant + gradient . x that no feasible design's objective is below, and its dual rows."""
 
     constant: float
     gradient: Array
@@ -202,12 +184,7 @@ class Bound(Minorant):
 def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
     """Return the affine lower bound of the objective that multipliers give, valid for every feasible x (P4).
 
-    Parameters
-    ----------
-    problem
-        Norms on the grid of samples on which the bound is to hold.
-    multipliers
-        Any dual rows on that grid; the rows of terms are scaled into the dual unit ball.
+    The multipliers are any dual rows on the grid of the problem; those of terms are scaled into the dual unit ball.
     """
     norms = [norm for _, norm in (*problem.terms, *problem.limits)]
     gradient, constant = np.zeros(norms[0].slope.shape[-1] if norms else problem.size), 0.0
@@ -235,7 +212,7 @@ def is_moved(norm: AffineNorm) -> bool:
 
 
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
-    """Return the lower bound of the objective that multipliers give (P4); `minorant` has the same parameters."""
+    """Return the lower bound of the objective that any dual rows on the grid of the problem give (P4)."""
     affine = minorant(problem, multipliers)
     minimum = affine.constant + sum(domain.minimum(affine.gradient) for domain in problem.domains)
     # a sum of norms is never negative

@@ -28,11 +28,9 @@ def corners_of(count: int) -> Array:
 
 @lru_cache(maxsize=8)
 def mixed(count: int) -> Array:
-    """Return the map from quadratics at vertices to Bernstein coefficients of their multilinear mixture.
+    """Return the map from quadratics by (1, s, s s') at vertices to coefficients of their multilinear mixture.
 
-    Returns
-    -------
-    Shape (4^n, 2^n, 1 + n + n^2), for quadratics by (1, s, s s').
+    Its shape is (4^n, 2^n, 1 + n + n^2), and the coefficients are those of Bernstein polynomials.
     """
     unit = np.eye(count, dtype=int)
     powers = [np.zeros(count, dtype=int), *unit, *(first + second for first in unit for second in unit)]

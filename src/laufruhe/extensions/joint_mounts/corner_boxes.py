@@ -99,11 +99,6 @@ class DesignBoxes:
         Mounts and columns of the incumbent if a vertex improved it.
     lower, upper
         Bounds of the open numbers of the mounts, shape (n,).
-
-    Parameters
-    ----------
-    exact_objective
-        Exact objective of a design; infinite if it violates a limit.
     """
 
     what, batch_size = "boxes of mounts, with unbalances", 2

@@ -82,18 +82,14 @@ def load_bounds(
     problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None,
     throws: OpenThrows | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance`.
+    """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance` [SI].
 
     Parameters
     ----------
-    value, gap_tolerance
-        Objective of the incumbent, and absolute gap tolerance [SI].
     shares
         Shares of the box budget, one bound after each.
     witness
         Incumbent by numbers of mounts, columns of unbalances and open throws, to check bounds.
-    throws
-        Open throws.
     """
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return
@@ -120,17 +116,12 @@ def _is_bounded(measure: Measure, problem: Problem, turns: bool = False) -> bool
 class LoadBoxes:
     """Lower bounds over boxes of mounts, unbalances and throws.
 
+    Omitted small orders may add up to `left_out` of the objective [SI].
+
     Attributes
     ----------
     lower, upper
         Bounds of the open numbers of the mounts, the columns of the unbalances, and the open throws, shape (n,).
-
-    Parameters
-    ----------
-    left_out
-        Part of the objective that omitted small orders may add up to [SI].
-    throws
-        Open throws.
     """
 
     what = "boxes of mounts and unbalances"

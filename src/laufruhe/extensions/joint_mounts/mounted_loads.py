@@ -43,7 +43,7 @@ class Pairing:
 
 
 class MountedLoads:
-    """Loads of a problem with open unbalances and open mounts.
+    """Loads of a problem with open unbalances and open mounts; loads of open throws are separate from the fixed ones.
 
     Attributes
     ----------
@@ -53,11 +53,6 @@ class MountedLoads:
         Domains of the open unbalances.
     root
         Map to coordinates with unit mass, transposed, shape (6, 6).
-
-    Parameters
-    ----------
-    throws
-        Open throws; their loads are then separate from the fixed ones.
     """
 
     def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
@@ -157,15 +152,7 @@ class MountedLoads:
         return signals
 
     def pairing(self, problem: AffineProblem, multipliers: Multipliers) -> Pairing:
-        """Return the lower bound for any mounts, by multipliers of the unbalances for some mounts.
-
-        Parameters
-        ----------
-        problem
-            Norms for these mounts, from `at`.
-        multipliers
-            Multipliers of its terms and limits.
-        """
+        """Return the lower bound for any mounts, by multipliers of the problem `at` some mounts."""
         scaled = minorant(problem, multipliers).multipliers
         terms = zip(self.problem.load_terms, problem.terms, scaled.terms, strict=True)
         limits = zip(self.problem.load_limits, problem.limits, scaled.limits, strict=True)

@@ -30,15 +30,7 @@ MARGIN = 1e-3
 
 
 class RunBoxes:
-    """Lower bounds of run-ups over boxes of stiffness, if nothing else is open (E65).
-
-    Parameters
-    ----------
-    model
-        Model of the boxes.
-    measures
-        Measures of run-ups.
-    """
+    """Lower bounds of measures of run-ups over boxes of stiffness, if nothing else is open (E65)."""
 
     def __init__(self, model: BoxModel, measures: Sequence[Measure]) -> None:
         self._model, self._matrices, self.measures = model, RunMatrices(model), tuple(measures)
@@ -121,13 +113,7 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
 
 
 class _RunBounds:
-    """Lower bounds of one run on boxes.
-
-    Parameters
-    ----------
-    maps, d
-        Maps from motion to the signal of a measure, and its rows for each place.
-    """
+    """Lower bounds of one run on boxes, from maps of its motion to a signal with `d` rows for each place."""
 
     def __init__(self, box_equations: MotionEquations, run: RunMoments, maps: Maps, d: int) -> None:
         self._equations, self._run, self._maps, self._d = box_equations, run, maps, d

@@ -38,10 +38,7 @@ NEAR = 0.98
 class RunRows:
     """Rows of each step of run-up and shut-down, affine in the unbalances.
 
-    Attributes
-    ----------
-    constants, slopes
-        By measure, shapes (steps, places, d) and (steps, places, d, n).
+    By measure, constants have the shape (steps, places, d), and slopes the shape (steps, places, d, n).
     """
 
     constants: dict[Measure, Array]

@@ -22,14 +22,9 @@ from laufruhe.numerics.arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """Matrix that is linear in the open numbers.
+    """Matrix that is linear in the open numbers, with its value at their lower bounds, shape (r, n).
 
-    Attributes
-    ----------
-    lowest
-        Matrix at the lower bounds of all open numbers, shape (r, n).
-    slopes
-        Derivatives by each open number, shape (open numbers, r, n).
+    Its slopes by the open numbers have the shape (open numbers, r, n).
     """
 
     lowest: Array

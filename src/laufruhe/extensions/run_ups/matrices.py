@@ -23,10 +23,7 @@ Rows: TypeAlias = tuple[LinearMaps, int]
 class RunMatrices:
     """Matrices of run-ups as functions of open stiffnesses; coordinates of fluid tracks follow those of the block.
 
-    Attributes
-    ----------
-    base
-        Time model with all stiffnesses at their lower bounds, without bump stops.
+    The time model `base` has all stiffnesses at their lower bounds, and no bump stops.
     """
 
     def __init__(self, model: BoxModel) -> None:

@@ -42,12 +42,10 @@ class LongSteps:
 
 
 class RunMoments:
-    """Moments of one run.
+    """Moments of one run in long steps, each of several short ones.
 
     Parameters
     ----------
-    sweep
-        Short steps of the run.
     wrenches
         Wrenches as `Sweep.wrenches` returns them.
     load

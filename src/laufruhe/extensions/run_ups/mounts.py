@@ -32,10 +32,7 @@ STARTS, STOPPED_STARTS = 6, 3
 def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     """Return the best local optimum of several starts, with a lower bound.
 
-    Parameters
-    ----------
-    relaxed
-        Result without run-ups: one start, and a lower bound.
+    The result without run-ups, `relaxed`, gives a start and a lower bound.
     """
     started = time.perf_counter()
     initial = evaluate_start(problem)

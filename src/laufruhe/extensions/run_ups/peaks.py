@@ -34,16 +34,9 @@ STEP, MIN_SHARE = 1e-5, 0.1
 
 
 class RunPeaks:
-    """Peaks of measures, one measure after the other.
+    """Peaks of measures of run-ups, one measure after the other, on elastic mounts with open numbers and unbalances.
 
-    Parameters
-    ----------
-    problem
-        Problem with a run on elastic mounts; numbers of mounts and unbalances are open.
-    measures
-        Measures of run-ups.
-    coarser
-        Factor by which steps are longer than in a final evaluation. Above 1 peaks are interpolated between steps.
+    Steps are `coarser` times as long as in a final evaluation. Above 1 peaks are interpolated between steps.
     """
 
     def __init__(self, problem: Problem, measures: Sequence[Measure], coarser: int = 1) -> None:

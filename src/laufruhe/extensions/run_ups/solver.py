@@ -27,14 +27,9 @@ _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
-    """Return the optimum of a problem with run-ups in objective or limits.
+    """Return the optimum of a problem with run-ups in objective or limits, over these kinds of open numbers.
 
-    Parameters
-    ----------
-    kinds
-        Kinds of the open numbers.
-    decide
-        Function that solves a problem without run-ups.
+    The function `decide` solves a problem without run-ups.
 
     Raises
     ------

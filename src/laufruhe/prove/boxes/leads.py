@@ -40,12 +40,10 @@ SLACK = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class LeadBound:
-    """Bound of a box.
+    """Bound of a box, infinite if no design is feasible.
 
     Attributes
     ----------
-    value
-        Lower bound of the objective in the box; infinite if no design is feasible.
     at_middle
         Lower bound at the middle of the box.
     pull
@@ -80,13 +78,7 @@ class _SecondDerivative:
 
 
 class LeadBoxes:
-    """Bounds of boxes of leads.
-
-    Parameters
-    ----------
-    model
-        Model of a problem with open leads, and perhaps open unbalances.
-    """
+    """Bounds of boxes of leads, for a model with open leads and perhaps open unbalances."""
 
     def __init__(self, model: PhaseLeadModel) -> None:
         self.model = model

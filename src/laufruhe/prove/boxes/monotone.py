@@ -42,14 +42,9 @@ class Monotone:
 
 @dataclass(frozen=True, eq=False)
 class MonotoneProblem:
-    """Minimise a weighted sum of monotone functions under limits on others.
+    """Minimise a weighted sum of monotone functions under limits on others, between bounds of shape (n,).
 
-    Attributes
-    ----------
-    terms, limits
-        Pairs (weight, function) and (maximum, function).
-    lower, upper
-        Bounds of the open numbers, shape (n,).
+    Terms are pairs of weight and function, and limits pairs of maximum and function.
     """
 
     terms: tuple[tuple[float, Monotone], ...]
@@ -112,18 +107,7 @@ def bisect_monotone(
 ) -> BoxResult:  # fmt: skip
     """Halve boxes until none can hold a design better than `value` by more than the gap tolerance (T9).
 
-    Parameters
-    ----------
-    problem
-        Monotone functions and bounds of the open numbers.
-    value
-        Objective of the incumbent [SI]; infinite if there is none.
-    gap_tolerance
-        Improvement that counts as none [SI].
-    max_boxes
-        Largest number of boxes.
-    witness
-        Incumbent, to check bounds; None without one.
+    The objective `value` of the incumbent is infinite without one. Without a witness, bounds are not checked.
     """
     boxes = _MonotoneBoxes(problem, value, gap_tolerance, witness)
     if witness is not None:

@@ -70,12 +70,7 @@ class _Travel:
 def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
     """Return an upper bound of the change of torque of a shared chamber [N m], on cells from the dead centre of `part`.
 
-    Parameters
-    ----------
-    part
-        The piston with a fixed crank.
-    half
-        Largest change of the lead of the other piston [rad].
+    The crank of `part` is fixed, and the lead of the other piston changes by at most `half` [rad].
     """
     facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(facing, Facing)

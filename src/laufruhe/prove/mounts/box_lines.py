@@ -47,14 +47,7 @@ class LinearRelaxation:
     def add(self, weight: float, minimum: LinearBound, left_out: float = 0.0) -> None:
         """Add a weighted term to the objective, or zero on boxes where its bound is not positive.
 
-        Parameters
-        ----------
-        weight
-            Weight of the term.
-        minimum
-            Lower bound of the term.
-        left_out
-            Largest effect of omitted orders on the term [SI].
+        The largest effect of omitted orders on the term is `left_out` [SI].
         """
         value = minimum.value - minimum.remainder - left_out
         is_positive = np.isfinite(value) & (value > 0.0)
@@ -62,16 +55,9 @@ class LinearRelaxation:
         self.slopes = self.slopes + weight * np.where(is_positive[:, None], minimum.slopes, 0.0)
 
     def add_limit(self, minimum: LinearBound, left_out: float, maximum: float) -> None:
-        """Add the limit of a measure to at most `maximum`.
+        """Add the limit of a measure to at most `maximum` [SI].
 
-        Parameters
-        ----------
-        minimum
-            Lower bound of the measure.
-        left_out
-            Largest effect of omitted orders on the measure [SI].
-        maximum
-            Limit [SI].
+        The largest effect of omitted orders on the measure is `left_out` [SI].
         """
         unit = maximum or 1.0
         violation = (minimum.value - minimum.remainder - left_out - maximum) / unit

@@ -78,15 +78,7 @@ def lower_bound_of_norm(model: BoxModel, measure: Measure, lines: LoadedOrders, 
 
 
 def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
-    """Return a linear lower bound of a norm of responses on every box (E38).
-
-    Parameters
-    ----------
-    answer
-        Forces or travel of the mounts that count, r = 3 mounts.
-    lines
-        Orders of the responses.
-    """
+    """Return a linear lower bound of a norm of responses at the mounts that count, r = 3 mounts, on every box (E38)."""
     share, weights = measure.shares(problem.points), line_weights(problem, measure, lines)
     if measure.norm.is_euclidean:
         return root_under(answer, weights)

@@ -88,14 +88,7 @@ def is_travel(channel: Channel) -> bool:
 
 
 class BoxModel:
-    """Matrices of a problem whose only open numbers are stiffnesses.
-
-    Parameters
-    ----------
-    problem
-        Problem on elastic mounts.
-    evaluation
-        Evaluation of any design: all designs have its wrenches.
+    """Matrices of a problem on elastic mounts whose only open numbers are stiffnesses; all designs have its wrenches.
 
     Attributes
     ----------

@@ -52,16 +52,9 @@ THROW_DEVIATION = 0.02
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """A design, and the local optimum from which it was computed.
+    """A design by the exact model, and the local optimum of a smooth program from which it was computed.
 
-    Attributes
-    ----------
-    design
-        Design by the exact model.
-    joint
-        Smooth program of mounts, unbalances and throws together.
-    optimum
-        Local optimum of the program; None if the design was only evaluated.
+    The optimum is None if the design was only evaluated.
     """
 
     design: Design
@@ -75,12 +68,10 @@ class SearchResult:
 
 
 class MountSearch:
-    """Multistart search of open mounts.
+    """Multistart search of open mounts, with one crank star and one firing order.
 
     Parameters
     ----------
-    problem
-        Problem with one crank star and one firing order.
     initial
         Evaluation of the initial design, which competes with the results.
     workers

@@ -64,17 +64,10 @@ def _minimum_value(designs: list[StarDesign]) -> float:
 def solve_star_mounts(problem: Problem) -> Result:
     """Return the best of the stars, each with its optimal mounts and unbalances (E35).
 
-    Parameters
-    ----------
-    problem
-        Problem on elastic mounts with open throws, firing order or optional shafts.
-
     Raises
     ------
     ModelError
         If there are too many stars to list.
-    SolverError
-        If a solver stops without a result.
     """
     phasing = problem.phasing
     if phasing is None:

@@ -51,17 +51,7 @@ def _most_starts(problem: Problem) -> int:
 
 
 def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
-    """Return the points of a Latin hypercube, shape (count, n).
-
-    Parameters
-    ----------
-    lower, upper
-        Bounds, shape (n,) each.
-    count
-        Number of points.
-    seed
-        Seed of the random numbers.
-    """
+    """Return the points of a Latin hypercube between bounds of shape (n,), shape (count, n)."""
     generator = np.random.default_rng(seed)
     cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
     return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
