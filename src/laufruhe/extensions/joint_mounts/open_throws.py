@@ -75,10 +75,8 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
     )
     if phasing.throw_bounds is None or is_unsupported:
         return None
-    realised, weights_on_throws = (
-        with_default_sampling(replace(phasing.realise(candidate), phasing=None)),
-        rotor_throws_of(phasing, candidate),
-    )
+    realised = with_default_sampling(replace(phasing.realise(candidate), phasing=None))
+    weights_on_throws = rotor_throws_of(phasing, candidate)
     if any(drive.rotor in weights_on_throws for decision in realised.decisions for drive in decision.rotor_drives):
         return None
     lower, upper = np.transpose(phasing.throw_bounds)

@@ -61,10 +61,8 @@ class RunMatrices:
     def uneven_loss(self) -> LinearMaps:
         """Loss less that of the common loss factor."""
         loss, stiffness = self.motion.lossy, self._square("stiffness")
-        lowest, slopes = (
-            loss.lowest - self.loss_factor * stiffness.lowest,
-            loss.slopes - self.loss_factor * stiffness.slopes,
-        )
+        lowest = loss.lowest - self.loss_factor * stiffness.lowest
+        slopes = loss.slopes - self.loss_factor * stiffness.slopes
         zero = Linear(np.zeros_like(lowest), np.zeros_like(slopes))
         return LinearMaps(zero, Linear(lowest, slopes), zero)
 

@@ -222,10 +222,8 @@ def _between(
     A curve leaves its chord by at most an eighth of the squared step times its largest second derivative. |y'| of the
     middle, whose load jumps, differs from that of the nearer end by at most half a step times its derivative.
     """
-    spectral, frobenius = (
-        (box_equations.matrix, box_equations.first),
-        (box_equations.second, box_equations.maps.remainder),
-    )
+    spectral = (box_equations.matrix, box_equations.first)
+    frobenius = (box_equations.second, box_equations.maps.remainder)
     norms = [np.linalg.norm(matrix, 2, axis=(-2, -1)) for matrix in spectral]
     norms += [np.linalg.norm(matrix, axis=(-2, -1)) for matrix in frobenius]
     matrix_norm, first_norm, second_norm, rest_norm = (

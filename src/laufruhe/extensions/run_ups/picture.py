@@ -35,10 +35,8 @@ def figure(result: Result) -> Figure:
                     envelope.speeds * RPM, factors[k] * values, color=series.colour, linestyle=style, linewidth=1.4
                 )
                 maximum[k] = max(maximum[k], factors[k] * float(values.max(initial=0.0)))
-        force, travel = (
-            max(envelope_of_run.worst_force for envelope_of_run in runs),
-            max(envelope_of_run.worst_travel for envelope_of_run in runs),
-        )
+        force = max(envelope_of_run.worst_force for envelope_of_run in runs)
+        travel = max(envelope_of_run.worst_travel for envelope_of_run in runs)
         legend.append(series.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
     for axes, (label, channel), factor, panel_maximum in zip(layout.panels, _ROWS, factors, maximum, strict=True):
         limits = [factor * limit.maximum for limit in limits_on(result, channel)]

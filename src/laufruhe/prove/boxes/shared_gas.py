@@ -127,10 +127,8 @@ def _pressed(
     over, steep = np.zeros_like(low), np.zeros_like(low)
     for is_in_stroke, pair, slope in zip(strokes, ends, slopes, strict=True):
         maximum = np.maximum(*(np.abs(pressure - gas.crankcase_pressure) for pressure in pair))
-        over, steep = (
-            np.maximum(over, np.where(is_in_stroke, maximum, 0.0)),
-            np.maximum(steep, np.where(is_in_stroke, slope, 0.0)),
-        )
+        over = np.maximum(over, np.where(is_in_stroke, maximum, 0.0))
+        steep = np.maximum(steep, np.where(is_in_stroke, slope, 0.0))
     return over, steep
 
 

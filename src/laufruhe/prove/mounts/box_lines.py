@@ -116,9 +116,7 @@ class LinearRelaxation:
             best = bounds.argmax(axis=1)[:, None]
             highest = np.take_along_axis(bounds, best, axis=1)[:, 0]
             price = np.where(highest > bound, np.take_along_axis(prices, best, axis=1)[:, 0], 0.0)
-            value, slopes, bound = (
-                value + price * violation,
-                slopes + price[:, None] * gradient,
-                np.maximum(bound, highest),
-            )
+            value = value + price * violation
+            slopes = slopes + price[:, None] * gradient
+            bound = np.maximum(bound, highest)
         return np.asarray(np.maximum(np.where(broken, np.inf, bound), 0.0))

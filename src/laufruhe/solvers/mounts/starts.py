@@ -165,10 +165,8 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
             design = with_mounts(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
         except ModelError:
             continue
-        excess, value = (
-            sum(max(design.check_limit(limit).violation, 0.0) for limit in limits),
-            objective_value(plain, design),
-        )
+        excess = sum(max(design.check_limit(limit).violation, 0.0) for limit in limits)
+        value = objective_value(plain, design)
         if peaks is not None and peaks.is_known:
             violation, objective = _peak_scores(problem, peaks, row)
             excess, value = VIOLATION_WEIGHT * (excess + violation), value + objective
