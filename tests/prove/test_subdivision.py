@@ -24,7 +24,7 @@ from laufruhe.prove.mounts.subdivision import StiffnessBoxes, is_stiffness_probl
 from laufruhe.prove.witness import Witness
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.mounts.places import evaluate_design_at
+from laufruhe.solvers.mounts.starts import evaluate_design_at
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from problem_files import PROBLEMS
 

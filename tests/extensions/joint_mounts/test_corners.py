@@ -23,7 +23,7 @@ from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import TURNED
 from laufruhe.prove.certificate import lower_bound, minorant
-from laufruhe.solvers.mounts.places import design_at_start
+from laufruhe.solvers.mounts.starts import design_at_start
 
 
 @pytest.mark.parametrize("seed", first_fast((780017, 780000, 780004, 780012), 3))

@@ -17,7 +17,7 @@ from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.mounts.places import design_at_start
+from laufruhe.solvers.mounts.starts import design_at_start
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
 EARLY = 0.1

@@ -159,16 +159,21 @@ def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
     blocks = -(-count // BLOCK)
     states = np.zeros((modes, blocks, BLOCK), dtype=complex)
     states.reshape(modes, -1)[:, :count] = driven
-    reach = 1
-    while reach < BLOCK:
-        # doubles the count of steps that each entry includes, within its block
-        states[..., reach:] += (decays**reach)[:, None, None] * states[..., :-reach]
-        reach *= 2
+    accumulate(states, decays[:, None])
     carried, block_decay = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
     for k, block_end in enumerate(np.ascontiguousarray(states[:, :-1, -1].T), 1):
         carried[k] = block_decay * carried[k - 1] + block_end
     states += carried.T[..., None] * decays[:, None, None] ** np.arange(1, BLOCK + 1)
     return states.reshape(modes, -1)[:, :count]
+
+
+def accumulate(states: ComplexArray, decays: ComplexArray) -> None:
+    """Add up driven_k to z_k = decay z_{k-1} + driven_k along the last axis, in place; z is zero before the first."""
+    reach = 1
+    while reach < states.shape[-1]:
+        # doubles the count of steps that each entry includes
+        states[..., reach:] += (decays**reach)[..., None] * states[..., :-reach]
+        reach *= 2
 
 
 @lru_cache
@@ -178,14 +183,17 @@ def _nodes() -> Array:
 
 @lru_cache
 def _quadrature() -> tuple[Array, Array]:
-    nodes = _nodes()
     points, shares = np.polynomial.legendre.leggauss(FINE)
     points = 0.5 * (points + 1.0)
-    bases = np.array([
-        np.prod([(points - other_node) / (node - other_node) for other_node in nodes if other_node != node], axis=0)
-        for node in nodes
-    ])  # fmt: skip
-    return points, np.ascontiguousarray((0.5 * shares * bases).T)
+    return points, np.ascontiguousarray((0.5 * shares * _polynomials(points)).T)
+
+
+def _polynomials(points: Array) -> Array:
+    # L_i, one at Gauss point i and zero at the others, at points within a step of one, shape (Gauss points, points)
+    nodes = _nodes()
+    return np.array(
+        [np.prod([(points - other) / (node - other) for other in nodes if other != node], axis=0) for node in nodes]
+    )
 
 
 @lru_cache
@@ -202,9 +210,4 @@ def largest_share() -> float:
 
     The sum of |L_i| is largest at the ends of the step.
     """
-    nodes = _nodes()
-    ends = [
-        np.prod([(1.0 - other_node) / (node - other_node) for other_node in nodes if other_node != node])
-        for node in nodes
-    ]
-    return float(np.abs(ends).sum())
+    return float(np.abs(_polynomials(np.ones(1))).sum())

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.extensions.run_ups.linear_run import RunResponse, Sweep
@@ -23,7 +22,7 @@ from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.physics.steady_state import integrated, motion_rates, static_size
-from laufruhe.physics.time_model import TimeModel, time_model
+from laufruhe.physics.time_model import time_model
 
 HIGHEST = 12.0
 """Highest order of the loads in a run; higher ones move the block by less than the error between steps."""
@@ -187,7 +186,14 @@ def run_through(
         raise ModelError("a run-up needs a duration and speeds that are not negative")
     model, gain = time_model(mounting), (last - first) / duration
     loads = [(part.orders, part.coefficients @ model.load.T) for part in (inertia, gas) if part is not None]
-    rates = motion_rates(model, _sweeping(loads, first, gain))
+
+    def load(t: float) -> Array:
+        # the first load is inertia, in proportion to the square of the speed
+        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))
+
+    rates = motion_rates(model, load)
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
     state, edges = np.zeros(2 * model.size), np.linspace(0.0, duration, stretches + 1)
     force, travel, twist = np.zeros((3, stretches))
@@ -196,25 +202,9 @@ def run_through(
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, MIN_STEPS), MAX_STEPS))
         states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=absolute)
-        force[k], travel[k], twist[k] = _maximum(model, *np.split(states, 2))
+        y, rate = np.split(states, 2)
+        signals = model.mount_forces(y, rate), model.mount_travels(y)
+        force[k], travel[k] = (np.linalg.norm(signal, axis=-1).max() for signal in signals)
+        twist[k] = np.abs(model.roll @ y).max()
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)
-
-
-def _maximum(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
-    force, travel = model.mount_forces(y, rate), model.mount_travels(y)
-    sizes = (np.linalg.norm(signal, axis=-1).max() for signal in (force, travel))
-    largest_force, largest_travel = (float(size) for size in sizes)
-    return largest_force, largest_travel, float(np.abs(model.roll @ y).max())
-
-
-def _sweeping(
-    loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
-) -> Callable[[float], Array]:
-    # E28: crank speed rises by `gain`; the first load is inertia, in proportion to the square of the speed
-    def load(t: float) -> Array:
-        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]
-        return np.asarray(sum(parts[1:], speed * speed * parts[0]))
-
-    return load

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.linear_run import BLOCK, LinearRun, RunResponse, Sweep
+from laufruhe.extensions.run_ups.linear_run import BLOCK, LinearRun, RunResponse, Sweep, accumulate
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.physics.time_model import TimeModel
 
@@ -131,8 +131,12 @@ def _followed(batch: _DesignBatch, driven: ComplexArray) -> ComplexArray:
     count, z = driven.shape[-1], np.ascontiguousarray(driven[..., 0])
     for start in range(1, count, BLOCK):
         driving_block = driven[..., start : start + BLOCK]
-        free = _free(driving_block, z, batch.decays, powers)
-        if _touches(batch, free) or np.any(batch.pressed(z)):
+        free = np.array(driving_block)
+        accumulate(free, batch.decays)
+        free += powers[..., : free.shape[-1]] * z[..., None]
+        parts = np.stack([free.real, free.imag], axis=2).reshape(len(free), -1, free.shape[-1])
+        touches = np.abs(batch.travel_map @ parts) > batch.gaps
+        if np.any(touches) or np.any(batch.pressed(z)):
             steps = np.ascontiguousarray(np.moveaxis(driving_block, -1, 0))
             for k, driving in enumerate(steps):
                 z = batch.next(z, driving)
@@ -140,16 +144,3 @@ def _followed(batch: _DesignBatch, driven: ComplexArray) -> ComplexArray:
             free = np.moveaxis(steps, 0, -1)
         states[..., start : start + BLOCK], z = free, np.ascontiguousarray(free[..., -1])
     return states
-
-
-def _touches(batch: _DesignBatch, free: ComplexArray) -> bool:
-    parts = np.stack([free.real, free.imag], axis=2).reshape(len(free), -1, free.shape[-1])
-    return bool(np.any(np.abs(batch.travel_map @ parts) > batch.gaps))
-
-
-def _free(driven: ComplexArray, z: ComplexArray, decays: ComplexArray, powers: ComplexArray) -> ComplexArray:
-    states, reach = np.array(driven), 1
-    while reach < states.shape[-1]:
-        states[..., reach:] += (decays**reach)[..., None] * states[..., :-reach]
-        reach *= 2
-    return np.asarray(states + powers[..., : states.shape[-1]] * z[..., None])

@@ -139,6 +139,12 @@ class StiffnessBoxes:
         ]
         numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
         self._priced = [limit for limit in numbers if limit.measure.channel in LINEAR_BOUNDS]
+        # orders of each transmissibility
+        self._ratios: dict[Measure, LoadedOrders] = {}
+        for measure in filter(is_ratio, problem.measures):
+            counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=measure.points, orders=measure.orders)
+            lines = self.model.lines(counted)
+            self._ratios[measure] = lines.subset(lines.omegas > 0.0)
         measures = simulated_measures(problem)
         self.simulated: SimulatedBoxes | None = (
             call_by_name(f"{measures[0].channel.simulation}:boxes", self.model, measures) if measures else None
@@ -154,7 +160,7 @@ class StiffnessBoxes:
         mounts = len(self.problem.engine.mounts)
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]
-        lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if is_ratio(q))
+        lines += sum(2 * len(self._ratios[q].omegas) for q in ratios if q in self._ratios)
         simulated = self.simulated.cost // SIMULATED_SHARE if self.simulated is not None else 0
         return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + simulated
 
@@ -225,7 +231,7 @@ class StiffnessBoxes:
         # lower bounds of mount numbers in the objective, and branching scores
         bounds, scores = np.zeros(len(lower)), np.zeros_like(lower)
         for term in self.problem.mount_terms:
-            if is_ratio(term.measure):
+            if term.measure in self._ratios:
                 minimum, score = self._ratio(term.measure, lower, upper)
                 scores = scores + term.weight * score
             else:
@@ -237,20 +243,15 @@ class StiffnessBoxes:
         # boxes that violate a limit of a mount number everywhere, shape (boxes,)
         violated = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
-            if is_ratio(limit.measure):
+            if limit.measure in self._ratios:
                 violated |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
             elif limit.measure.channel not in BOUNDED_LINEARLY:
                 violated |= breaks(self.model, limit, lower, upper)
         return violated
 
-    def _ratio_lines(self, measure: Measure) -> LoadedOrders:
-        counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=measure.points, orders=measure.orders)
-        lines = self.model.lines(counted)
-        return lines.subset(lines.omegas > 0.0)
-
     def _ratio(self, measure: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
         # lower bounds of a transmissibility, and branching scores (E40)
-        lines = self._ratio_lines(measure)
+        lines = self._ratios[measure]
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
         loads = (lines, lines.at_rest())
         expansions = [self.model.expanded(orders, lower, upper) for orders in loads]

@@ -16,7 +16,7 @@ from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import STIFFNESS, Decision, real_bounds
+from laufruhe.problem.decision import STIFFNESS, real_bounds
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -74,22 +74,19 @@ def convex_program(problem: Problem) -> ConvexProgram:
     start = np.array([d.real_start for d in decisions])
     mounting = mounting_in(problem.design(start.tolist()))
     root = mass_root(mounting.block)
-    slopes = np.array([root @ _slope(mounting, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
+    slopes, springs = np.zeros((len(decisions), 6, 6)), every_spring(mounting.mounts)
+    for slope, decision in zip(slopes, decisions, strict=True):
+        # derivative of the stiffness matrix (E3)
+        for drive in decision.mount_drives:
+            place, spring = springs[drive.mount]
+            row = np.array(spring.orientation)[drive.number] @ mounting.motions[place]
+            slope += drive.gain * np.outer(row, row)
+    slopes = np.array([root @ slope @ root.T for slope in slopes]).reshape(-1, 6, 6)
     base = root @ mounting.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
     matrices = StiffnessMatrices(base, slopes)
     terms = tuple((term.weight, _function(term.measure, matrices, mounting, problem)) for term in problem.objective)
     limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, mounting, problem)]
     return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
-
-
-def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
-    # derivative of the stiffness matrix, shape (6, 6) (E3)
-    total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
-    for drive in decision.mount_drives:
-        place, spring = springs[drive.mount]
-        row = np.array(spring.orientation)[drive.number] @ mounting.motions[place]
-        total += drive.gain * np.outer(row, row)
-    return total
 
 
 def _function(
@@ -108,22 +105,18 @@ def _function(
 def _limits(
     limit: Limit, source: int, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
 ) -> list[ConvexLimit]:
-    limits = []
+    upper: ConvexFunction
+    lower: ConvexFunction | None = None
     if limit.measure.channel is channels.FREQUENCIES:
-        if limit.maximum < math.inf:
-            limits.append(ConvexLimit(Eigenvalue(matrices, 1.0), (math.tau * limit.maximum) ** 2, source))
-        if limit.minimum > -math.inf:
-            limits.append(
-                ConvexLimit(Eigenvalue(matrices, -1.0), -((math.tau * limit.minimum) ** 2), source, "at least")
-            )
-        return limits
-    function = _function(limit.measure, matrices, mounting, problem)
-    if limit.maximum < math.inf:
-        limits.append(ConvexLimit(function, limit.maximum, source))
-    if limit.minimum > -math.inf and isinstance(function, LinearFunction):
-        limits.append(
-            ConvexLimit(LinearFunction(-function.constant, -function.gradient), -limit.minimum, source, "at least")
-        )
+        upper, lower = Eigenvalue(matrices, 1.0), Eigenvalue(matrices, -1.0)
+        maximum, minimum = ((math.tau * edge) ** 2 for edge in (limit.maximum, limit.minimum))
+    else:
+        upper, maximum, minimum = _function(limit.measure, matrices, mounting, problem), limit.maximum, limit.minimum
+        if isinstance(upper, LinearFunction):
+            lower = LinearFunction(-upper.constant, -upper.gradient)
+    limits = [ConvexLimit(upper, maximum, source)] if limit.maximum < math.inf else []
+    if lower is not None and limit.minimum > -math.inf:
+        limits.append(ConvexLimit(lower, -minimum, source, "at least"))
     return limits
 
 

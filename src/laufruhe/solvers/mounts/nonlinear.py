@@ -41,9 +41,8 @@ from laufruhe.solvers.conclusion import (
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import are_contradictory, bound_search, minimal_conflict, mount_numbers
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.places import StartPoint, evaluate_design_at
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
-from laufruhe.solvers.mounts.starts import evaluation_count, start_of_result
+from laufruhe.solvers.mounts.starts import StartPoint, evaluate_design_at, evaluation_count, start_of_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima

@@ -20,8 +20,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
-from laufruhe.solvers.mounts.places import StartPoint, design_at_start, evaluate_design_at
-from laufruhe.solvers.mounts.starts import start_points
+from laufruhe.solvers.mounts.starts import StartPoint, design_at_start, evaluate_design_at, start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima, is_explored
 from laufruhe.solvers.smooth.nonlinear import StopWhen, run_all_starts, solve_nonlinear
 from laufruhe.solvers.smooth.program import SmoothProgram
@@ -260,17 +259,13 @@ class MountSearch:
                 self._update_best(result)
                 if FEASIBLE < design.violation <= NEAR:
                     self._nearly_feasible.append(result)
+        limits = [limit for limit in self.problem.limits if limit not in self._ignored]
+        best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
+        good = [design for design in designs if design.value <= best and design.evaluation.violation(limits) <= NEAR]
         self._active_again = {
-            limit for limit in self._ignored if any(self._comes_close(design, limit) for design in designs)
-        }
-
-    def _comes_close(self, design: Design, limit: Limit) -> bool:
-        if self.best is not None and self._is_feasible and design.value > self.best.design.value:
-            return False
-        limits = [active for active in self.problem.limits if active not in self._ignored]
-        return (
-            design.evaluation.check_limit(limit).violation > -NEAR_LIMIT and design.evaluation.violation(limits) <= NEAR
-        )
+            limit for limit in self._ignored
+            if any(design.evaluation.check_limit(limit).violation > -NEAR_LIMIT for design in good)
+        }  # fmt: skip
 
     def _update_best(self, result: SearchResult) -> None:
         if self.best is None or result.rank < self.best.rank:
@@ -306,22 +301,20 @@ class MountSearch:
         ]  # fmt: skip
         for result in distinct_results[:MAX_AROUND]:
             best = self.best
-            if best is None or best.design.violation > FEASIBLE or result.design.value < best.design.value:
-                self._search_with_margin(result)
-
-    def _search_with_margin(self, result: SearchResult) -> None:
-        margin = 0.0
-        for _ in timed_rounds(MAX_MARGINS):
-            if result.optimum is None or not FEASIBLE < result.design.violation <= NEAR:
-                break
-            margin += 1.001 * result.design.violation
-            joint = self._program(margin)
-            ends = solve_nonlinear(joint.program, [result.optimum.x], 1, self._iterations)
-            design = self._evaluate_optimum(ends[0], joint) if ends else None
-            if design is None:
-                break
-            result = SearchResult(design, joint, ends[0])
-            self._update_best(result)
+            if best is not None and best.design.violation <= FEASIBLE and result.design.value >= best.design.value:
+                continue
+            margin = 0.0
+            for _ in timed_rounds(MAX_MARGINS):
+                if result.optimum is None or not FEASIBLE < result.design.violation <= NEAR:
+                    break
+                margin += 1.001 * result.design.violation
+                joint = self._program(margin)
+                ends = solve_nonlinear(joint.program, [result.optimum.x], 1, self._iterations)
+                design = self._evaluate_optimum(ends[0], joint) if ends else None
+                if design is None:
+                    break
+                result = SearchResult(design, joint, ends[0])
+                self._update_best(result)
 
 
 def _split(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:

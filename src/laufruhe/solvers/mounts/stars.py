@@ -187,16 +187,11 @@ def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int)
     bounded = [replace(designs[0], result=first), *designs[1:]]
     # the bound of the problem is the smallest of all stars
     cutoff = first.certificate.lower_bound if first.certificate is not None else minimum
-    pieces = [(k, design.result) for k, design in enumerate(designs)][1:]
-    work = partial(_with_bound, value=minimum, cutoff=cutoff)
-    for k, result in ordered_map(work, pieces, "bounds of stars on their mounts"):
+    work = partial(with_mount_bounds, value=minimum, cutoff=cutoff, in_batch=True)
+    others = ordered_map(work, [design.result for design in designs[1:]], "bounds of stars on their mounts")
+    for k, result in enumerate(others, 1):
         bounded[k] = replace(bounded[k], result=result)
     return bounded
-
-
-def _with_bound(piece: tuple[int, Result], value: float, cutoff: float) -> tuple[int, Result]:
-    number, result = piece
-    return number, with_mount_bounds(result, value, cutoff, in_batch=True)
 
 
 def _solve_moved_throws(problem: Problem, phasing: Phasing, designs: list[StarDesign]) -> list[StarDesign]:

@@ -1,11 +1,12 @@
-"""Choose start points for a search of mounts: the best points of a Latin hypercube."""
+"""Start points for a search of mounts: their evaluation by the exact model, and the best of a Latin hypercube."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -18,7 +19,8 @@ from laufruhe.problem.decision import domains_of, projected_vector, real_bounds
 from laufruhe.problem.evaluation import Evaluation, objective_value, with_mounts
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import unbalance_values
+from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import Design, evaluate_design, unbalance_values
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 
@@ -34,6 +36,24 @@ SIMULATED_POOL = 4
 # weight of violations with simulated measures, which most designs violate
 VIOLATION_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
+
+StartPoint: TypeAlias = tuple[list[float], Array | None]
+"""Numbers of the mounts [SI], and columns of the unbalances [kg m], or None for those of the best design."""
+
+
+def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | None:
+    """Evaluate the design with these values of its decisions; None on an undamped resonance."""
+    try:
+        return evaluate_design(problem, values)
+    except ModelError:
+        return None
+
+
+def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Design | None:
+    """Evaluate the design with these mounts and columns of unbalances; None on an undamped resonance."""
+    mounts, columns = iter(start[0]), start[1]
+    unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
+    return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])
 
 
 def evaluation_count(problem: Problem) -> int:
