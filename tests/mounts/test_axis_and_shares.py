@@ -17,9 +17,8 @@ from laufruhe.problem.channels import motion_indices, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_numbers import RANGES
+from laufruhe.prove.mounts.box_numbers import RANGES, maximum_shares, shortfall
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.box_shares import maximum_shares, shortfall
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 from mounts.powertrain import powertrain, random_mounting

@@ -120,7 +120,9 @@ class DesignBoxes:
     def max_boxes(self) -> int:
         """Box budget: as requested, or for some tens of seconds."""
         count = len(self.lower)
-        if self.max_corners < MIN_CORNER_SHARE * 2**count or self.loads.rows * self.loads.columns > MAX_NUMBERS:
+        # fixed loads and unbalances, in three directions
+        columns = 3 * (1 + sum(domain.width for domain in self.loads.domains))
+        if self.max_corners < MIN_CORNER_SHARE * 2**count or self.loads.rows * columns > MAX_NUMBERS:
             return 0
         return self.loads.problem.search.boxes_or(BOXES * self.max_corners // max(4 ** (count - 3), 1))
 

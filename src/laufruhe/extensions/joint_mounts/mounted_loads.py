@@ -94,11 +94,6 @@ class MountedLoads:
         return self._norms[measure, averaged]
 
     @property
-    def columns(self) -> int:
-        """Count of columns of the rows: fixed loads and unbalances, in three directions."""
-        return 3 * (1 + sum(domain.width for domain in self.domains))
-
-    @property
     def rows(self) -> int:
         """Count of rows of all measures on mounts."""
         problem = self.problem

@@ -26,7 +26,6 @@ from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.norms.norm import curvature, mean_square
-from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.boxes.lead_swing import LeadSwing
@@ -173,11 +172,17 @@ class LeadBoxes:
 
     def _second_derivative(self, measure: Measure, s: int) -> _SecondDerivative:
         shares = measure.shares(self.model.problem.points)
-        square, maximum, kinks = 0.0, [], []
+        square, maximum = 0.0, []
+        kinks: list[tuple[Array, Array, Array]] = []
         for weight, signal in zip(shares[shares > 0.0], self.model.counted(measure, s), strict=True):
             square += weight * float(np.mean(mean_square(signal.series.derivative.derivative)))
             maximum.append(curvature(signal)[0])
-            kinks += _kinks(signal)
+            places = signal.coefficients.shape[1]
+            if signal.kinks is None:
+                kinks += [(np.zeros(0),) * 3] * places
+            else:
+                angles, jumps = signal.kinks.angles, signal.kinks.jumps
+                kinks += [(angles, lengths(jumps[:, 1, k]), lengths(jumps[:, 0, k])) for k in range(places)]
         return _SecondDerivative(math.sqrt(square), np.concatenate(maximum), tuple(kinks))
 
 
@@ -212,12 +217,3 @@ def minimum_on_arcs(
         minimum = min(minimum, float(leads @ slopes) + sum(domain.minimum(corner_gradient) for domain in domains))
     # d differs from sin(n d) / n by the cube
     return minimum - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0
-
-
-def _kinks(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
-    # per place: angles of kinks, jumps of slope, jumps of value
-    places = signal.coefficients.shape[1]
-    if signal.kinks is None:
-        return [(np.zeros(0), np.zeros(0), np.zeros(0))] * places
-    jumps = signal.kinks.jumps
-    return [(signal.kinks.angles, lengths(jumps[:, 1, k]), lengths(jumps[:, 0, k])) for k in range(places)]

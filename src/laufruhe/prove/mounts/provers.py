@@ -105,15 +105,9 @@ def provers() -> tuple[Prover, ...]:
 def run_provers(question: Question) -> BoxResult:
     """Run all provers that apply in rounds of growing work, until one closes the gap or time is over.
 
-    Parameters
-    ----------
-    question
-        Problem and incumbent; its bound is raised to the best one found.
-
-    Returns
-    -------
-    BoxResult
-        Best bound, number of all boxes, and the start points of the last prover that has any.
+    The bound of the question is raised to the best one found. The result has this bound, the number of all boxes, and
+    the
+    start points of the last prover that has any.
     """
     eligible = [prover for prover in provers() if prover.for_open_throws is (question.open_throws is not None)]
     running = [prover.bounds(question) for prover in eligible if prover.applies(question.problem)]

@@ -19,10 +19,7 @@ SLACK = 1e-6
 def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | None = None) -> tuple[Array, Array]:
     """Return lower and upper bounds of the numbers of every spring, shape (springs, 14) each.
 
-    Parameters
-    ----------
-    lower, upper
-        Values of the open numbers of the mounts, shape (n,); their bounds by default.
+    The open numbers of the mounts lie between `lower` and `upper`, shape (n,), or their bounds by default.
     """
     low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()

@@ -23,10 +23,7 @@ from laufruhe.problem.problem import Problem
 def firing_bound(problem: Problem, design: Evaluation) -> float:
     """Return a lower bound of the objective over all even stars of this geometry, or zero where none is known [SI].
 
-    Parameters
-    ----------
-    design
-        One of the stars, with any weights.
+    The design is one of the stars, with any weights.
     """
     engine = design.engine
     if any(term.measure.is_load and term.measure.is_inside for term in problem.objective) or problem.fidelity.is_uneven:

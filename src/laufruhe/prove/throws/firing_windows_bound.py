@@ -33,21 +33,14 @@ def uneven_bound(
 ) -> float:  # fmt: skip
     """Return a lower bound over all stars of in-line cylinders with these firing intervals [SI].
 
+    It is zero, which is always valid, if there are more than `MAX_STARS` stars.
+
     Parameters
     ----------
-    phasing
-        In-line cylinders, throws open.
-    space
-        The even stars.
-    objective
-        Norms of couples.
+    space, objective
+        The even stars, and norms of couples.
     intervals
         Bounds of every firing interval [rad].
-
-    Returns
-    -------
-    float
-        Lower bound; zero, which is always valid, if there are more than `MAX_STARS` stars.
     """
     if phasing.bank is not None or space.size > MAX_STARS:
         return 0.0
@@ -71,18 +64,9 @@ def steady_bound(problem: Problem) -> float:
 
 
 def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
-    """Return the minimum of `star_bounds` over stars and of the minimum `incumbent` of earlier stars.
+    """Return the minimum of `star_bounds` over stars, shape (stars, throws), and of the minimum over earlier stars.
 
     Directions are evaluated in batches. A star whose bound exceeds the minimum needs no further directions.
-
-    Parameters
-    ----------
-    costs
-        Bounds by direction, throw and step, from `throw_costs`.
-    stars
-        Step of every throw, shape (stars, throws).
-    incumbent
-        Minimum over stars evaluated before, or infinity.
     """
     bounds = np.full(len(stars), -math.inf)
     for first in range(0, len(costs), BATCH):

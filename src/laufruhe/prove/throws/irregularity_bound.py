@@ -27,10 +27,7 @@ SAMPLED = 1e-4
 class StoredWorkBound:
     """Relation between stored work and the degree of irregularity at one operating point (T11).
 
-    Attributes
-    ----------
-    energy
-        Energy (m_max / 2 + (J_max - J_min) / 4) w_0^2, valid for cylinders at any phases [J].
+    The energy is (m_max / 2 + (J_max - J_min) / 4) w_0^2, valid for cylinders at any phases [J].
     """
 
     energy: float

@@ -46,10 +46,8 @@ class Cut:
         ----------
         stars
             Step of every throw, shape (stars, throws).
-        sets
-            Indices of the optional shafts that are built, for each set.
-        owners
-            Index of the optional shaft of every decision, -1 for none.
+        sets, owners
+            Indices of the optional shafts that are built, for each set; that of every decision, -1 for none.
         """
         return np.maximum(self._sums(stars, sets, owners), 0.0)
 
@@ -93,15 +91,7 @@ class Cut:
 
 
 def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
-    """Return the cut that the dual rows of one star give (S14).
-
-    Parameters
-    ----------
-    fine
-        Problem of all stars on the grid of the dual rows.
-    multipliers
-        Dual rows of one star.
-    """
+    """Return the cut that dual rows of one star give, on the grid of the problem of all stars (S14)."""
     throws, steps = fine.terms[0][1].moves.shape[:2]
     size = fine.terms[0][1].slope.shape[-1]
     constant, moves, scale = 0.0, np.zeros((throws, steps)), 0.0

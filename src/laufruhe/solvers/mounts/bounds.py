@@ -38,12 +38,7 @@ def mount_numbers(design: Design) -> Array:
 def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> BoxResult:
     """Bound the result of a search by all provers; continue the search where their bounds are lowest.
 
-    Parameters
-    ----------
-    search
-        Search of the problem, already run.
-    defer_bounds
-        True to leave bounds to `with_mount_bounds`, unless only stiffness is open.
+    Bounds are left to `with_mount_bounds` if `defer_bounds` is True, unless only stiffness is open.
     """
     division = BoxResult(0.0, 0)
     if search.moves is not None or not problem.search.proves or (defer_bounds and not is_stiffness_problem(problem)):

@@ -47,12 +47,7 @@ def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
 class _Program:
     """Scaled convex program in cvxpy.
 
-    Parameters
-    ----------
-    program
-        The convex program in SI units.
-    relaxed
-        True to add the largest relative violation of the limits to the objective.
+    If relaxed, the largest relative violation of the limits is added to the objective.
     """
 
     def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:

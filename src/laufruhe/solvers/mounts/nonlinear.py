@@ -96,14 +96,7 @@ def solve_joint(
 def solve_moved(problem: Problem, moves: ThrowMoves, even_result: Result | None) -> tuple[Result, Candidate]:
     """Solve a problem whose throws may leave their star; return the result and the star with its new throws (E36).
 
-    Parameters
-    ----------
-    problem
-        Problem of the star.
-    moves
-        Moves of the throws.
-    even_result
-        Result of the star without moves, the first start; None if there is none.
+    The result of the star without moves, `even_result`, is the first start.
     """
     first = start_of_result(problem, even_result) if even_result is not None and even_result.decisions else None
     # bounds over mounts alone are not valid for moved throws
@@ -203,14 +196,8 @@ def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
     """Return a lower bound of the objective: the sum of bounds of each kind of terms, none of which is negative [SI].
 
     Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
-    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts.
-
-    Parameters
-    ----------
-    problem
-        Problem with open mounts.
-    values
-        Values of the decisions of a good design; provers need them.
+    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts, for which they
+    need the values of the decisions of a good design.
     """
     problem, total, results = named_part(problem), 0.0, []
     on_mounts, block = (
