@@ -51,8 +51,6 @@ class MountedLoads:
         Samples of the rows over their period.
     domains
         Domains of the open unbalances.
-    root
-        Map to coordinates with unit mass, transposed, shape (6, 6).
     """
 
     def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
@@ -64,13 +62,14 @@ class MountedLoads:
             # rows have the samples of the exact model
             self._model = AffineModel(bounded_problem, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
-        self.root = mass_root(mounting_in(problem.engine).block)
         self._norms: dict[tuple[Measure, bool], AffineNorm] = {}
 
     @cached_property
     def orders(self) -> LoadedOrders:
         """Orders with loads: wrenches of fixed loads, of each unit column, and of each open throw at angle zero."""
-        wrench_map = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
+        block = mounting_in(self.problem.engine).block
+        # to coordinates with unit mass
+        wrench_map = moved_wrench(NUMBERS, block.centre_of_gravity).T @ mass_root(block).T
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
         angles = self._throws.angles[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (constant, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
