@@ -1,7 +1,7 @@
 """Bounds of sag, natural frequencies, energy shares and other mount numbers over boxes of stiffness (E39, E64).
 
-For energy shares of motions in modes, let E be the change of the stiffness in the modes u of the middle of a box. A mode
-v of a design in the box satisfies
+For energy shares of motions in modes, let E be the change of the stiffness in the modes u of the middle of a box. A
+mode v of a design in the box satisfies
 
     (l - s_j - E_jj) v_j = sum of E_jk v_k over the others
 
