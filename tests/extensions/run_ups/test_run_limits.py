@@ -112,7 +112,7 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     x = np.concatenate([domain.columns_of(u) for domain, u in zip(domains_of(problem.decisions), values, strict=True)])
     point, worst = problem.points[0], rows.worst(measure, x)
     up, down = runs_of(problem.design(values), point, problem.fidelity, problem.engine.extra(Run))
-    assert worst == pytest.approx(max(up.worst_travel, down.worst_travel), rel=1e-9)
+    assert worst == pytest.approx(max(up.travel.max(), down.travel.max()), rel=1e-9)
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
     stopped = {**mounts, "places": [{**place, "stop": stop} for place in mounts["places"]]}

@@ -54,9 +54,9 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     point = min(kept.problem.points, key=lambda p: p.speed)
     loads = split_loads(design.engine, point, design.fidelity)
     fine = run_through(mounting_in(design.engine), *loads, 0.0, 1000.0 * RPM, 0.5, 600, tolerance=1e-8)
-    assert record["up"]["travel"] == pytest.approx(fine.worst_travel, rel=1e-2)
-    assert record["up"]["twist"] == pytest.approx(fine.worst_twist, rel=1e-2)
-    assert record["up"]["force"] == pytest.approx(fine.worst_force, rel=1e-2)
+    assert record["up"]["travel"] == pytest.approx(fine.travel.max(), rel=1e-2)
+    assert record["up"]["twist"] == pytest.approx(fine.twist.max(), rel=1e-2)
+    assert record["up"]["force"] == pytest.approx(fine.force.max(), rel=1e-2)
 
 
 @pytest.mark.parametrize(

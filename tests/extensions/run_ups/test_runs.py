@@ -165,7 +165,7 @@ def test_shut_down_meets_the_same_resonance():
     up = run_through(mounting, unit, None, 0.0, 2 * np.pi * 15.0, 6.0, stretches=60)
     down = run_through(mounting, unit, None, 2 * np.pi * 15.0, 0.0, 6.0, stretches=60)
     assert down.speeds[-1] == pytest.approx(0.0, abs=1e-9)
-    assert down.worst_travel == pytest.approx(up.worst_travel, rel=0.15)
+    assert down.travel.max() == pytest.approx(up.travel.max(), rel=0.15)
 
 
 def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
@@ -180,4 +180,4 @@ def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
         mounting = elastic_mounting(block, mounts)
         assert (mounting.modes.frequencies[-1] > 1e5) == (method == "Radau")
         runs.append(run_through(mounting, Spectrum(Fraction(1), lift), None, 0.0, 60.0, 0.6, 12, method, 1e-5))
-    assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].worst_force)
+    assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].force.max())

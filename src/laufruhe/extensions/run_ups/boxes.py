@@ -40,7 +40,7 @@ class RunBoxes:
     @property
     def cost(self) -> int:
         """Work of one box, as a count of numbers."""
-        sides, n = len(self._model.lower), 2 * self._matrices.size
+        sides, n = len(self._model.lower), 2 * self._matrices.base.size
         columns = 1 + sides + len(pairs_of(sides))
         return len(self._rows) * sum(run.sweep.count // run.times for run in self._runs) * columns * n
 
@@ -122,7 +122,7 @@ class _RunBounds:
     def under(self) -> LinearBound:
         """Return the best bound over all times and places, with a step that ends at the peak of the middle."""
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
-        count = min(long_steps.count for long_steps in steps)
+        count = min(len(long_steps.impulses) for long_steps in steps)
         moments = np.stack([long_steps.moments[..., :count].reshape(-1, count) for long_steps in steps])
         impulses, peak_loads = (
             np.stack([getattr(long_steps, k)[:count] for long_steps in steps]) for k in ("impulses", "peak_loads")
@@ -133,7 +133,7 @@ class _RunBounds:
         """Return the short step with the largest signal at the middle of each box, near the largest long step."""
         box_equations, run = self._equations, self._run
         steps = run.ending_at(0)
-        rows = steps.moments.reshape(-1, steps.count)
+        rows = steps.moments.reshape(-1, len(steps.impulses))
         moments = np.broadcast_to(rows, (box_equations.count, *rows.shape))
         middle = self._steps.middle(moments)
         squares = self._lengths(middle) ** 2

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from laufruhe.extensions.run_ups.linear_run import RunResponse
 from laufruhe.extensions.run_ups.machine import Run
-from laufruhe.extensions.run_ups.runs import RunUp, missed_share, point_of, runs_of
+from laufruhe.extensions.run_ups.runs import missed_share, point_of, runs_of
 from laufruhe.machine import Engine
-from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import Need, NumberChannel
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
@@ -32,29 +30,26 @@ class RunChannel(NumberChannel):
     Attributes
     ----------
     part
-        Return the signal, shape (times, places, d), from the response; the channel is its largest length.
+        Attribute of a response with the signal, shape (times, places, d); the channel is its largest length.
     """
 
     needs: Need = RUN
     depends_on_loads: bool = False
     simulation: str = "laufruhe.extensions.run_ups.simulation"
     peak_error: Callable[[Engine], float] = _peak_error
-    part: Callable[[RunResponse], Array] = field(kw_only=True)
+    part: str = field(kw_only=True)
 
 
-def _run_channel(
-    name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[RunResponse], Array]
-) -> RunChannel:
+def _run_channel(part: str, unit: str) -> RunChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         run = evaluation.engine.extra(Run)
         if run is None or not evaluation.loads:
             return (0.0,)
         point = point_of(run, [loads.point for loads in evaluation.loads])
-        return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
+        runs = runs_of(evaluation.engine, point, evaluation.fidelity, run)
+        return (max(float(getattr(envelope, part).max()) for envelope in runs),)
 
-    return RunChannel(name, unit, values=values, part=part)
+    return RunChannel(f"run-up {part}", unit, values=values, part=part)
 
 
-FORCE = _run_channel("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
-TRAVEL = _run_channel("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
-TWIST = _run_channel("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)
+FORCE, TRAVEL, TWIST = _run_channel("force", "N"), _run_channel("travel", "m"), _run_channel("twist", "rad")

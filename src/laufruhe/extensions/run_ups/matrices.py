@@ -31,11 +31,6 @@ class RunMatrices:
         model_at_lower = time_model(model.mounting(model.lower))
         self.base = replace(model_at_lower, stops=np.zeros_like(model_at_lower.stops))
 
-    @property
-    def size(self) -> int:
-        """Count n of coordinates."""
-        return self.base.size
-
     @cached_property
     def motion(self) -> LinearMaps:
         """Stiffness, loss and damping of E25 and E26."""
@@ -83,21 +78,21 @@ class RunMatrices:
 
         springs = [at_rest(self._padded(slope)) - at_rest(no_drag) for slope in self._model.slopes["springs"]]
         maps = LinearMaps(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
-        zero = np.zeros((self.size, 1))
+        zero = np.zeros((self.base.size, 1))
         return maps, signal_of(measure, RunResponse(self.base, zero, zero)).shape[-1]
 
     def _signal_rows(self, measure: Measure, forces: Array, drag: Array, is_rate: bool) -> Array:
-        identity, zero = np.eye(self.size), np.zeros((self.size, self.size))
+        identity, zero = np.eye(self.base.size), np.zeros((self.base.size, self.base.size))
         model = replace(self.base, forces=forces, drag=drag)
         signal = signal_of(measure, RunResponse(model, *((zero, identity) if is_rate else (identity, zero))))
-        return np.asarray(signal.reshape(self.size, -1).T)
+        return np.asarray(signal.reshape(self.base.size, -1).T)
 
     def _lowest(self, name: str) -> Array:
         return np.asarray(self._model.at(name, self._model.lower[None])[0])
 
     def _padded(self, rows: Array) -> Array:
-        return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, self.size - 6)])
+        return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, self.base.size - 6)])
 
     def _square(self, name: str) -> Linear:
-        padding = [(0, self.size - 6)] * 2
+        padding = [(0, self.base.size - 6)] * 2
         return Linear(np.pad(self._lowest(name), padding), np.pad(self._model.slopes[name], [(0, 0), *padding]))

@@ -35,11 +35,6 @@ class LongSteps:
     impulses: Array
     peak_loads: Array
 
-    @property
-    def count(self) -> int:
-        """Count of steps."""
-        return len(self.impulses)
-
 
 class RunMoments:
     """Moments of one run in long steps, each of several short ones.

@@ -64,7 +64,7 @@ class MotionEquations:
 
     def __init__(self, model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> None:
         self.scale, self.above, self.halves = scale, 0.5 * (lower + upper) - model.lower, 0.5 * (upper - lower)
-        self.count, n, halves = len(lower), matrices.size, self.halves
+        self.count, n, halves = len(lower), matrices.base.size, self.halves
         squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
         lower_eigenvalues, upper_eigenvalues = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
         is_restrained = lower_eigenvalues[:, 0] > MIN_STIFFNESS * upper_eigenvalues[:, -1]

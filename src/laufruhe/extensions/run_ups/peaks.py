@@ -222,7 +222,8 @@ def signal_of(measure: Measure, response: RunResponse) -> Array:
     channel = measure.channel
     if not isinstance(channel, RunChannel):
         raise TypeError(f"{measure.name} is not of a run-up")
-    return channel.part(response)
+    signal: Array = getattr(response, channel.part)
+    return signal
 
 
 def _peaks(parts: Sequence[Array], between: bool) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
@@ -35,8 +36,7 @@ def figure(result: Result) -> Figure:
                     envelope.speeds * RPM, factors[k] * values, color=series.colour, linestyle=style, linewidth=1.4
                 )
                 maximum[k] = max(maximum[k], factors[k] * float(values.max(initial=0.0)))
-        force = max(envelope_of_run.worst_force for envelope_of_run in runs)
-        travel = max(envelope_of_run.worst_travel for envelope_of_run in runs)
+        force, travel, _ = np.max([envelope.worst for envelope in runs], axis=0).tolist()
         legend.append(series.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
     for axes, (label, channel), factor, panel_maximum in zip(layout.panels, _ROWS, factors, maximum, strict=True):
         limits = [factor * limit.maximum for limit in limits_on(result, channel)]

@@ -55,19 +55,9 @@ class RunUp:
     twist: Array
 
     @property
-    def worst_force(self) -> float:
-        """Largest force of the run [N]."""
-        return float(self.force.max())
-
-    @property
-    def worst_travel(self) -> float:
-        """Largest travel of the run [m]."""
-        return float(self.travel.max())
-
-    @property
-    def worst_twist(self) -> float:
-        """Largest roll of the run [rad]."""
-        return float(self.twist.max())
+    def worst(self) -> tuple[float, float, float]:
+        """Largest force [N], travel [m] and roll [rad] of the run."""
+        return float(self.force.max()), float(self.travel.max()), float(self.twist.max())
 
 
 def point_of(run: Run, points: Sequence[OperatingPoint]) -> OperatingPoint:

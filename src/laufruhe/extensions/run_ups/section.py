@@ -63,10 +63,9 @@ def _tables(result: Result) -> list[Table]:
         return []
     run, (up, down) = run_of(result), runs_of_design(result, result.final)
     rows = tuple(
-        (name, f"{time:g} s", figure(envelope.worst_force, "N"), figure(envelope.worst_travel, "m"),
-         figure(envelope.worst_twist, "rad"))
+        (name, f"{time:g} s", *map(figure, envelope.worst, ("N", "m", "rad")))
         for name, time, envelope in (("run-up", run.up, up), ("shut-down", run.down, down))
-    )  # fmt: skip
+    )
     note = (
         f"On any mount, between rest and {quantity_text(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
     )
@@ -75,16 +74,10 @@ def _tables(result: Result) -> list[Table]:
 
 def _record(result: Result) -> dict[str, Any]:
     run = run_of(result)
+    runs = zip(("up", "down"), (run.up, run.down), runs_of_design(result, result.final), strict=True)
     records = {
-        direction: {
-            "time": time,
-            "force": envelope.worst_force,
-            "travel": envelope.worst_travel,
-            "twist": envelope.worst_twist,
-        }
-        for direction, time, envelope in zip(
-            ("up", "down"), (run.up, run.down), runs_of_design(result, result.final), strict=True
-        )
+        direction: dict(zip(("time", "force", "travel", "twist"), (time, *envelope.worst), strict=True))
+        for direction, time, envelope in runs
     }
     return {"up_to": run.speed, "point": run_point(result).name, **records}
 
