@@ -17,6 +17,7 @@ so E37 holds for all open numbers of mounts.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,43 +94,32 @@ class _Signals:
         return np.concatenate([none, *self._inputs], axis=1)[..., : 6 + len(self.owners)]
 
 
-@dataclass(frozen=True, eq=False)
-class OpenStiffness:
-    """Static stiffness over a box: A = middle + outputs S (1 - feedback S)^-1 inputs.
+def open_stiffness(
+    problem: Problem, lower: Array, upper: Array
+) -> tuple[Array, Callable[[Array], tuple[Array, float]]]:
+    """Return the static stiffness A at the middle of a box, shape (6, 6), and a function of y for y' A y in the box.
 
-    Attributes
-    ----------
-    numbers
-        Index of the open number of each channel, shape (m,).
-    middle, outputs, inputs, feedback
-        Shapes (6, 6), (6, m), (m, 6) and (m, m).
+    The function returns coefficients by (1, s, s s') of n open numbers, shape (1 + n + n^2,), and a bound of the
+    remainder. Over the box A = middle + outputs S (1 - feedback S)^-1 inputs.
     """
+    equations = _BlockOnMounts(problem, np.zeros(1), lower, upper)
+    middle, outputs = np.split(equations.body[0].real, [6], axis=1)
+    inputs, feedback = np.split(equations.signals.inputs[0].real, [6], axis=1)
+    incidence = (equations.signals.numbers[:, None] == np.arange(len(lower))).astype(float)
+    loop = np.abs(feedback)
 
-    numbers: Indices
-    middle: Array
-    outputs: Array
-    inputs: Array
-    feedback: Array
-
-    def form(self, y: Array, count: int) -> tuple[Array, float]:
-        """Return y' A y by (1, s, s s') of n = `count` numbers, shape (1 + n + n^2,), and a bound of its remainder."""
-        out, inputs, loop = y @ self.outputs, self.inputs @ y, np.abs(self.feedback)
-        incidence = (self.numbers[:, None] == np.arange(count)).astype(float)
-        second = incidence.T @ (out[:, None] * self.feedback * inputs) @ incidence
+    def form(y: Array) -> tuple[Array, float]:
+        out, travel = y @ outputs, inputs @ y
+        second = incidence.T @ (out[:, None] * feedback * travel) @ incidence
         converges = not loop.any() or float(np.abs(np.linalg.eigvals(loop)).max()) < 1.0
         # sum of all powers of the feedback
         power_sum = (
-            np.linalg.solve(np.eye(len(loop)) - loop, np.abs(inputs)) if converges else np.full_like(inputs, math.inf)
+            np.linalg.solve(np.eye(len(loop)) - loop, np.abs(travel)) if converges else np.full_like(travel, math.inf)
         )
-        remainder = np.abs(out) @ loop @ loop @ power_sum
-        return np.concatenate([[y @ self.middle @ y], (out * inputs) @ incidence, second.ravel()]), float(remainder)
+        remainder = float(np.abs(out) @ loop @ loop @ power_sum)
+        return np.concatenate([[y @ middle @ y], (out * travel) @ incidence, second.ravel()]), remainder
 
-
-def open_stiffness(problem: Problem, lower: Array, upper: Array) -> OpenStiffness:
-    """Return the static stiffness of a problem over a box of open numbers of mounts, shape (n,) each."""
-    equations = _BlockOnMounts(problem, np.zeros(1), lower, upper)
-    body, inputs = equations.body[0].real, equations.signals.inputs[0].real
-    return OpenStiffness(equations.signals.numbers, body[:, :6], body[:, 6:], inputs[:, :6], inputs[:, 6:])
+    return middle, form
 
 
 def mount_loop(problem: Problem, omegas: Array, lower: Array, upper: Array) -> Loop:

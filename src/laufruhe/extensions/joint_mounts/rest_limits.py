@@ -49,31 +49,27 @@ class RestLimits:
         if not self._limits:
             return violations
         count, bernstein = len(lower), coefficients(len(lower))
-        stiffness = open_stiffness(self._problem, lower, upper)
-
-        def form(y: Array) -> tuple[Array, float]:
-            # coefficients of y' A y, and a bound of its remainder
-            powers, remainder = stiffness.form(y, count)
-            return bernstein @ powers, remainder
-
+        middle, form = open_stiffness(self._problem, lower, upper)
         for limit in self._limits:
             if limit.measure.channel is channels.SAG:
                 maximum = limit.maximum * self._weight * (1.0 + SLACK)
                 if 0.0 < maximum < math.inf:
-                    y = np.asarray(np.linalg.solve(stiffness.middle, self._pull), dtype=np.float64)
-                    energy, remainder = form(y)
-                    violations.append((2.0 * float(self._pull @ y) - energy - remainder - maximum) / maximum)
+                    y = np.asarray(np.linalg.solve(middle, self._pull), dtype=np.float64)
+                    powers, remainder = form(y)
+                    violations.append(
+                        (2.0 * float(self._pull @ y) - bernstein @ powers - remainder - maximum) / maximum
+                    )
             elif limit.measure.channel is channels.FREQUENCIES:
                 # modes at the middle by rising frequency
-                modes: Array = np.linalg.eigh(0.5 * (stiffness.middle + stiffness.middle.T))[1]
+                modes: Array = np.linalg.eigh(0.5 * (middle + middle.T))[1]
                 if limit.minimum > 0.0:
-                    energy, remainder = form(modes[:, 0])
+                    powers, remainder = form(modes[:, 0])
                     minimum = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2
-                    violations.append((minimum - energy - remainder) / minimum)
+                    violations.append((minimum - bernstein @ powers - remainder) / minimum)
                 if limit.maximum < math.inf:
-                    energy, remainder = form(modes[:, -1])
+                    powers, remainder = form(modes[:, -1])
                     maximum = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2
-                    violations.append((energy - remainder - maximum) / maximum)
+                    violations.append((bernstein @ powers - remainder - maximum) / maximum)
             else:
                 ends = [float(numbers[:, STIFFNESS].sum()) for numbers in number_ranges(self._problem, lower, upper)]
                 slopes = 0.5 * (upper - lower) * self._stiffness_slopes

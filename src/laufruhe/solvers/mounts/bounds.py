@@ -70,12 +70,8 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
 
     Parameters
     ----------
-    result
-        Result of a problem with open mounts.
-    value
-        Objective of the best design of all stars; the bound need not be higher [SI].
-    cutoff
-        Bound at which the proof stops [SI].
+    value, cutoff
+        Objective of the best design of all stars; the bound need not be higher. Bound at which the proof stops [SI].
     in_batch
         True if many results are bounded, so that cheap bounds come first.
     """

@@ -14,7 +14,7 @@ from laufruhe.errors import counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.numerics.workers import speculation, worker_pool
+from laufruhe.numerics.workers import worker_pool
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
@@ -30,7 +30,6 @@ from laufruhe.prove.mounts.provers import Question, provers, run_provers
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
-    Design,
     ProofData,
     build_result,
     infeasible_result,
@@ -119,47 +118,43 @@ def _search_and_bound(
         search = MountSearch(problem, initial, workers, moves, first, keep_initial=moves is None)
         model_time = time.perf_counter()
         search.run()
-        with speculation(_balance, math.inf) as ahead:
-            # optimise the unbalances again while provers bound; a prover may still find a better design
-            results = [search.best_or_initial]
-            ahead.prefetch((x.design.values, _share(x.design)) for x in results if x is not None)
-            division = bound_search(problem, search, defer_bounds)
-            best = search.best_or_initial
-            timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
-            if best is None or best.design.violation > FEASIBILITY_TOL:
-                return _without_design(problem, search, initial, division, timing), search.turns
-            balance = ahead.result(best.design.values, _share(best.design))
-    best, gap = _rebalanced(best, *balance) if balance is not None else (best, None)
+        first_best = search.best_or_initial
+        is_feasible = first_best is not None and first_best.design.violation <= FEASIBILITY_TOL
+        rebalanced = _rebalanced(first_best) if first_best is not None and is_feasible else None
+        division = bound_search(problem, search, defer_bounds)
+        best = search.best_or_initial
+        timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
+        if best is None or best.design.violation > FEASIBILITY_TOL:
+            return _without_design(problem, search, initial, division, timing), search.turns
+        if rebalanced is None or first_best is None or first_best.design.values != best.design.values:
+            # a prover has found a better design
+            rebalanced = _rebalanced(best)
+    best, gap = rebalanced
     return _result(search, initial, best, gap, division, timing, defer_bounds), search.turns
 
 
-def _share(design: Design) -> tuple[Problem, Sequence[float]]:
-    return design.problem, mount_numbers(design).tolist()
+def _rebalanced(best: SearchResult) -> tuple[SearchResult, float | None]:
+    """Optimise the unbalances of a result on its mounts; return the better design, and the gap of the unbalances.
 
-
-def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
-    """Return optimal unbalances on fixed mounts and their gap; None if the program is not convex."""
-    problem, mounts = share
+    The gap is None if the program of the unbalances is not convex, or gives no feasible design.
+    """
+    design, problem = best.design, best.design.problem
     if not problem.unbalances or not problem.load_terms or problem.mount_terms or is_time_over():
-        return None
+        return best, None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on the excitation
-        return None
-    engine = problem.design(mounts, problem.mount_decisions)
+        return best, None
+    numbers = mount_numbers(design).tolist()
+    engine = problem.design(numbers, problem.mount_decisions)
     result = solve_unbalances(replace(problem, engine=engine).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
-        return None
-    return unbalance_values(problem, result), result.certificate.gap
-
-
-def _rebalanced(best: SearchResult, unbalances: Sequence[complex], gap: float) -> tuple[SearchResult, float | None]:
-    """Return the better of a result and its design with these unbalances; the gap is None if that is infeasible."""
-    design, columns = best.design, iter(unbalances)
-    mounts = iter(mount_numbers(design).tolist())
-    values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
-    rebalanced = evaluate_design_at(design.problem, values)
+        return best, None
+    mounts, columns = iter(numbers), iter(unbalance_values(problem, result))
+    values = [next(columns) if d.is_affine else next(mounts) for d in problem.decisions]
+    rebalanced = evaluate_design_at(problem, values)
     if rebalanced is None or rebalanced.violation > FEASIBILITY_TOL:
         return best, None
+    gap = result.certificate.gap
     return best if rebalanced.value >= design.value else replace(best, design=rebalanced), gap
 
 
