@@ -59,14 +59,11 @@ ExactObjective: TypeAlias = Callable[[Array, Array], float]
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """Optimal unbalances and multipliers for the mounts at a vertex.
+    """Optimal unbalances for the mounts at a vertex, shape (columns,), and their lower bound for any mounts.
 
-    Attributes
-    ----------
-    columns
-        Optimal unbalances, or those with the smallest violation of limits, shape (columns,).
-    pairing
-        Lower bound for any mounts by the multipliers; None on an undamped resonance.
+    If the limits contradict each other, the unbalances have the smallest violation. On an undamped resonance there is
+    no
+    bound.
     """
 
     columns: Array

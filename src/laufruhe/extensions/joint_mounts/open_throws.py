@@ -31,12 +31,7 @@ _NONE = Spectrum(Fraction(1), np.zeros((1, 6), dtype=complex))
 class OpenThrows:
     """Throws of a crank without gas loads, some with open angles, and without open unbalances on them.
 
-    Attributes
-    ----------
-    waves
-        Loads of the throws.
-    angles, lower, upper
-        Initial angle and bounds of each throw [rad], shape (throws,).
+    The initial angles and their bounds [rad] have the shape (throws,).
     """
 
     waves: ThrowWaves

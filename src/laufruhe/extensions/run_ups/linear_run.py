@@ -73,13 +73,7 @@ class Sweep:
 
 @dataclass(frozen=True, eq=False)
 class RunResponse:
-    """Motion of the mounts and the block at equal time steps.
-
-    Attributes
-    ----------
-    y, rate
-        Coordinates of the time model and their derivatives, shape (n, steps + 1).
-    """
+    """Motion of the mounts and the block at equal time steps, by the coordinates of the model, shape (n, steps + 1)."""
 
     model: TimeModel = field(repr=False)
     y: Array
