@@ -71,10 +71,8 @@ class BranchAndBound(Generic[P]):
         Known design that checks the bound of every part that contains it, or None.
     reports_bounds
         Whether bounds are bounds of the objective, and appear in progress reports.
-    node_count
-        Number of parts bounded so far, the root included.
-    open_nodes
-        Parts that remain, as a heap.
+    node_count, open_nodes
+        Number of parts bounded so far, the root included, and parts that remain, as a heap.
     complete
         Whether the search ended by its own criterion, and not by a limit of time or number.
     """

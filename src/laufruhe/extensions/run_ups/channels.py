@@ -27,10 +27,7 @@ def _peak_error(engine: Engine) -> float:
 class RunChannel(NumberChannel):
     """Largest value of a signal in run-up and shut-down, integrated in time.
 
-    Attributes
-    ----------
-    part
-        Attribute of a response with the signal, shape (times, places, d); the channel is its largest length.
+    The signal, shape (times, places, d), is the attribute `part` of a response; the channel is its largest length.
     """
 
     needs: Need = RUN

@@ -10,12 +10,10 @@ from laufruhe.machine.extra import Extra
 
 @dataclass(frozen=True)
 class Run(Extra):
-    """Run from rest to a speed and back, at constant acceleration each way.
+    """Run from rest to a speed [rad/s] and back, at constant acceleration each way.
 
     Attributes
     ----------
-    speed
-        Speed at the end of the run-up [rad/s].
     up, down
         Time of run-up and of shut-down [s].
     point

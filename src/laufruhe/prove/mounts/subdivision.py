@@ -56,16 +56,12 @@ def is_stiffness_problem(problem: Problem) -> bool:
 def stiffness_bounds(
     problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance.
+    """Yield bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance [SI].
 
     Parameters
     ----------
-    problem
-        Problem for which `is_stiffness_problem` returns True.
     value
         Objective of the incumbent [SI]. Without one it is infinite, and an infinite bound proves infeasibility.
-    gap_tolerance
-        Improvement that counts as none [SI].
     shares
         Shares of the box budget, one bound after each.
     witness

@@ -73,19 +73,12 @@ def solve_joint(
 
     Parameters
     ----------
-    problem
-        Problem on elastic mounts.
     workers
         Number of processes; by default the number of processors.
     defer_bounds
         True to leave bounds to `with_mount_bounds`, for one of several problems.
     start_mounts
         Numbers of the mounts of the first start [SI], shape (n,).
-
-    Raises
-    ------
-    SolverError
-        If a process of the solver dies.
     """
     return _search_and_bound(
         problem, workers, None, None if start_mounts is None else (list(start_mounts), None), defer_bounds
