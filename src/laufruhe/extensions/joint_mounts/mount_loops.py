@@ -123,15 +123,7 @@ def open_stiffness(
 
 
 def mount_loop(problem: Problem, omegas: Array, lower: Array, upper: Array) -> Loop:
-    """Return the feedback loop of a problem over a box of open numbers of mounts.
-
-    Parameters
-    ----------
-    omegas
-        Angular frequencies [rad/s], shape (w,).
-    lower, upper
-        Open numbers of the mounts, shape (n,).
-    """
+    """Return the feedback loop at w frequencies [rad/s] over a box of open numbers of mounts, shape (n,)."""
     equations = _BlockOnMounts(problem, omegas, lower, upper)
     inverse = inverses(equations.body[..., :6])
     back = inverse @ equations.body[..., 6:]
