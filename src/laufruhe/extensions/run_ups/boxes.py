@@ -97,12 +97,9 @@ def bounds_runs(problem: Problem) -> bool:
 
 
 def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
-    """Return True if no design within the limits meets a stop, so that its run-up is that without stops.
-
-    Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
-    push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
-    steps.
-    """
+    # Limits of travel must lie below each gap. If stops alone turn no motion by more than half a radian in a step, they
+    # push back at most a 24th of the travel beyond their gaps. So a design that meets a stop also exceeds the limit in
+    # steps, and the run-up of all others is that without stops.
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
     maximum = min((limit.maximum for limit in limits), default=math.inf)
