@@ -219,8 +219,8 @@ def ratio_under(
         minimum, high = np.zeros(len(best)), top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
         for _ in range(HALVINGS):
             t = 0.5 * (minimum + high)
-            least = top.value - top.remainder - t * over - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1)
-            minimum, high = np.where(least >= 0.0, t, minimum), np.where(least >= 0.0, high, t)
+            excess = top.value - top.remainder - t * over - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1)
+            minimum, high = np.where(excess >= 0.0, t, minimum), np.where(excess >= 0.0, high, t)
         best = np.maximum(best, np.where(is_bounded, minimum, 0.0))
         scores = np.maximum(scores, (top.scores + minimum[:, None] * bottom.scores) / bottom.value[:, None])
     return best, scores

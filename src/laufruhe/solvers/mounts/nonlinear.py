@@ -252,7 +252,6 @@ def _method(optima: Sequence[LocalOptimum], scale: float, balance_gap: float | N
 def _without_design(
     problem: Problem, search: MountSearch, initial: Evaluation, division: BoxResult, timing: dict[str, float]
 ) -> Result:
-    """Return a result without a design: infeasible with the conflicting limits if proven, else failed."""
     conflict = _proven_conflict(problem)
     if not conflict and division.bound == math.inf:
         conflict = minimal_conflict(problem)
