@@ -1,7 +1,5 @@
 """A program over cones, by its dual and as told: x and z keep the conditions and meet, whatever was solved before."""
 
-from typing import Any
-
 import clarabel
 import numpy as np
 import pytest
@@ -9,11 +7,9 @@ from scipy.sparse import coo_array
 
 from laufruhe.extensions.mount_relaxation.cone_solver import (
     Cone,
-    DualSolver,
-    PrimalSolver,
+    ConeSolver,
     column,
     matrix_of,
-    solver_for,
 )
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
@@ -48,19 +44,18 @@ class Program:
         ]
         self.costs = generator.normal(size=(3, width))
 
-    def solver(self, kind: Any) -> DualSolver | PrimalSolver:
+    def solver(self, is_dual: bool | None = None) -> ConeSolver:
         """By its dual, or as told."""
         kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
-        found: DualSolver | PrimalSolver = kind(coo_array(self.rows), self.right, self.cones, kinds, SETTINGS)
-        return found
+        return ConeSolver(coo_array(self.rows), self.right, self.cones, kinds, SETTINGS, is_dual)
 
 
-@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
+@pytest.mark.parametrize("is_dual", [True, False])
 @pytest.mark.parametrize("seed", range(4))
-def test_both_keep_their_conditions_and_meet(seed: int, kind: Any) -> None:
+def test_both_keep_their_conditions_and_meet(seed: int, is_dual: bool) -> None:
     program = Program(seed)
     for cost in program.costs:
-        x, z, minimum = program.solver(kind).solve(cost)
+        x, z = program.solver(is_dual).solve(cost)
         slack = program.right - program.rows @ x
         assert np.abs(slack[:3]).max() < 1e-6
         assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
@@ -72,33 +67,22 @@ def test_both_keep_their_conditions_and_meet(seed: int, kind: Any) -> None:
             assert np.linalg.eigvalsh(matrix_of(left[own], SIZE)).min() > -1e-6
         assert z[3 : 3 + 2 * COUNT].min() > -1e-6
         assert z[-4] - np.linalg.norm(z[-3:]) > -1e-6
-        assert minimum == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
+        assert cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
 
 
 def test_what_is_larger_stands_in_a_program_once() -> None:
     program = Program(1)
-    assert isinstance(program.solver(solver_for), DualSolver)
+    assert program.solver().is_dual
     program.rows = np.concatenate([program.rows, program.rows[-4:], program.rows[-4:]])
     program.right = np.concatenate([program.right, program.right[-4:], program.right[-4:]])
     program.cones[-1:] = [Cone(12, clarabel.SecondOrderConeT(12), True)]
-    assert isinstance(program.solver(solver_for), PrimalSolver)
+    assert not program.solver().is_dual
 
 
-@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
-def test_an_answer_does_not_depend_on_those_before(kind: Any) -> None:
+@pytest.mark.parametrize("is_dual", [True, False])
+def test_an_answer_does_not_depend_on_those_before(is_dual: bool) -> None:
     program = Program(7)
-    several = program.solver(kind)
+    several = program.solver(is_dual)
     for cost in (*program.costs, *program.costs[::-1]):
-        for told, alone in zip(several.solve(cost), program.solver(kind).solve(cost), strict=True):
+        for told, alone in zip(several.solve(cost), program.solver(is_dual).solve(cost), strict=True):
             assert np.array_equal(told, alone)
-
-
-@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
-def test_what_has_no_least_value_is_told(kind: Any) -> None:
-    program = Program(3)
-    # nothing holds an entry that no row has
-    rows, width = np.column_stack([program.rows, np.zeros(len(program.rows))]), program.rows.shape[1] + 1
-    kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in program.matrices]
-    unbounded = kind(coo_array(rows), program.right, program.cones, kinds, SETTINGS)
-    assert unbounded.solve(np.eye(width)[-1])[2] == np.inf
-    assert np.isfinite(unbounded.solve(np.append(program.costs[0], 0.0))[2])

@@ -8,10 +8,9 @@ import pytest
 
 from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
 from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
+from laufruhe.extensions.mount_relaxation.cone_program import ROUGH, ConeProgram, Objectives, bounds_ahead
 from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
-from laufruhe.extensions.mount_relaxation.speculation import Objectives, bounds_ahead
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 
@@ -46,7 +45,9 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
     half, whole = (boxes.cut_off(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
     aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
     found = [Objectives(program, None).bound(0, aim)[0] for program in (whole, half, whole)]
-    alone = [ConeProgram(program).minimum(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)]
+    alone = [
+        ConeProgram(program, ROUGH).minimum(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)
+    ]
     assert found == [*alone, alone[0]]
     assert alone[0] != alone[1]
 
@@ -58,5 +59,5 @@ def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -
     boxes, anew = (SdpRelaxation(problem, value, 1e-3, near) for _ in range(2))
     at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]
     boxes.bound(at, boxes.upper)
-    found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0]).minimum(aim)[0] for one in (boxes, anew))
+    found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0], ROUGH).minimum(aim)[0] for one in (boxes, anew))
     assert found == alone

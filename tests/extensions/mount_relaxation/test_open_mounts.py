@@ -108,12 +108,12 @@ def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
     for k, own in enumerate(sets):
         domains.append(Domain(Decision(f"d{k}", "kg m", own, 0j, ()), start))
         start += domains[-1].width
-    columns, middles = unbalance_basis(domains, [0j for _ in sets])
+    columns = unbalance_basis(domains, [0j for _ in sets])
     farthest = np.zeros(start)
     for _ in range(400):
         drawn = random.uniform(-1.0, 1.0, start)
         x = np.concatenate([domain.project(drawn) for domain in domains])
-        u = np.linalg.solve(columns.domain_map, x - middles)
+        u = np.linalg.solve(columns.domain_map, x - columns.middles)
         farthest = np.maximum(farthest, np.abs(u))
         lifted = np.concatenate([[1.0], u])
         assert all(lifted @ matrix @ lifted <= 1e-12 for matrix in columns.sets)

@@ -52,7 +52,7 @@ def table(result: Result, title: str) -> Any:
 def test_two_designs_and_every_tolerance_have_a_row(built: Result) -> None:
     found = built.details
     assert isinstance(found, RobustResult)
-    assert [row[0] for row in table(built, "Under tolerance").rows] == ["best drawing", "decided", "price"]
+    assert [row[0] for row in table(built, "Under tolerance").rows] == ["nominal design", "robust design", "price"]
     assert [row[0] for row in table(built, "Tolerances").rows] == [one.name for one in found.tolerances]
     record = as_dict(built)["robust"]
     assert record["over"] == "worst case"

@@ -94,7 +94,7 @@ def test_worst_case_is_proven(result: Result) -> None:
     assert result.details.exact
     assert result.details.robust.worst == worst(result)
     assert result.details.robust.worst < result.details.nominal.worst
-    # the best drawing is the best drawing
+    # the best drawing is the nominal design
     assert result.details.nominal.drawing <= result.details.robust.drawing
 
 
@@ -192,7 +192,7 @@ def limited(read: Callable[[str], Problem], maximum: float) -> tuple[Problem, _P
     """A limit of the shaking force, and the program of engines as drawn."""
     limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{maximum} N"\n'
     problem = read(TEXT + ROBUST + limit)
-    program = _Program(problem, 0.0)
+    program = _Program(problem)
     program.add([np.zeros(tolerances_of(problem).count)])
     return problem, program
 

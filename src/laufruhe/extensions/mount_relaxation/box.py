@@ -9,12 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
-from laufruhe.extensions.mount_relaxation.constraints import (
-    MomentConstraint,
-    moment_constraints,
-    stiffness_constraints,
-)
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram, Objectives
+from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint, moment_constraints
+from laufruhe.extensions.mount_relaxation.limits import UNBOUNDED
 from laufruhe.extensions.mount_relaxation.modes import mode_constraints
 from laufruhe.extensions.mount_relaxation.odd_multiples import (
     HighOrder,
@@ -25,6 +22,7 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import (
 )
 from laufruhe.extensions.mount_relaxation.orders import EpigraphVariable, MeasureOrders, Order
 from laufruhe.extensions.mount_relaxation.program import (
+    LinearLimit,
     QuadraticBound,
     RootTerm,
     SdpProgram,
@@ -33,7 +31,6 @@ from laufruhe.extensions.mount_relaxation.program import (
     proven_bound,
 )
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
-from laufruhe.extensions.mount_relaxation.speculation import Objectives
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.budget import timed_rounds
 
@@ -86,8 +83,8 @@ class BoxRelaxation:
             for basis, sides in zip(search.modes, search.mode_sides, strict=True)
         )
 
-    def bound(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> tuple[float, Array, Array | None]:
-        """Return a lower bound of the norm on the box, branching scores, and open numbers at the optimum or None.
+    def bound(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> tuple[float, Array]:
+        """Return a lower bound of the norm on the box, and branching scores.
 
         Several variables are bounded one by one. The chords of their roots between lower and upper bounds are then
         bounded together (E54). On the root box, the lower bounds of its roots are written to `root_bounds`.
@@ -95,11 +92,11 @@ class BoxRelaxation:
         scores = np.zeros(len(self.lower))
         self.roots = root_bounds
         if not variables:
-            return 0.0, scores, None
+            return 0.0, scores
         if _is_single(variables):
-            squared_root, scores, optimum = self._solve(variables, np.ones(1))
+            squared_root, scores = self._solve(variables, np.ones(1))
             root = variables[0].unit * math.sqrt(max(squared_root, 0.0)) - variables[0].loss
-            return max(root, 0.0), scores, optimum
+            return max(root, 0.0), scores
         self.roots = root_bounds.copy()
         units = np.array([variable.unit for variable in variables])
         for k in np.flatnonzero(_matters(units * [variable.share for variable in variables])).tolist():
@@ -114,11 +111,11 @@ class BoxRelaxation:
             root_bounds[:] = self.roots
         return result
 
-    def _bound_mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> tuple[float, Array, Array | None]:
+    def _bound_mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> tuple[float, Array]:
         mean = self._mean(variables, roots)
         if mean.floor >= self.cutoff:
-            return mean.floor, np.zeros(len(self.lower)), None
-        bound, scores, optimum = self._solve(variables, mean.prices, mean)
+            return mean.floor, np.zeros(len(self.lower))
+        bound, scores = self._solve(variables, mean.prices, mean)
         bound = max(bound + mean.constant, mean.floor)
         # a branch may also tighten bounds of odd multiples (E62)
         multiple_scores = np.zeros(len(scores))
@@ -129,7 +126,7 @@ class BoxRelaxation:
                     weight = variable.share * variable.factor / multiple / len(self.query.mounts)
                     for j, looseness in enumerate(high_order.looseness(self._solution_s) * weight):
                         self._score(multiple_scores, [j], float(looseness))
-        return bound, joint_scores(scores, multiple_scores, self.upper_norm - bound), optimum
+        return bound, joint_scores(scores, multiple_scores, self.upper_norm - bound)
 
     def _narrow_roots(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> Array:
         """Return lower bounds of each root, given that the norm of the whole stays below its upper bound (E58).
@@ -201,8 +198,8 @@ class BoxRelaxation:
 
     def _solve(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
-    ) -> tuple[float, Array, Array | None]:
-        """Return the proven least sum of priced variables or roots, branching scores, and open numbers, or None."""
+    ) -> tuple[float, Array]:
+        """Return the proven least sum of priced variables or roots, and branching scores."""
         # the solver works best if prices add up to one
         scale = float(prices.sum())
         program, responses = self._program(variables, prices / scale, mean)
@@ -210,14 +207,9 @@ class BoxRelaxation:
             program = replace(program, objective=np.append(mean.slopes / scale, np.zeros(5 * len(self.modes))))
         solution = ConeProgram(program).solve(program)
         self._solution_s = solution.s
-        optimum = None
-        if self.search.stiffness_alone:
-            optimum = 0.5 * (self.lower + self.upper)[: self.search.mount_numbers]
-            for j, decisions in enumerate(self.mounts.decisions):
-                optimum[decisions[0]] += 0.5 * (self.upper - self.lower)[decisions[0]] * solution.s[j]
         orders = [order for variable in variables for order in variable.orders]
         scores = self._branching_scores(orders, responses, solution)
-        return scale * proven_bound(program, solution.multipliers), scores, optimum
+        return scale * proven_bound(program, solution.multipliers), scores
 
     def cut_off(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> SdpProgram:
         """Return the program of designs in the box with a norm up to its upper bound."""
@@ -233,37 +225,53 @@ class BoxRelaxation:
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[SdpProgram, list[Response]]:
-        """Return the program of variables at prices, and the responses to its orders."""
+        """Return the program of variables at prices, and the responses to their orders, then to those of limits alone.
+
+        Limits bound further epigraph variables above, or the squares of forces by those at rest (E61).
+        """
         quadratics: list[QuadraticBound] = []
         responses: list[Response] = []
         constraints: list[MomentConstraint] = []
         roots: list[RootTerm] = []
-        for number, variable in enumerate(variables):
-            first = len(responses)
-            for k, order in enumerate(variable.orders, first):
-                response, order_constraints = self._state(order, self.query.bound(order, variable, self.upper_norm))
+        numbers_of_orders: dict[tuple[int, int, int, bool], int] = {}
+
+        def number_of(order: Order, bound: ResponseBound) -> int:
+            key = order.point, order.index, order.part, order.omega > 0.0
+            if key not in numbers_of_orders:
+                response, order_constraints = self._state(order, bound)
+                number = numbers_of_orders[key] = len(responses)
+                constraints.extend(replace(constraint, order=number) for constraint in order_constraints)
                 responses.append(response)
-                constraints += [replace(constraint, order=k) for constraint in order_constraints]
-            numbers = range(first, len(responses))
-            quadratics += variable.quadratic_bounds(number, self.query, responses[first:], numbers)
+            return numbers_of_orders[key]
+
+        for number, variable in enumerate(variables):
+            numbers = [number_of(o, self.query.bound(o, variable, self.upper_norm)) for o in variable.orders]
+            variable_responses = [responses[k] for k in numbers]
+            quadratics += variable.quadratic_bounds(number, self.query, variable_responses, numbers)
             if mean is not None:
-                lengths = variable.lengths(self.query, responses[first:], numbers)
+                lengths = variable.lengths(self.query, variable_responses, numbers)
                 lower, upper = float(mean.lower[number]), float(mean.upper[number])
                 roots.append(RootTerm(prices[number], lower, upper, lengths))
-        # bounds of stiffness in motions of a symmetry without orders (E57)
-        parts = {order.part for variable in variables for order in variable.orders}
-        for k, mounts in enumerate(self.parts):
-            if k and k not in parts and 0 not in parts:
-                constraints += stiffness_constraints(mounts, responses[0].size)
-        terms = self.search.limits.terms(variables, self._state, responses)
-        responses += terms.responses
+        uppers, ratios = [math.inf] * len(variables), list[LinearLimit]()
+        for limit in self.search.limits.norms:
+            for variable in limit.variables:
+                numbers = [number_of(o, limit.query.bound(o, variable, limit.upper)) for o in variable.orders]
+                variable_responses = [responses[k] for k in numbers]
+                quadratics += variable.quadratic_bounds(len(uppers), limit.query, variable_responses, numbers)
+                uppers.append((variable.root_bound(limit.upper / variable.share) / variable.unit) ** 2)
+        for ratio in self.search.limits.ratios:
+            moving, resting = (
+                [number_of(order, UNBOUNDED) for order in orders] for orders in (ratio.orders, ratio.orders_at_rest)
+            )
+            forces = {k: responses[k].forces * responses[k].unit for k in (*moving, *resting)}
+            size = max(float(np.linalg.norm(force[..., 0])) for force in forces.values()) or 1.0
+            matrices = [(k, squared(forces[k] / size)) for k in moving]
+            ratios.append((*matrices, *((k, -(ratio.upper**2) * squared(forces[k] / size)) for k in resting)))
         program = SdpProgram(
             tuple(response.size for response in responses), tuple(response.reaches for response in responses),
             self.mounts.numbers, responses[0].columns,
-            np.append(0.0 * prices if roots else prices, np.zeros(len(terms.uppers))),
-            [*quadratics, *terms.quadratics], [*constraints, *terms.constraints], terms.linear,
-            self.search.basis.sets, roots, self.modes,
-            np.append(np.full(len(variables), math.inf), terms.uppers),
+            np.append(0.0 * prices if roots else prices, np.zeros(len(uppers) - len(variables))),
+            quadratics, constraints, ratios, self.search.basis.sets, roots, self.modes, np.array(uppers),
         )  # fmt: skip
         return program, responses
 

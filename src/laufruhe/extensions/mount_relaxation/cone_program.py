@@ -1,23 +1,30 @@
-"""Statement of the relaxation (E43-E45, E52-E54) as a cone program; any multipliers of it prove valid bounds."""
+"""Statement of the relaxation (E43-E45, E52-E54) as a cone program; any multipliers of it prove valid bounds.
+
+Several objectives under the same constraints are bounded by one program; worker processes may bound them ahead.
+"""
 
 from __future__ import annotations
 
 import math
+import pickle
+import threading
 from collections import defaultdict
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import cached_property
+from itertools import islice
 from typing import Any, TypeAlias
+from uuid import uuid4
 
 import numpy as np
 from scipy.sparse import coo_array, vstack
 
 from laufruhe.extensions.mount_relaxation.cone_solver import (
     Cone,
-    DualSolver,
-    PrimalSolver,
+    ConeSolver,
     column,
     matrix_of,
-    solver_for,
     triangle,
 )
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
@@ -32,6 +39,7 @@ from laufruhe.extensions.mount_relaxation.program import (
     proven_bound,
 )
 from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.workers import Speculation, speculation
 
 # small price of each square in the objective, which makes the remainder of the multipliers convex
 SQUARE_PRICE = 3e-7
@@ -50,23 +58,27 @@ _SETTINGS = {
     "max_step_fraction": 0.95,
 }
 
+# seconds of relaxations after which worker processes start: such searches often need dozens
+START_SECONDS = 0.25
+
 ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"
-_Parts: TypeAlias = defaultdict[Hashable, list[Array]]
+_Step: TypeAlias = tuple[str, bytes, Array | int]
+Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 
 class ConeProgram:
     """Rows of cones of an `SdpProgram`.
 
     The variables are, in this order: epigraph variables, blocks of their quadratic bounds, roots and their lengths, s,
-    and moments of each order and of each mode.
+    and moments of each order and of each mode. `tolerances` are those of gap and feasibility.
     """
 
-    def __init__(self, program: SdpProgram) -> None:
+    def __init__(self, program: SdpProgram, tolerances: tuple[float, float] = FINE) -> None:
         self.program = program
+        self._settings = {**_SETTINGS, **dict(zip(("tol_gap_rel", "tol_feas"), tolerances, strict=True))}
         self.rows: list[Any] = []
         self.right: list[Array] = []
         self.cones: list[tuple[str, Hashable]] = []
-        self._solvers: dict[tuple[float, float], DualSolver | PrimalSolver] = {}
         blocks = [_entries(size) for quadratic in program.quadratics for size in quadratic.blocks]
         self.blocks = np.cumsum([len(program.prices), *blocks])
         counts = [1 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
@@ -149,9 +161,8 @@ class ConeProgram:
         for matrix in program.sets:
             self._add(column(matrix)[None], self._corner(0), SIDES, "sets")
         for linear in program.linear:
-            columns = np.concatenate([self._moment(order) for order, _ in linear.matrices])
-            block = np.concatenate([column(matrix) for _, matrix in linear.matrices])[None]
-            self._add(block, columns, SIDES, "linear", np.array([linear.upper]))
+            columns = np.concatenate([self._moment(order) for order, _ in linear])
+            self._add(np.concatenate([column(matrix) for _, matrix in linear])[None], columns, SIDES, "linear")
         if len(program.uppers):
             bounded = np.flatnonzero(np.isfinite(program.uppers))
             self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
@@ -217,14 +228,14 @@ class ConeProgram:
             program = replace(self.program, limit=replace(self.program.limit, root=objective))
         else:
             program = replace(self.program, objective=objective)
-        solution = self.solve(program, ROUGH)
+        solution = self.solve(program)
         modes = [moments[0, 0, 1:] for moments in solution.modes]
         return proven_bound(program, solution.multipliers), np.concatenate([solution.s, *modes])
 
-    def solve(self, program: SdpProgram, tolerances: tuple[float, float] = FINE) -> Solution:
+    def solve(self, program: SdpProgram) -> Solution:
         """Return multipliers and moments of a program with the same constraints, whatever the solver's status."""
-        x, z, value = self._solver(tolerances).solve(self._cost(program))
-        parts: _Parts = defaultdict(list)
+        x, z = self._solver.solve(self._cost(program))
+        parts: defaultdict[Hashable, list[Array]] = defaultdict(list)
         for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
             parts[name].append(part)
         lengths = []
@@ -232,6 +243,14 @@ class ConeProgram:
             # vectors of the second-order cones without their first entry, order by order
             vectors = iter(parts["lengths", number])
             lengths.append([-np.array([next(vectors)[1:] for _ in rows]) for _, rows in root.rows])
+        mode_multipliers = []
+        for number, mode in enumerate(program.modes):
+            matrices = [
+                matrix_of(part, len(t[0])) for part, t in zip(parts["matrices", number], mode.matrices, strict=True)
+            ]
+            signs = [[matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0)]
+            (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
+            mode_multipliers.append(ModeMultipliers(matrices, sides, -equal, corners, [*zip(*signs, strict=True)]))
         multipliers = SdpMultipliers(
             [matrix_of(part, bound.size) for part, bound in zip(parts["quadratics"], program.quadratics, strict=True)],
             [
@@ -244,7 +263,7 @@ class ConeProgram:
             _joined(parts["chords"]),
             lengths,
             float(sum(part[0] for part in parts["limit"])),
-            [self._mode_multipliers(number, mode, parts) for number, mode in enumerate(program.modes)],
+            mode_multipliers,
         )
         moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         modes = []
@@ -252,16 +271,7 @@ class ConeProgram:
             entries = x[start:end].reshape(1 + program.numbers, -1)
             modes.append(np.array([matrix_of(entries_of_matrix, 6) for entries_of_matrix in entries]))
         s = np.clip(x[self.first : self.first + program.numbers], -1.0, 1.0)
-        return Solution(multipliers, s, moments, value, modes)
-
-    def _mode_multipliers(self, number: int, mode: ModeConstraints, parts: _Parts) -> ModeMultipliers:
-        matrices = [
-            matrix_of(part, tensor.shape[1])
-            for part, tensor in zip(parts["matrices", number], mode.matrices, strict=True)
-        ]
-        upper_parts, lower_parts = ([matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0))
-        (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
-        return ModeMultipliers(matrices, sides, -equal, corners, [*zip(upper_parts, lower_parts, strict=True)])
+        return Solution(multipliers, s, moments, modes)
 
     def _cost(self, program: SdpProgram) -> Array:
         cost = np.zeros(int(self.modes[-1]))
@@ -277,27 +287,74 @@ class ConeProgram:
             cost[self._moment(order)] = -SQUARE_PRICE * _diagonal(size)
         return cost
 
-    def _solver(self, tolerances: tuple[float, float]) -> DualSolver | PrimalSolver:
-        """Return the solver for all objectives under these constraints, at tolerances (gap, feasibility)."""
+    @cached_property
+    def _solver(self) -> ConeSolver:
+        """Solver for all objectives under these constraints."""
         import clarabel
 
-        if tolerances not in self._solvers:
-            kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
-            cones = []
-            for (cone, _), right in zip(self.cones, self.right, strict=True):
-                size = len(right)
-                if cone == MATRIX:
-                    # rows of the matrix from the size of its triangle
-                    cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
-                else:
-                    cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
-            moments = [
-                (self._moment(order), clarabel.PSDTriangleConeT(size)) for order, size in enumerate(self.program.sizes)
-            ]
-            rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
-            settings = {**_SETTINGS, **dict(zip(("tol_gap_rel", "tol_feas"), tolerances, strict=True))}
-            self._solvers[tolerances] = solver_for(rows, right, cones, moments, settings)
-        return self._solvers[tolerances]
+        kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+        cones = []
+        for (cone, _), right in zip(self.cones, self.right, strict=True):
+            size = len(right)
+            if cone == MATRIX:
+                # rows of the matrix from the size of its triangle
+                cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
+            else:
+                cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
+        moments = [(self._moment(k), clarabel.PSDTriangleConeT(size)) for k, size in enumerate(self.program.sizes)]
+        rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
+        return ConeSolver(rows, right, cones, moments, self._settings)
+
+
+class _Cache(threading.local):
+    """Cone program that this thread built last, by name."""
+
+    name = ""
+    program: ConeProgram | None = None
+
+
+_CACHE = _Cache()
+
+
+def _bound(step: _Step) -> tuple[float, Array]:
+    name, program, objective = step
+    if _CACHE.program is None or _CACHE.name != name:
+        _CACHE.name, _CACHE.program = name, ConeProgram(pickle.loads(program), ROUGH)
+    return _CACHE.program.minimum(objective)
+
+
+def bounds_ahead() -> AbstractContextManager[Ahead]:
+    """Return the speculative executor for all boxes of one search."""
+    return speculation(_bound, START_SECONDS)
+
+
+class Objectives:
+    """Objectives of one program; each worker has a copy of it, so that all workers return the same bounds."""
+
+    def __init__(self, program: SdpProgram, ahead: Ahead | None) -> None:
+        self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead
+        if ahead is not None:
+            ahead.discard()
+
+    def bound(self, key: Hashable, objective: Array | int) -> tuple[float, Array]:
+        """Return the bound and optimum as `ConeProgram.minimum` does; `key` names the objective."""
+        step = (self._name, self._program, objective)
+        return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
+
+    def all_bounds(self, objectives: Sequence[Array | int]) -> list[float]:
+        """Return the bound of each objective; later ones are computed ahead."""
+        bounds = []
+        for k, objective in enumerate(objectives):
+            self.prefetch(islice(enumerate(objectives), k, None))
+            bounds.append(self.bound(k, objective)[0])
+        return bounds
+
+    def prefetch(self, objectives: Iterable[tuple[Hashable, Array | int]]) -> None:
+        """Start objectives that may follow, the most likely first."""
+        if self._ahead is not None:
+            self._ahead.prefetch(
+                ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives
+            )
 
 
 def _joined(parts: Sequence[Array]) -> Array:

@@ -12,7 +12,6 @@ and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001
 from __future__ import annotations
 
 import math
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -47,7 +46,7 @@ class Cone:
     has_one_scale: bool
 
 
-class _ConeSolver:
+class ConeSolver:
     """Solver of one program for any cost vector.
 
     Parameters
@@ -60,110 +59,64 @@ class _ConeSolver:
         Columns of each X_k and its cone; at least one.
     settings
         Settings of Clarabel.
+    is_dual
+        True to solve the second program, False for the first; by default the one that stores the larger cones once: the
+        matrices X_k, or the cones with one scale.
     """
 
     def __init__(
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
-        settings: Mapping[str, Any],
+        settings: Mapping[str, Any], is_dual: bool | None = None,
     ) -> None:  # fmt: skip
+        if is_dual is None:
+            matrix_size = sum(len(columns) ** 2 for columns, _ in matrices)
+            is_dual = matrix_size >= sum(cone.size**2 for cone in cones if cone.has_one_scale)
+        self.is_dual = is_dual
         self._settings = {**settings, "equilibrate_enable": False}
         self._row_scales, self._column_scales = _scales(rows, cones, matrices)
-        self._scaled_rows = csc_array(diags_array(self._row_scales) @ rows @ diags_array(self._column_scales))
+        scaled_rows = csc_array(diags_array(self._row_scales) @ rows @ diags_array(self._column_scales))
         self._right = self._row_scales * right
-        self._entries = np.concatenate([columns for columns, _ in matrices])
+        entries, (count, width) = np.concatenate([columns for columns, _ in matrices]), rows.shape
+        self._kinds = [kind for _, kind in matrices]
+        if is_dual:
+            free_count = width - len(entries)
+            self._order = np.concatenate([np.setdiff1d(np.arange(width), entries), entries])
+            self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
+            inequality_rows = np.flatnonzero(
+                np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones])
+            )
+            transposed = diags_array(self._signs) @ scaled_rows[:, self._order].T
+            added: Any = -eye_array(count, format="csr")[inequality_rows]
+            self._rows = csc_array(vstack([transposed, added]))
+            self._kinds = [_zero_cone(free_count), *self._kinds, *(c.kind for c in cones if c.kind is not None)]
+        else:
+            added = coo_array((-np.ones(len(entries)), (np.arange(len(entries)), entries)), (len(entries), width))
+            self._rows = csc_array(vstack([scaled_rows, added]))
+            self._kinds = [*(_zero_cone(c.size) if c.kind is None else c.kind for c in cones), *self._kinds]
+        self._zeros = np.zeros(added.shape[0])
         self._solver: Any = None
 
-    def solve(self, cost: Array) -> tuple[Array, Array, float]:
-        """Return x, z and q'x whatever the solver's status; q'x is infinite if it reports the program as unbounded."""
+    def solve(self, cost: Array) -> tuple[Array, Array]:
+        """Return x and z whatever the solver's status."""
         scaled = self._column_scales * cost
         size = float(np.abs(scaled).max(initial=0.0))
         factor = float(np.clip(1.0 / size, _MIN_SCALE, _MAX_SCALE)) if size > 0.0 else 1.0
-        x, z, is_bounded = self._solve_scaled(factor * scaled)
-        x = self._column_scales * x
-        return x, self._row_scales * z / factor, float(cost @ x) if is_bounded else math.inf
-
-    @abstractmethod
-    def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
-        # scaled x and z, and True if the program is bounded
-        raise NotImplementedError
-
-
-class DualSolver(_ConeSolver):
-    """Solver of the dual program."""
-
-    def __init__(
-        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
-        settings: Mapping[str, Any],
-    ) -> None:  # fmt: skip
-        super().__init__(rows, right, cones, matrices, settings)
-        count, width = rows.shape
-        free_count = width - len(self._entries)
-        self._order = np.concatenate([np.setdiff1d(np.arange(width), self._entries), self._entries])
-        self._signs = np.where(np.arange(width) < free_count, 1.0, -1.0)
-        inequality_rows = np.flatnonzero(
-            np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones])
-        )
-        self._zeros = np.zeros(len(inequality_rows))
-        transposed = diags_array(self._signs) @ self._scaled_rows[:, self._order].T
-        self._rows = csc_array(vstack([transposed, -eye_array(count, format="csr")[inequality_rows]]))
-        self._kinds = [
-            _zero_cone(free_count),
-            *(kind for _, kind in matrices),
-            *(cone.kind for cone in cones if cone.kind is not None),
-        ]
-
-    def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
-        import clarabel
-
-        right = np.append(-self._signs * cost[self._order], self._zeros)
-        if self._solver is None:
-            self._solver = new_solver(self._right, self._rows, right, self._kinds, self._settings)
+        scaled = factor * scaled
+        if self.is_dual:
+            vectors = {"q": self._right, "b": np.append(-self._signs * scaled[self._order], self._zeros)}
         else:
-            self._solver.update(b=right)
-        solution, status = self._solver.solve(), clarabel.SolverStatus
-        x = np.empty(len(cost))
-        x[self._order] = -self._signs * np.nan_to_num(np.array(solution.z))[: len(cost)]
-        # the dual is infeasible if the program is unbounded
-        is_bounded = solution.status not in (status.PrimalInfeasible, status.AlmostPrimalInfeasible)
-        return x, np.nan_to_num(np.array(solution.x)), is_bounded
-
-
-class PrimalSolver(_ConeSolver):
-    """Solver of the primal program."""
-
-    def __init__(
-        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
-        settings: Mapping[str, Any],
-    ) -> None:  # fmt: skip
-        super().__init__(rows, right, cones, matrices, settings)
-        count = len(self._entries)
-        entries = coo_array((-np.ones(count), (np.arange(count), self._entries)), shape=(count, rows.shape[1]))
-        self._rows = csc_array(vstack([self._scaled_rows, entries]))
-        self._sides = np.append(self._right, np.zeros(count))
-        self._kinds = [_zero_cone(cone.size) if cone.kind is None else cone.kind for cone in cones]
-        self._kinds += [kind for _, kind in matrices]
-
-    def _solve_scaled(self, cost: Array) -> tuple[Array, Array, bool]:
-        import clarabel
-
+            vectors = {"q": scaled, "b": np.append(self._right, self._zeros)}
         if self._solver is None:
-            self._solver = new_solver(cost, self._rows, self._sides, self._kinds, self._settings)
+            self._solver = new_solver(vectors["q"], self._rows, vectors["b"], self._kinds, self._settings)
         else:
-            self._solver.update(q=cost)
-        solution, status = self._solver.solve(), clarabel.SolverStatus
+            self._solver.update(**vectors)
+        solution = self._solver.solve()
         x, z = (np.nan_to_num(np.array(values)) for values in (solution.x, solution.z))
-        return x, z[: len(self._right)], solution.status not in (status.DualInfeasible, status.AlmostDualInfeasible)
-
-
-def solver_for(
-    rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]],
-    settings: Mapping[str, Any],
-) -> DualSolver | PrimalSolver:  # fmt: skip
-    """Return the solver that stores the larger cones once: the matrices X_k, or the cones with one scale."""
-    matrix_size = sum(len(columns) ** 2 for columns, _ in matrices)
-    cone_size = sum(cone.size**2 for cone in cones if cone.has_one_scale)
-    solver = DualSolver if matrix_size >= cone_size else PrimalSolver
-    return solver(rows, right, cones, matrices, settings)
+        if self.is_dual:
+            entries = np.empty(len(cost))
+            entries[self._order] = -self._signs * z[: len(cost)]
+            x, z = entries, x
+        return self._column_scales * x, self._row_scales * z[: len(self._right)] / factor
 
 
 def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:

@@ -59,7 +59,7 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
         constraints += _place_constraints(numbers, place, loads, shifted)
     unit, unturned_motions = mounts.highest, mounts.unturned_motions
     # A - L and U - A; where places are open, only in motions without turns about them
-    for sign, matrix in _stiffness_limits(mounts):
+    for sign, matrix in [*((1.0, floor) for floor in mounts.floors), *((-1.0, ceiling) for ceiling in mounts.ceilings)]:
         image = sign * (response.carried - matrix @ response.motion) / unit
         constant, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
         constraint = product_constraint(constant, slopes, response.motion, image)
@@ -154,22 +154,6 @@ def _place_constraints(
     difference = squares[0] - squares[1]
     scale = float(np.square(plain).sum() + np.square(products).sum())
     return [*constraints, _of_moments(numbers, 0.5 * (difference + difference.transpose(0, 1, 3, 2)), scale)]
-
-
-def _stiffness_limits(mounts: OpenMounts) -> list[tuple[float, Array]]:
-    return [*((1.0, floor) for floor in mounts.floors), *((-1.0, ceiling) for ceiling in mounts.ceilings)]
-
-
-def stiffness_constraints(mounts: OpenMounts, size: int) -> list[MomentConstraint]:
-    """Return A - L and U - A in motions without orders, for moments of shape (size, size)."""
-    unit, unturned_motions, constraints = mounts.highest, mounts.unturned_motions, []
-    for sign, matrix in _stiffness_limits(mounts):
-        constant, slopes = (
-            unturned_motions.T @ part @ unturned_motions / unit for part in (mounts.middle - matrix, mounts.slopes)
-        )
-        no_moments = np.zeros((len(constant), len(constant), size, size))
-        constraints.append(MomentConstraint(0, sign * constant, sign * slopes, no_moments))
-    return constraints if unturned_motions.size else []
 
 
 def _restricted(constraint: MomentConstraint, motions: Array) -> MomentConstraint:

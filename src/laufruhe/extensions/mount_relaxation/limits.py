@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
-import numpy as np
-
-from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts
 from laufruhe.extensions.mount_relaxation.orders import (
     MAX_ORDERS,
@@ -21,8 +19,7 @@ from laufruhe.extensions.mount_relaxation.orders import (
     Order,
     epigraph_variables,
 )
-from laufruhe.extensions.mount_relaxation.program import LinearLimit, QuadraticBound
-from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, squared
+from laufruhe.extensions.mount_relaxation.response import ResponseBound
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.spectrum import orders_equal
@@ -35,9 +32,6 @@ from laufruhe.prove.mounts.ranges import SLACK
 # a limit enters only if the best design has more than this share of it
 NEAR_LIMIT = 0.7
 UNBOUNDED = ResponseBound((), math.inf, False)
-
-Stated = tuple[Response, list[MomentConstraint]]
-"""Response to an order, and the constraints on its moments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,28 +50,10 @@ class RatioLimit:
     orders: tuple[Order, ...]
     upper: float
 
-
-@dataclass(eq=False)
-class LimitTerms:
-    """Terms that limits add to a program.
-
-    Attributes
-    ----------
-    responses
-        Responses to orders that the objective lacks.
-    constraints
-        Constraints on the moments of these orders.
-    quadratics, uppers
-        Quadratic bounds of further epigraph variables, and the upper bounds of these variables.
-    linear
-        Limits of transmissibility.
-    """
-
-    responses: list[Response] = field(default_factory=list)
-    constraints: list[MomentConstraint] = field(default_factory=list)
-    quadratics: list[QuadraticBound] = field(default_factory=list)
-    uppers: list[float] = field(default_factory=list)
-    linear: list[LinearLimit] = field(default_factory=list)
+    @cached_property
+    def orders_at_rest(self) -> tuple[Order, ...]:
+        """The orders without motion, under the same loads."""
+        return tuple(replace(order, omega=0.0) for order in self.orders)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,78 +81,26 @@ class Limits:
         )
         return Limits(tuple(norms), tuple(ratios))
 
-    def terms(
-        self, variables: Sequence[EpigraphVariable], state: Callable[[Order, ResponseBound], Stated],
-        responses: Sequence[Response],
-    ) -> LimitTerms:  # fmt: skip
-        """Return the terms that limits add to a program.
-
-        Parameters
-        ----------
-        variables, responses
-            Epigraph variables of the objective, and the responses to their orders.
-        state
-            Return the response to an order, and the constraints on its moments.
-        """
-        terms, numbers_of_orders = (
-            LimitTerms(),
-            {_key(o): k for k, o in enumerate(o for v in variables for o in v.orders)},
-        )
-        all_responses = list(responses)
-
-        def order_number(order: Order, bound: ResponseBound) -> int:
-            if _key(order) not in numbers_of_orders:
-                response, constraints = state(order, bound)
-                numbers_of_orders[_key(order)] = len(all_responses)
-                terms.constraints += [replace(constraint, order=len(all_responses)) for constraint in constraints]
-                terms.responses.append(response)
-                all_responses.append(response)
-            return numbers_of_orders[_key(order)]
-
-        for limit in self.norms:
-            for variable in limit.variables:
-                numbers = [
-                    order_number(order, limit.query.bound(order, variable, limit.upper)) for order in variable.orders
-                ]
-                norm_responses = [all_responses[k] for k in numbers]
-                terms.quadratics += variable.quadratic_bounds(
-                    len(variables) + len(terms.uppers), limit.query, norm_responses, numbers
-                )
-                terms.uppers.append((variable.root_bound(limit.upper / variable.share) / variable.unit) ** 2)
-        for ratio in self.ratios:
-            moving = [order_number(order, UNBOUNDED) for order in ratio.orders]
-            resting = [order_number(replace(order, omega=0.0), UNBOUNDED) for order in ratio.orders]
-            forces = {k: all_responses[k].forces * all_responses[k].unit for k in (*moving, *resting)}
-            size = max(float(np.linalg.norm(force[..., 0])) for force in forces.values()) or 1.0
-            matrices = [(k, squared(forces[k] / size)) for k in moving]
-            matrices += [(k, -(ratio.upper**2) * squared(forces[k] / size)) for k in resting]
-            terms.linear.append(LinearLimit(tuple(matrices), 0.0))
-        return terms
-
-
-def _key(order: Order) -> tuple[int, int, int, bool]:
-    return order.point, order.index, order.part, order.omega > 0.0
-
 
 def limits_of(
-    problem: Problem, evaluation: Evaluation, in_parts: Callable[[Measure], MeasureOrders],
-    of_all_motions: Callable[[Measure], MeasureOrders],
+    problem: Problem, evaluation: Evaluation,
+    orders_of: Callable[[Measure, Sequence[OpenMounts]], MeasureOrders], parts: Sequence[OpenMounts],
 ) -> Limits:  # fmt: skip
-    """Return the limits that the best design comes near.
+    """Return the limits that the best design comes near; transmissibility is limited in all motions (E57).
 
     Parameters
     ----------
     evaluation
         The best design.
-    in_parts
-        Return the orders of a measure, each in the symmetric parts of the motions if there are such (E57).
-    of_all_motions
-        Return the orders of a measure in all motions.
+    orders_of
+        Return the orders of a measure in some parts of the motions.
+    parts
+        Mounts for all motions, then for each symmetry if there is one.
     """
     norms: list[NormLimit] = []
     for limit in problem.limits:
         if limit.measure.on_mounts and NEAR_LIMIT * limit.maximum <= evaluation.value(limit.measure) < math.inf:
-            query = in_parts(limit.measure)
+            query = orders_of(limit.measure, parts)
             if query.orders and query.is_sampled_fully:
                 norms.append(NormLimit(query, (), limit.maximum * (1.0 + SLACK)))
     ratios: list[RatioLimit] = []
@@ -184,7 +108,8 @@ def limits_of(
         measure = limit.measure
         if not measure.channel.depends_on_loads or evaluation.value(measure) < NEAR_LIMIT * limit.maximum:
             continue
-        query = of_all_motions(Measure(channels.MOUNT_FORCE, RMS, points=measure.points, orders=measure.orders))
+        force = Measure(channels.MOUNT_FORCE, RMS, points=measure.points, orders=measure.orders)
+        query = orders_of(force, parts[:1])
         for point in query.points:
             speed, orders = problem.points[point].speed, [o for o in query.orders if o.point == point]
             groups = [tuple(orders)]

@@ -21,9 +21,6 @@ from laufruhe.problem.channels import DECOUPLING, motion_indices
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK
 
-OF_SHARES = frozenset({DECOUPLING})
-"""Channels that measure energy shares of motions in modes."""
-
 # smallest squared radius of the ball of modes, over the squared length of its centre
 NO_SIZE = 1e-8
 
@@ -53,7 +50,7 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
         return ()
     shares: dict[int, float] = {}
     for limit in problem.mount_limits:
-        if limit.measure.channel in OF_SHARES and limit.minimum > 0.0:
+        if limit.measure.channel is DECOUPLING and limit.minimum > 0.0:
             for motion in motion_indices(limit.measure):
                 shares[motion] = max(shares.get(motion, 0.0), limit.minimum * (1.0 - SLACK))
     return tuple(mode_basis(mounts.root, motion, share) for motion, share in shares.items())
@@ -82,11 +79,9 @@ def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Arra
     identity = np.einsum("ax,by->abxy", np.eye(d), np.eye(d))
     identity = 0.5 * (identity + identity.transpose(0, 1, 3, 2))
     square = 0.5 * (entry + entry.transpose(0, 2, 1, 3, 4))
-    tensors = []
-    for sign, edge in ((1.0, max(mounts.lowest, 0.0)), (-1.0, mounts.highest)):
-        tensor = sign * square
-        tensor[0] -= sign * edge / unit * identity
-        tensors.append(tensor)
+    tensors = np.array([square, -square])
+    tensors[0, 0] -= max(mounts.lowest, 0.0) / unit * identity
+    tensors[1, 0] += mounts.highest / unit * identity
     rows, columns = np.triu_indices(d, 1)
     equal = (entry - entry.transpose(0, 2, 1, 3, 4))[:, rows, columns].transpose(1, 0, 2, 3)
     ranges = [np.diag([1.0, *-np.ones(d - 1)])]
@@ -95,16 +90,8 @@ def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Arra
         matrix[0, 0], matrix[0, k], matrix[k, k] = -low * high, 0.5 * (low + high), -1.0
         matrix[k, 0] = matrix[0, k]
         ranges.append(matrix)
-    sides = []
-    for matrix in ranges:
-        side = np.zeros((1 + count, d, d))
-        side[0] = matrix
-        if not count:
-            # a box without width has no Z_j that implies the side
-            sides.append(side)
-        for j in range(1, 1 + count):
-            for sign in (1.0, -1.0):
-                side[j] = sign * matrix
-                sides.append(side.copy())
-            side[j] = 0.0
-    return ModeConstraints(tuple(tensors), np.array(sides), equal)
+    # each side for Z + Z_j and Z - Z_j; a box without width has no Z_j that implies the side for Z
+    units = np.eye(1 + count)
+    pairs = [units[0] + sign * unit for unit in units[1:] for sign in (1.0, -1.0)] or [units[0]]
+    sides = np.array([np.multiply.outer(pair, matrix) for matrix in ranges for pair in pairs])
+    return ModeConstraints(tuple(tensors), sides, equal)

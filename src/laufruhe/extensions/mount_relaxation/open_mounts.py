@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from laufruhe.extensions.mount_relaxation.parameter_maps import (
     ParameterMaps,
     PlaceTerm,
-    PlaneFrames,
     PlaneStiffness,
     SpringTerm,
 )
@@ -202,12 +201,17 @@ def is_lifted(problem: Problem) -> bool:
     return are_fixed and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
-def open_mounts(problem: Problem, lower: Array, upper: Array, frames: PlaneFrames | None = None) -> OpenMounts:
-    """Return matrices and bounds of the open mounts over a box of the decisions; the problem must be `is_lifted`.
+def open_mounts(
+    problem: Problem, lower: Array, upper: Array, frames: Array | None = None, boxes: Mapping[Any, Array] | None = None
+) -> OpenMounts:
+    """Return matrices and bounds of the open mounts over a box; the problem must be `is_lifted`.
 
-    The box has the bounds `lower` and `upper`, shape (n,) each.
+    Parameters
+    ----------
+    lower, upper, frames, boxes
+        See `ParameterMaps`.
     """
-    mounting, maps = mounting_in(problem.engine), ParameterMaps(problem, lower, upper, frames)
+    mounting, maps = mounting_in(problem.engine), ParameterMaps(problem, lower, upper, frames, boxes)
     root = mass_root(mounting.block)
     count, centre = len(maps.low), np.array(mounting.block.centre_of_gravity)
     motions = np.array([point_motion(NUMBERS, maps.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
@@ -234,7 +238,7 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, frames: PlaneFrame
         root, motions, np.array([total for total, _, _ in springs]), np.array([total for _, total, _ in springs]),
         maps.low[:, LOSS], maps.low[:, LAG], np.array(spring_mounts, dtype=np.intp),
         tuple((k,) for k in sorted({*spring_mounts})), mounting.dynamic,
-        tuple(term for *_, terms in springs for term in terms), places, maps.numbers.decisions,
+        tuple(term for *_, terms in springs for term in terms), places, maps.decisions,
         tuple((1.0 - 2.0 * SLACK) * floor for floor in floors),
         tuple((1.0 + SLACK) ** 2 * ceiling for ceiling in ceilings),
         tuple(bands), low, high, loss_floor, lag_floor, damping, maps.low[:, STIFFNESS].min(axis=1), maps.planes,

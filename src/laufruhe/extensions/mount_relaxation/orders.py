@@ -142,7 +142,7 @@ class MeasureOrders:
 
 
 def measure_orders(
-    problem: Problem, measure: Measure, model: AffineModel, reference: Evaluation, basis: tuple[UnbalanceBasis, Array],
+    problem: Problem, measure: Measure, model: AffineModel, reference: Evaluation, basis: UnbalanceBasis,
     parts: Sequence[OpenMounts],
 ) -> MeasureOrders:  # fmt: skip
     """Return the orders of a measure, sorted by their size in the best design.
@@ -151,8 +151,6 @@ def measure_orders(
     ----------
     reference
         The best design.
-    basis
-        Basis of the unbalances, and the middles of their columns.
     parts
         Mounts for all motions, then for each symmetry if there is one.
     """
@@ -167,8 +165,8 @@ def measure_orders(
         coefficients = narrow_signal(measure, signals[p], reference.engine).coefficients
         step, series = stacked_coefficients([constant, *slopes], base)
         loads = series @ wrench_map.T
-        loads[0] += np.einsum("q,qki->ki", basis[1], loads[1:])
-        loads[1:] = np.einsum("cq,qki->cki", basis[0].domain_map, loads[1:])
+        loads[0] += np.einsum("q,qki->ki", basis.middles, loads[1:])
+        loads[1:] = np.einsum("cq,qki->cki", basis.domain_map, loads[1:])
         size = np.abs(loads @ parts[0].root.T).sum(axis=0).max(axis=1)
         numbers = np.asarray(float(step) * np.arange(series.shape[1]), dtype=np.float64)
         orders = []
@@ -310,27 +308,23 @@ class EpigraphVariable:
 def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> list[EpigraphVariable]:
     """Return the variables that bound a norm from below: one, or one for each operating point (E45)."""
     norm = query.measure.norm
+    if not query.orders:
+        return []
     if norm.is_euclidean:
-        return [_of_squares(query)] if query.orders else []
+        weights = np.array([query.shares[order.point] for order in query.orders]) * (0.5 / len(query.mounts))
+        sizes = weights * np.array([np.sum(np.abs(order.signal) ** 2) for order in query.orders])
+        by_size = np.argsort(-sizes, kind="stable")
+        omitted = 1.0 - np.cumsum(sizes[by_size]) / max(float(sizes.sum()), 1e-300)
+        retained = by_size[: min(int(np.argmax(omitted <= OMITTED)) + 1, MAX_ORDERS)]
+        orders = tuple(query.orders[k] for k in retained)
+        return [EpigraphVariable(orders, 1.0, math.sqrt(float(sizes.sum())) or 1.0, 0.0, True, 1.0)]
     strongest = [_strongest(query, p, parts) for p in query.points]
     if norm.sums_lengths:
         return strongest
-    if not strongest:
-        return []
     unit = max(variable.unit for variable in strongest)
     loss, factor = max(variable.loss for variable in strongest), min(variable.factor for variable in strongest)
     orders = tuple(order for variable in strongest for order in variable.orders)
     return [EpigraphVariable(orders, 1.0, unit, loss, not norm.is_largest_mean, factor)]
-
-
-def _of_squares(query: MeasureOrders) -> EpigraphVariable:
-    weights = np.array([query.shares[order.point] for order in query.orders]) * (0.5 / len(query.mounts))
-    sizes = weights * np.array([np.sum(np.abs(order.signal) ** 2) for order in query.orders])
-    by_size = np.argsort(-sizes, kind="stable")
-    omitted = 1.0 - np.cumsum(sizes[by_size]) / max(float(sizes.sum()), 1e-300)
-    retained = by_size[: min(int(np.argmax(omitted <= OMITTED)) + 1, MAX_ORDERS)]
-    orders = tuple(query.orders[k] for k in retained)
-    return EpigraphVariable(orders, 1.0, math.sqrt(float(sizes.sum())) or 1.0, 0.0, True, 1.0)
 
 
 def _strongest(query: MeasureOrders, point: int, parts: Sequence[OpenMounts]) -> EpigraphVariable:
@@ -341,40 +335,27 @@ def _strongest(query: MeasureOrders, point: int, parts: Sequence[OpenMounts]) ->
     """
     order, *other_orders = [order for order in query.orders if order.point == point]
     norm, lengths = query.measure.norm, np.linalg.norm(order.signal, axis=1)
-    odd_multiples = [
-        other_order for other_order in other_orders if other_order.index % (2 * order.index) == order.index
-    ]
+    odd_multiples = tuple(
+        (other, other.index // order.index) for other in other_orders if other.index % (2 * order.index) == order.index
+    )
     phases = query.samples // math.gcd(query.samples, order.index) if query.samples else 0
     is_square_wave = bool(phases) and query.samples % (2 * order.index) == 0 and not query.has_kinks
+    # factor of a mean: by a sampled square wave, less odd multiples; otherwise by the cosine
+    factor, size = 2.0 / phases / math.tan(math.pi / phases) if is_square_wave else COSINE, float(lengths.mean())
     if norm.sums_lengths:
-        # by a sampled square wave, less odd multiples; otherwise by the cosine
-        size = float(lengths.mean())
-        factor = 2.0 / phases / math.tan(math.pi / phases) if is_square_wave else COSINE
-        multiples = (
-            tuple((other_order, other_order.index // order.index) for other_order in odd_multiples)
-            if is_square_wave
-            else ()
-        )
+        multiples, phases = (odd_multiples, phases) if is_square_wave else ((), 0)
         share = float(query.shares[point])
-        return EpigraphVariable(
-            (order,), share, factor * size or 1.0, 0.0, False, factor, multiples, phases if is_square_wave else 0
-        )
+        return EpigraphVariable((order,), share, factor * size or 1.0, 0.0, False, factor, multiples, phases)
     mean, swing = norm.is_largest_mean, 2.0 if norm.is_diameter else 1.0
     loss = sum(
-        query.largest_sum(other_order, parts)
         # weight in the sampled square wave
-        * (
-            2.0 / phases / math.sin(math.pi * (other_order.index // order.index) / phases)
-            if mean and is_square_wave
-            else 1.0
-        )
-        for other_order in odd_multiples
+        query.largest_sum(other, parts)
+        * (2.0 / phases / math.sin(math.pi * k / phases) if mean and is_square_wave else 1.0)
+        for other, k in odd_multiples
     )
     loss /= len(query.mounts) if mean else 1
-    if mean:
-        factor = 2.0 / phases / math.tan(math.pi / phases) if is_square_wave else 0.5
-        cosine_factor, size = 0.5, float(lengths.mean())
-    else:
+    cosine_factor = COSINE
+    if not mean:
         fine_phases = phases * norm.refinement
         factor, size = (swing * math.cos(math.pi / fine_phases) if is_square_wave else 0.0), float(lengths.max())
         cosine_factor = swing * (phases * math.sin(math.pi / phases) / 4.0 if phases > 1 else math.sqrt(0.125))

@@ -131,36 +131,6 @@ class PlaceTerm:
         return np.cross(self.turn_axes, self.axis)
 
 
-@dataclass(frozen=True, eq=False)
-class PlaneFrames:
-    """Fixed axes in which planes of turning mounts are stated, and boxes of their stiffness (E63).
-
-    Attributes
-    ----------
-    frames
-        Numbers of each spring that fix its axes, shape (springs, 14).
-    boxes
-        Ranges of K11, K22 and K12 by the key of a plane, shape (3, 2) each; None for full ranges.
-    """
-
-    frames: Array
-    boxes: Mapping[Any, Array] | None = None
-
-
-class _SharedNumbers:
-    """Indices of s by keys; mirrored mounts share them."""
-
-    def __init__(self) -> None:
-        self._known: dict[Any, tuple[int, tuple[int, ...]]] = {}
-
-    def index(self, key: Any, decisions: Sequence[int]) -> int:
-        return self._known.setdefault(key, (len(self._known), tuple(sorted(set(decisions)))))[0]
-
-    @property
-    def decisions(self) -> tuple[tuple[int, ...], ...]:
-        return tuple(decisions for _, decisions in self._known.values())
-
-
 class ParameterMaps:
     """Maps from s to stiffness, damping and places of each mount.
 
@@ -168,23 +138,37 @@ class ParameterMaps:
     ----------
     lower, upper
         Bounds of the open numbers of mounts, shape (n,) each.
-    framed
-        Axes and boxes of planes; by default the axes at the middle, and full ranges.
+    frames
+        Numbers of each spring that fix the axes in which its plane is stated (E63), shape (springs, 14); by default
+        those of the middle.
+    boxes
+        Ranges of K11, K22 and K12 by the key of a plane, shape (3, 2) each; None for full ranges.
     """
 
-    def __init__(self, problem: Problem, lower: Array, upper: Array, framed: PlaneFrames | None = None) -> None:
+    def __init__(
+        self, problem: Problem, lower: Array, upper: Array, frames: Array | None = None,
+        boxes: Mapping[Any, Array] | None = None,
+    ) -> None:  # fmt: skip
         self.low, self.high = number_ranges(problem, lower, upper)
         self.start = np.array(problem.mount_numbers, dtype=float)
-        self._frames = 0.5 * (self.low + self.high) if framed is None else framed.frames
-        self._boxes = None if framed is None else framed.boxes
+        self._frames, self._boxes = 0.5 * (self.low + self.high) if frames is None else frames, boxes
         self.planes: dict[Any, tuple[int, PlaneStiffness]] = {}
         self._bounds: dict[tuple[int, int], tuple[Array, Array]] = {}
         self.half = 0.5 * (upper - lower)
-        self.numbers = _SharedNumbers()
+        # indices of s, and the decisions that each follows, by keys that mirrored mounts share
+        self._numbers: dict[Any, tuple[int, tuple[int, ...]]] = {}
         self.drives: list[dict[int, list[tuple[int, float]]]] = [{} for _ in self.low]
         for j, decision in enumerate(problem.mount_decisions):
             for drive in decision.mount_drives:
                 self.drives[drive.mount].setdefault(drive.number, []).append((j, drive.gain))
+
+    def _number(self, key: Any, decisions: Sequence[int]) -> int:
+        return self._numbers.setdefault(key, (len(self._numbers), tuple(decisions)))[0]
+
+    @property
+    def decisions(self) -> tuple[tuple[int, ...], ...]:
+        """For each s, the numbers of the decisions that it follows."""
+        return tuple(decisions for _, decisions in self._numbers.values())
 
     def middle(self, m: int) -> Array:
         """Return the middles of the ranges of all numbers of a spring, shape (14,)."""
@@ -256,7 +240,7 @@ class ParameterMaps:
             if reach[i] > 0.0:
                 half_ranges = [(j, gain * self.half[j]) for j, gain in self.drives[m][i]]
                 terms = tuple(
-                    (self.numbers.index(("one", j), [j]), np.array([[half_range]])) for j, half_range in half_ranges
+                    (self._number(("one", j), [j]), np.array([[half_range]])) for j, half_range in half_ranges
                 )
                 bound = np.array([[reach[i]]])
                 sides = (bound, 1.0), (bound, -1.0)
@@ -272,7 +256,7 @@ class ParameterMaps:
         first_entry, second_entry = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
         off_diagonal = sign * (np.ones((2, 2)) - np.eye(2))
         terms = tuple(
-            (self.numbers.index((k, key), [len(self.half) + first_number + k]), halves[k] * matrix)
+            (self._number((k, key), [len(self.half) + first_number + k]), halves[k] * matrix)
             for k, matrix in enumerate((first_entry, second_entry, off_diagonal))
         )
         centre = centre1 * first_entry + centre2 * second_entry + centre3 * off_diagonal
@@ -329,7 +313,7 @@ class ParameterMaps:
         for a, b in combinations_with_replacement(range(3), 2):
             matrix = np.zeros((3, 3))
             matrix[a, b] = matrix[b, a] = half
-            terms.append((self.numbers.index(("space", kind.start, m, a, b), decisions), matrix))
+            terms.append((self._number(("space", kind.start, m, a, b), decisions), matrix))
         side = half * np.eye(3)
         middle = 0.5 * (low + high) * np.eye(3)
         return middle, [SpringTerm(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), ((side, side),), half)]
@@ -356,7 +340,7 @@ class ParameterMaps:
         places = []
         for (j, axis, *_), mounts in groups.items():
             is_damped = any(bool(np.any(self.low[m, DAMPING])) for m, _ in mounts)
-            number, turn_axes = self.numbers.index(("one", j), [j]), np.delete(np.eye(3), axis, axis=0)
+            number, turn_axes = self._number(("one", j), [j]), np.delete(np.eye(3), axis, axis=0)
             places.append(PlaceTerm(number, np.eye(3)[axis], tuple(mounts), turn_axes, is_damped))
         return tuple(places)
 
@@ -428,19 +412,16 @@ class PlaneStiffness:
             if minimum - rounding > slope * max(-along_range[0], along_range[1], 0.0):
                 return None
             low, high = self.stiffness_range(part)
-            part = _contract_by_trace(part, float(self.low.sum()) - rounding, float(self.high.sum()) + rounding)
+            # the trace lies between the sums of the ranges
+            smallest, largest = float(self.low.sum()) - rounding, float(self.high.sum()) + rounding
+            lower = np.maximum(part[:2, 0], smallest - part[1::-1, 1])
+            part[:2, 1] = np.minimum(part[:2, 1], largest - part[1::-1, 0])
+            part[:2, 0] = lower
             part = _contract_by_eigenvalues(part, low - rounding, high + rounding)
             if np.any(part[:, 0] > part[:, 1] + rounding):
                 return None
             part = np.sort(part, axis=1)
         return part
-
-
-def _contract_by_trace(box: Array, low: float, high: float) -> Array:
-    part = box.copy()
-    for k, partner in ((0, 1), (1, 0)):
-        part[k] = max(box[k, 0], low - box[partner, 1]), min(box[k, 1], high - box[partner, 0])
-    return part
 
 
 def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:

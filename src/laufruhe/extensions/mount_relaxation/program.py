@@ -16,6 +16,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import TypeAlias
 
 import numpy as np
 
@@ -112,12 +113,8 @@ class ObjectiveLimit:
     root: int | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class LinearLimit:
-    """Upper bound of a sum of <C, M>: order number and C, shape (d, d), of each term."""
-
-    matrices: tuple[tuple[int, Array], ...]
-    upper: float
+LinearLimit: TypeAlias = tuple[tuple[int, Array], ...]
+"""Sum of <C, M> that is not above zero: order number and C, shape (d, d), of each term."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,12 +215,11 @@ class ModeMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Solver output: multipliers, s, moments of orders and modes, and value; infinite if no point is feasible."""
+    """Solver output: multipliers, s, and moments of orders and modes."""
 
     multipliers: SdpMultipliers
     s: Array
     moments: Sequence[Array]
-    value: float
     modes: Sequence[Array] = ()
 
 
@@ -261,8 +257,7 @@ def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
         slopes -= np.einsum("ab,nab->n", price, constraint.slopes)
         remainders[constraint.order] -= np.einsum("ab,abij->ij", price, constraint.moments)
     for linear, factor in zip(program.linear, np.maximum(multipliers.linear, 0.0), strict=True):
-        bound -= float(factor) * linear.upper
-        for order, matrix in linear.matrices:
+        for order, matrix in linear:
             remainders[order] += factor * matrix
     corner = slice(1 + program.columns)
     for matrix, factor in zip(program.sets, np.maximum(multipliers.sets, 0.0), strict=True):

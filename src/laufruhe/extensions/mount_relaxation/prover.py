@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from laufruhe.extensions.mount_relaxation.cone_program import Objectives, bounds_ahead
 from laufruhe.extensions.mount_relaxation.open_mounts import is_lifted
 from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
-from laufruhe.extensions.mount_relaxation.speculation import Objectives, bounds_ahead
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
@@ -169,9 +169,8 @@ def _prove_levels(
         lower[sides], upper[sides] = thin_box(witness.place, lower[sides], upper[sides])
         thin = root_search.up_to(witness.upper_value * (1.0 + EXCESS)).bound(lower, upper)[0]
         witness.check_near("spring forces", thin)
-    count = relaxation.mount_numbers
-    candidates = (*relaxation.candidates, *places) if bound < relaxation.cutoff else ()
-    return BoxResult(bound, spent, tuple(place[:count] for place in candidates))
+    places = places if bound < relaxation.cutoff else ()
+    return BoxResult(bound, spent, tuple(place[: relaxation.mount_numbers] for place in places))
 
 
 class _Narrowing(BoxBisection):

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.extensions.mount_relaxation.box import BoxRelaxation
+from laufruhe.extensions.mount_relaxation.cone_program import Ahead
 from laufruhe.extensions.mount_relaxation.limits import limits_of
 from laufruhe.extensions.mount_relaxation.modes import mode_bases
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
@@ -21,10 +22,8 @@ from laufruhe.extensions.mount_relaxation.orders import (
     epigraph_variables,
     measure_orders,
 )
-from laufruhe.extensions.mount_relaxation.parameter_maps import PlaneFrames
 from laufruhe.extensions.mount_relaxation.program import SdpProgram
 from laufruhe.extensions.mount_relaxation.response import Response, ResponseBound, response_of
-from laufruhe.extensions.mount_relaxation.speculation import Ahead
 from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts
 from laufruhe.extensions.mount_relaxation.unbalance_basis import unbalance_basis
 from laufruhe.load_models.affine import AffineModel
@@ -60,14 +59,14 @@ class SdpRelaxation:
         Objective up to which bounds hold [SI].
     cutoff
         Bound from which a box is fathomed [SI].
+    mount_numbers
+        Count of open numbers of mounts.
     lower, upper
         Root box, shape (n,): open numbers of mounts, stiffness entries of planes (E63), and coordinates of modes.
     reference
         The best design in these coordinates without those of modes.
     modes, mode_sides
         Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
-    candidates
-        Open numbers at the optimum of the first relaxation: starts from which a search may find a better design.
     multiple_uppers
         Upper bounds of odd multiples over better designs, by the id of their order.
     ahead
@@ -83,12 +82,13 @@ class SdpRelaxation:
         ahead: Ahead | None = None,
     ) -> None:
         self.problem, self.value, self.cutoff, self.ahead = problem, value, value - GAP_SAFETY * gap_tolerance, ahead
+        self.mount_numbers = len(problem.mount_decisions)
         lower, upper = real_bounds(problem.mount_decisions)
         self._reference = np.array(
             [v for v, d in zip(reference, problem.decisions, strict=True) if not d.is_affine], dtype=float
         )
         self._frames = number_ranges(problem, self._reference, self._reference)[0]
-        self._planes = open_mounts(problem, lower, upper, PlaneFrames(self._frames)).planes
+        self._planes = open_mounts(problem, lower, upper, self._frames).planes
         self.reference = np.concatenate(
             [self._reference, *(np.append(plane.reference, 0.0) for _, plane in self._planes.values())]
         )
@@ -99,7 +99,6 @@ class SdpRelaxation:
         ones = np.ones(5 * len(self.modes))
         self.lower, self.upper = np.append(lower, -ones), np.append(upper, ones)
         self.mode_sides = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
-        self.candidates: list[Array] = []
         self._stiffness_boxes = StiffnessBoxes(problem, 0.05 * gap_tolerance) if is_stiffness_problem(problem) else None
         self._model = AffineModel(off_resonance(problem))
         unbalances = [v for v, d in zip(reference, problem.decisions, strict=True) if d.is_affine]
@@ -111,13 +110,13 @@ class SdpRelaxation:
         fixed_terms = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in fixed_terms)
 
-        def orders_of(measure: Measure, parts: Sequence[OpenMounts] = self._parts) -> MeasureOrders:
+        def orders_of(measure: Measure, parts: Sequence[OpenMounts]) -> MeasureOrders:
             return measure_orders(problem, measure, self._model, evaluation, basis, parts)
 
-        queries = [(term.weight, orders_of(term.measure)) for term in mount_terms]
-        limits = limits_of(problem, evaluation, orders_of, lambda measure: orders_of(measure, self._parts[:1]))
+        queries = [(term.weight, orders_of(term.measure, self._parts)) for term in mount_terms]
+        limits = limits_of(problem, evaluation, orders_of, self._parts)
         loads = [order.loads[1:] for _, query in queries for order in query.orders]
-        self.basis, reduction = basis[0].reduced([*loads, *limits.loads])
+        self.basis, reduction = basis.reduced([*loads, *limits.loads])
         self._terms = [(weight, query.in_basis(reduction)) for weight, query in queries]
         self.limits = limits.in_basis(reduction, self._parts)
         self._variables = [epigraph_variables(query, self._parts) for _, query in self._terms]
@@ -133,13 +132,13 @@ class SdpRelaxation:
 
         If the mounts are symmetric, models for symmetric and for antisymmetric motions follow.
         """
-        count = len(self.problem.mount_decisions)
+        count = self.mount_numbers
         boxes = {key: np.column_stack([lower[sides], upper[sides]]) for key, sides in self._plane_sides()}
-        mounts = open_mounts(self.problem, lower[:count], upper[:count], PlaneFrames(self._frames, boxes))
+        mounts = open_mounts(self.problem, lower[:count], upper[:count], self._frames, boxes)
         return (mounts, *split_mounts(mounts))
 
     def _plane_sides(self) -> list[tuple[Any, slice]]:
-        first = len(self.problem.mount_decisions)
+        first = self.mount_numbers
         return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
 
     def contracted(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
@@ -168,16 +167,6 @@ class SdpRelaxation:
         return bool(abs(distance) < AT_END * (upper[side] - lower[side]))
 
     @property
-    def mount_numbers(self) -> int:
-        """Count of open numbers of mounts."""
-        return len(self.problem.mount_decisions)
-
-    @property
-    def stiffness_alone(self) -> bool:
-        """True if stiffness alone is open."""
-        return self._stiffness_boxes is not None
-
-    @property
     def has_loose_mean(self) -> bool:
         """True if odd multiples of its orders loosen the bound of a mean (E58)."""
         if not any(variable.multiples for variable in self._variables[0]):
@@ -204,26 +193,23 @@ class SdpRelaxation:
             return math.inf, np.zeros(len(lower))
         lower, upper = contracted_box
         if self._stiffness_boxes is not None:
-            count = len(self._reference)
+            count = self.mount_numbers
             stiffness_bound = float(self._stiffness_boxes.bounds(lower[None, :count], upper[None, :count])[0][0])
-        bound, scores = (
-            (stiffness_bound, np.zeros(len(lower))) if stiffness_bound >= self.cutoff else self.relax(lower, upper)
-        )
+        if stiffness_bound >= self.cutoff:
+            return stiffness_bound, np.zeros(len(lower))
+        bound, scores = self.relax(lower, upper)
         return max(stiffness_bound, bound), scores
 
     def relax(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """Return the lower bound of a box by the relaxation [SI], and branching scores, shape (n,)."""
         total, scores = self._constant, np.zeros(len(lower))
         for k, (weight, _) in enumerate(self._terms):
-            is_first = not self.candidates and k == 0
             box = self._box(k, lower, upper)
-            bound, term_scores, candidate = box.bound(self._variables[k], self._roots[k])
+            bound, term_scores = box.bound(self._variables[k], self._roots[k])
             if k == 0:
                 self._last_box = lower, upper, box.roots
             total += weight * bound
             scores += term_scores
-            if is_first and candidate is not None:
-                self.candidates.append(candidate)
         return total, scores * (upper > lower)
 
     def _box(self, term: int, lower: Array, upper: Array) -> BoxRelaxation:
@@ -241,11 +227,17 @@ class SdpRelaxation:
 
     def under(self, value: float) -> SdpRelaxation:
         """Return the relaxation of designs below a value, without orders that add little to the proof."""
+
+        def needed(variable: EpigraphVariable) -> tuple[Order, ...]:
+            size = np.array([float(np.sum(np.abs(order.signal) ** 2)) for order in variable.orders])
+            omitted = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
+            is_enough = omitted <= OMITTED * (1.0 - value / self.value)
+            return variable.orders[: int(np.argmax(is_enough)) + 1] if is_enough.any() else variable.orders
+
         relaxation = copy(self)
         relaxation.value = relaxation.cutoff = value
         relaxation._variables = [
-            [replace(variable, orders=self._needed(variable, value)) for variable in variables]
-            for variables in self._variables
+            [replace(variable, orders=needed(variable)) for variable in variables] for variables in self._variables
         ]
         uppers = dict(self.multiple_uppers)
         roots = [bounds.copy() for bounds in self._roots]
@@ -260,12 +252,6 @@ class SdpRelaxation:
         relaxation.value = value
         relaxation._reset()
         return relaxation
-
-    def _needed(self, variable: EpigraphVariable, value: float) -> tuple[Order, ...]:
-        size = np.array([float(np.sum(np.abs(order.signal) ** 2)) for order in variable.orders])
-        omitted = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
-        is_enough = omitted <= OMITTED * (1.0 - value / self.value)
-        return variable.orders[: int(np.argmax(is_enough)) + 1] if is_enough.any() else variable.orders
 
     def response(self, mounts: OpenMounts, order: Order, bound: ResponseBound, lower: Array, upper: Array) -> Response:
         """Return the response to an order over a box; units follow the design of the box nearest to the best."""

@@ -22,8 +22,8 @@ class UnbalanceBasis:
 
     Attributes
     ----------
-    domain_map
-        Map from u to the columns of the domains, less their middles, shape (columns, domain columns).
+    domain_map, middles
+        Map from u to the columns of the domains, less their middles, shape (columns, domain columns), and the middles.
     reference
         u of the best design, shape (columns,).
     sets
@@ -33,6 +33,7 @@ class UnbalanceBasis:
     """
 
     domain_map: Array
+    middles: Array
     reference: Array
     sets: tuple[Array, ...]
     domains: int
@@ -43,14 +44,9 @@ class UnbalanceBasis:
         return len(self.reference)
 
     def reduced(self, loads: Sequence[ComplexArray]) -> tuple[UnbalanceBasis, Array]:
-        """Return the basis reduced to what loads distinguish, and the map to it, shape (fewer, columns).
+        """Return the basis reduced to what loads (columns, k) distinguish, and the map to it, shape (fewer, columns).
 
         The columns of each domain have squares that add up to at most one, so that the reduced u lies in a ball.
-
-        Parameters
-        ----------
-        loads
-            Loads of orders per column, shape (columns, k) each.
         """
         rows = [
             part / (float(np.abs(order_loads).max(initial=0.0)) or 1.0)
@@ -66,13 +62,13 @@ class UnbalanceBasis:
         radius = math.sqrt(self.domains)
         ball = np.diag(np.concatenate([[-1.0], np.ones(rank)]))
         retained = directions[:, :rank].T
-        return UnbalanceBasis(
-            radius * retained @ self.domain_map, retained @ self.reference / radius, (ball,), 1
-        ), radius * retained
+        reference = retained @ self.reference / radius
+        reduced = UnbalanceBasis(radius * retained @ self.domain_map, self.middles, reference, (ball,), 1)
+        return reduced, radius * retained
 
 
-def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> tuple[UnbalanceBasis, Array]:
-    """Return the basis of all columns of domains, with a design's unbalances in it, and the columns' middles."""
+def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> UnbalanceBasis:
+    """Return the basis of all columns of domains, with a design's unbalances in it."""
     low, high = column_bounds(domains)
     middles, reaches = 0.5 * (low + high), 0.5 * (high - low)
     reference = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
@@ -90,4 +86,4 @@ def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> tuple
                 # unbalances lie to the left of the first side and to the right of the second
                 side[0, columns] = side[columns, 0] = 0.5 * sign * np.array([edge[1], -edge[0]])
                 sets.append(side)
-    return UnbalanceBasis(np.diag(reaches), reference, tuple(sets), len(domains)), middles
+    return UnbalanceBasis(np.diag(reaches), middles, reference, tuple(sets), len(domains))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache, partial
 from typing import TypeAlias
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from laufruhe.extensions.robust.tolerance import Tolerances, tolerances_of, with_errors
 from laufruhe.extensions.robust.worst_case import MAX_NODES, Terms, check_worst, worst_case
-from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.batch import BatchNorm, feature_rows
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, with_common_base
@@ -79,7 +80,7 @@ def evaluate_built(problem: Problem, values: Sequence[Value], samples: int) -> E
     return evaluate(problem, problem.design(values), samples)
 
 
-def objective_values(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array:
+def objective_values(terms: Terms, errors: Array) -> Array:
     """Return the objective of many engines, shape (engines,), from errors of shape (engines, columns)."""
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
@@ -148,20 +149,16 @@ class WorstCaseAdversary:
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
         """Return the worst engines of a design by branch and bound."""
-        engines = BuiltEngines(self.problem, values, self.samples)
+        built_at = cache(partial(BuiltEngines, self.problem, values))
+        engines = built_at(self.samples)
         columns, maximum = tolerances_of(self.problem).columns, MAX_NODES if proven else QUICK
         worst = worst_case(engines.terms, columns, self.tolerance, maximum=maximum)
         if proven:
             check_worst(engines.terms, columns, worst)
         errors, limits, divisions = [worst.errors], [], worst.nodes
         violated: list[str] = []
-        engines_by_samples = {self.samples: engines}
         for limit in load_limits_of(self.problem):
-            limit_sampling = limit_samples(limit.measure, self.samples)
-            engines_by_samples[limit_sampling] = engines_by_samples.get(limit_sampling) or BuiltEngines(
-                self.problem, values, limit_sampling
-            )
-            terms: Terms = ((1.0, engines_by_samples[limit_sampling].norm(limit.measure)),)
+            terms: Terms = ((1.0, built_at(limit_samples(limit.measure, self.samples)).norm(limit.measure)),)
             worst_of_limit = worst_case(terms, columns, self.tolerance, maximum=maximum)
             limits.append((limit, worst_of_limit.bound if proven else worst_of_limit.value))
             divisions += worst_of_limit.nodes
@@ -169,15 +166,9 @@ class WorstCaseAdversary:
                 errors.append(worst_of_limit.errors)
             violated += violated_limits([(limit, worst_of_limit.value)])
         return WorstEngines(
-            worst.value,
-            worst.bound,
-            tuple(errors),
-            tuple(limits),
-            largest_violation(limits),
-            tuple(violated),
-            divisions,
-            proven,
-        )
+            worst.value, worst.bound, tuple(errors), tuple(limits), largest_violation(limits), tuple(violated),
+            divisions, proven,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,30 +179,26 @@ class SampledEngines:
     ----------
     errors
         Errors of the engines, shape (engines, columns).
-    models
-        Models of the engines, if loads are not affine in the errors.
+    problems
+        Problems of the engines, if loads are not affine in the errors.
     """
 
     problem: Problem
     errors: Array
     samples: int
-    models: list[AffineModel] = field(default_factory=list)
+    problems: list[Problem] = field(default_factory=list)
 
     def subset(self, indices: NDArray[np.intp]) -> SampledEngines:
         """Return the engines with these indices."""
-        models = [self.models[k] for k in indices] if self.models else []
-        return SampledEngines(self.problem, self.errors[indices], self.samples, models)
-
-    def objective(self, values: Sequence[Value]) -> Array:
-        """Return the objective of each engine, shape (engines,)."""
-        return np.asarray(self._values(values, None))
+        problems = [self.problems[k] for k in indices] if self.problems else []
+        return SampledEngines(self.problem, self.errors[indices], self.samples, problems)
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:  # noqa: ARG002
         """Return the worst engines of a design, exactly."""
-        objectives = self._values(values, None)
+        objectives = self.objectives(values)
         errors, limits = [self.errors[int(np.argmax(objectives))]], []
         for limit in load_limits_of(self.problem):
-            limit_values = self._values(values, limit)
+            limit_values = self.objectives(values, limit)
             limits.append((limit, float(limit_values.max())))
             if limit_values.max() > limit.maximum:
                 errors.append(self.errors[int(np.argmax(limit_values))])
@@ -220,17 +207,16 @@ class SampledEngines:
             value, value, tuple(errors), tuple(limits), largest_violation(limits), violated, len(self.errors), True
         )
 
-    def _values(self, values: Sequence[Value], limit: Limit | None) -> Array:
+    def objectives(self, values: Sequence[Value], limit: Limit | None = None) -> Array:
+        """Return the objective of each engine, or the value of a limit in its place, shape (engines,)."""
         samples = self.samples if limit is None else limit_samples(limit.measure, self.samples)
         if tolerances_of(self.problem).is_affine:
             engines = BuiltEngines(self.problem, values, samples)
-            terms: Sequence[tuple[float, AffineNorm]] = (
-                engines.terms if limit is None else ((1.0, engines.norm(limit.measure)),)
-            )
+            terms: Terms = engines.terms if limit is None else ((1.0, engines.norm(limit.measure)),)
             return objective_values(terms, self.errors)
-        if not self.models:
-            self.models.extend(AffineModel(with_errors(self.problem, errors)) for errors in self.errors)
-        evaluations = (evaluate_built(model.problem, values, samples) for model in self.models)
+        if not self.problems:
+            self.problems.extend(with_errors(self.problem, errors) for errors in self.errors)
+        evaluations = (evaluate_built(problem, values, samples) for problem in self.problems)
         return np.array([
             objective_value(self.problem, evaluation) if limit is None else evaluation.value(limit.measure)
             for evaluation in evaluations

@@ -1,7 +1,8 @@
-"""Result of a design for built engines: comparison with the best drawing, and prices of tolerances (R10, R11)."""
+"""Result of a design for built engines: comparison with the nominal design, and prices of tolerances (R10, R11)."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -17,27 +18,19 @@ from laufruhe.extensions.robust.built_engines import (
     violated_limits,
 )
 from laufruhe.extensions.robust.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
-from laufruhe.extensions.robust.tolerance import (
-    Population,
-    Tolerance,
-    robust_of,
-    tolerances_of,
-    with_errors,
-    with_tolerances,
-)
+from laufruhe.extensions.robust.tolerance import robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Proof, make_certificate
+from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
-    Design,
-    ProofData,
     decision_values,
+    evaluate_design,
     infeasible_result,
     limit_values,
     priced_decisions,
@@ -73,68 +66,116 @@ class ActiveErrors:
     residual: float = 0.0
 
 
-def compare_designs(
-    problem: Problem, adversary: Adversary, nominal: Sequence[Value], robust: Sequence[Value],
-    robust_worst: WorstEngines, active: ActiveErrors, scenarios: int,
-) -> RobustResult:  # fmt: skip
-    """Compare the best drawing with the robust design on random engines, and price each tolerance.
+@dataclass(frozen=True, eq=False)
+class RobustDesign:
+    """Design with an upper bound over its engines, and a lower bound over all designs.
+
+    Attributes
+    ----------
+    values
+        Values of the decisions.
+    worst
+        Worst engines of the design.
+    bound
+        Lower bound of the objective over all designs [SI].
+    active
+        Error sets that determine the design.
+    scenarios, angles
+        Counts of error sets and of samples in the program.
+    samples
+        Samples over the cycle for engines.
+    margin
+        Share by which limits were lowered, because peaks lie between samples.
+    conflict
+        Limits that no design satisfies in each engine; all other attributes are then undefined.
+    """
+
+    values: tuple[Value, ...]
+    worst: WorstEngines
+    bound: float
+    active: ActiveErrors
+    scenarios: int
+    angles: int
+    samples: int
+    margin: float = 0.0
+    conflict: tuple[str, ...] = ()
+
+
+def robust_result(
+    problem: Problem, adversary: Adversary, nominal: Sequence[Value], initial_worst: WorstEngines, robust: RobustDesign,
+    method: str, seconds: float,
+) -> Result:  # fmt: skip
+    """Return the result of a design for built engines, compared with the nominal design on random engines.
 
     Parameters
     ----------
     adversary
         Search for the worst engines.
-    nominal, robust
-        Values of the decisions of both designs.
-    robust_worst
-        Worst engines of the robust design.
-    active
-        Error sets that determine it.
-    scenarios
-        Count of error sets in the program.
+    nominal
+        Values of the decisions of the optimum without errors.
+    initial_worst
+        Worst engines of the initial design.
+    method
+        Name of the method for the certificate.
+    seconds
+        Time of the search [s].
     """
     from scipy.stats import beta
 
-    population = robust_of(problem).population
-    sample = _Sample.of(problem, population, adversary.samples)
-    values = sample.values(problem, robust)
+    started, worst = time.perf_counter(), robust.worst
+    design = evaluate_design(problem, robust.values, robust.samples)
+    population, tolerances = robust_of(problem).population, tolerances_of(problem)
     share = SHARE if population.share is None else population.share
+    # random engines that no decision has used
+    count = CHECKED if tolerances.is_affine else min(population.engines, CHECKED_CURVED)
+    errors = tolerances.draw(np.random.default_rng([population.seed, 1]), count)
+    objectives = _objectives(problem, robust.values, errors, adversary.samples)
     nominal_worst = adversary.at(nominal, proven=True)
-    designs = (
-        _design("best drawing", problem, nominal, nominal_worst, sample.values(problem, nominal), share),
-        _design("decided", problem, robust, robust_worst, values, share),
-    )
-    worst = evaluate_built(with_errors(problem, robust_worst.errors[0]), robust, adversary.samples)
-    exceeding = int((values > robust_worst.bound * (1.0 + 1e-12)).sum())
+    nominal_objectives = _objectives(problem, nominal, errors, adversary.samples)
+    exceeding = int((objectives > worst.bound * (1.0 + 1e-12)).sum())
     # Clopper and Pearson (R10)
-    at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, len(values) - exceeding)) if exceeding < len(values) else 1.0
-    return RobustResult(
-        population=population, exact=population.share is None and tolerances_of(problem).is_affine, share=share,
-        nominal=designs[0], robust=designs[1], tolerances=_price_tolerances(problem, robust, active, sample, share),
-        scenarios=scenarios, divisions=robust_worst.divisions, engines=len(values), seed=sample.seed,
-        worst_engine=worst, exceeding=exceeding, exceeding_at_most=at_most,
+    at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, count - exceeding)) if exceeding < count else 1.0
+    details = RobustResult(
+        population=population, exact=population.share is None and tolerances.is_affine, share=share,
+        nominal=_design("nominal design", problem, nominal, nominal_worst, nominal_objectives, share),
+        robust=_design("robust design", problem, robust.values, worst, objectives, share),
+        tolerances=_priced_tolerances(problem, robust, errors, adversary.samples, share),
+        scenarios=robust.scenarios, divisions=worst.divisions, engines=count, seed=population.seed,
+        worst_engine=evaluate_built(with_errors(problem, worst.errors[0]), robust.values, adversary.samples),
+        exceeding=exceeding, exceeding_at_most=at_most,
     )  # fmt: skip
+    is_feasible = max(worst.violation, design.violation) <= FEASIBILITY_TOL
+    certificate = make_certificate(
+        worst.bound, robust.bound, numerical_zero(problem, design.evaluation.engine), problem.tolerance,
+        ProofStrength.EXACT if population.share is None else ProofStrength.RELAXED, robust.active.residual, method,
+    )  # fmt: skip
+    prices: dict[Limit, float] = {}
+    for limit, price in (pair for prices_of_set in robust.active.prices for pair in prices_of_set):
+        prices[limit] = prices.get(limit, 0.0) + price
+    status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
+    violated = " and ".join(map(repr, violated_limits(worst.limits))) or "a limit"
+    return Result(
+        problem=problem,
+        status=status if is_feasible else Status.FAILED,
+        objective=ObjectiveValue.of(problem, worst.bound, initial_worst.value),
+        certificate=certificate,
+        decisions=priced_decisions(design),
+        limits=_limits_in_the_worst_case(problem, limit_values(problem, design.evaluation), worst, prices),
+        initial=evaluate(problem),
+        final=design.evaluation,
+        message="" if is_feasible else f"the best design found breaks {violated} in some engines",
+        error=partial(objective_error, problem, details.worst_engine),
+        timing={"solve": seconds, "compare": time.perf_counter() - started},
+        details=details,
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class _Sample:
-    """Random engines that no decision has used."""
-
-    errors: Array
-    seed: int
-    samples: int
-
-    @classmethod
-    def of(cls, problem: Problem, population: Population, samples: int) -> _Sample:
-        count = CHECKED if tolerances_of(problem).is_affine else min(population.engines, CHECKED_CURVED)
-        random = np.random.default_rng([population.seed, 1])
-        return cls(tolerances_of(problem).draw(random, count), population.seed, samples)
-
-    def values(self, problem: Problem, values: Sequence[Value]) -> Array:
-        """Return the objective of each engine of a design, shape (engines,); affine loads are evaluated together."""
-        if tolerances_of(problem).is_affine:
-            return objective_values(BuiltEngines(problem, values, self.samples).terms, self.errors)
-        engines = (evaluate_built(with_errors(problem, z), values, self.samples) for z in self.errors)
-        return np.array([objective_value(problem, engine) for engine in engines])
+def _objectives(problem: Problem, values: Sequence[Value], errors: Array, samples: int) -> Array:
+    # objective of each engine, shape (engines,); affine loads are evaluated together
+    if tolerances_of(problem).is_affine:
+        return objective_values(BuiltEngines(problem, values, samples).terms, errors)
+    engines = (evaluate_built(with_errors(problem, z), values, samples) for z in errors)
+    return np.array([objective_value(problem, engine) for engine in engines])
 
 
 def _design(
@@ -159,44 +200,34 @@ def _design(
     )  # fmt: skip
 
 
-def _price_tolerances(
-    problem: Problem, values: Sequence[Value], active: ActiveErrors, sample: _Sample, share: float
+def _priced_tolerances(
+    problem: Problem, robust: RobustDesign, engine_errors: Array, samples: int, share: float
 ) -> tuple[PricedTolerance, ...]:
-    """Return the priced tolerances, the most expensive first."""
+    """Return the priced tolerances, the most expensive first (R11)."""
+
+    def objective(name: str, factor: float) -> float:
+        # objective of the active error sets, or of the share of engines, with one tolerance times the factor
+        scaled_problem = with_tolerances(problem, tolerances_of(problem).scaled(name, factor))
+        if robust_of(problem).population.share is not None:
+            return float(np.quantile(_objectives(scaled_problem, robust.values, engine_errors, samples), share))
+        total, active = 0.0, robust.active
+        for errors, weight, prices in zip(active.errors, active.shares, active.prices, strict=True):
+            limit_prices = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
+            if weight > 0.0 or limit_prices:
+                evaluation = evaluate_built(with_errors(scaled_problem, errors), robust.values, samples)
+                total += weight * objective_value(problem, evaluation)
+                total += sum(price * evaluation.value(limit.measure) for limit, price in limit_prices)
+        return total
+
     priced = []
     for tolerance in tolerances_of(problem).tolerances:
-        upper, lower = (
-            _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + step) for step in (STEP, -STEP)
-        )
+        upper, lower = (objective(tolerance.name, 1.0 + step) for step in (STEP, -STEP))
         saving = (upper - lower) / (2.0 * STEP)
         priced.append(PricedTolerance(
             tolerance.name, tolerance.size, tolerance.unit, str(tolerance.law), str(tolerance.scope),
             len(tolerance.errors), saving / tolerance.size, saving,
         ))  # fmt: skip
     return tuple(sorted(priced, key=lambda tolerance_price: -tolerance_price.saving))
-
-
-def _scaled_objective(
-    problem: Problem,
-    values: Sequence[Value],
-    active: ActiveErrors,
-    sample: _Sample,
-    share: float,
-    tolerance: Tolerance,
-    factor: float,
-) -> float:
-    """Return the objective of the active error sets, or of the share, with one tolerance times `factor` (R11)."""
-    scaled_problem = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
-    if robust_of(problem).population.share is not None:
-        return float(np.quantile(sample.values(scaled_problem, values), share))
-    total = 0.0
-    for errors, weight, prices in zip(active.errors, active.shares, active.prices, strict=True):
-        limit_prices = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
-        if weight > 0.0 or limit_prices:
-            evaluation = evaluate_built(with_errors(scaled_problem, errors), values, sample.samples)
-            total += weight * objective_value(problem, evaluation)
-            total += sum(price * evaluation.value(limit.measure) for limit, price in limit_prices)
-    return total
 
 
 def infeasible_robust_result(
@@ -218,54 +249,3 @@ def _limits_in_the_worst_case(
         price = prices.get(limit, 0.0) if active else 0.0
         result.append(replace(value, value=maximum, active=active, shadow_price=price))
     return tuple(result)
-
-
-def robust_result(
-    problem: Problem,
-    design: Design,
-    initial_worst: WorstEngines,
-    final_worst: WorstEngines,
-    active: ActiveErrors,
-    proof: ProofData,
-    details: RobustResult,
-    timing: dict[str, float],
-) -> Result:
-    """Return the result of a design for built engines.
-
-    Parameters
-    ----------
-    initial_worst, final_worst
-        Worst engines of the initial design and of the robust design.
-    active
-        Error sets that determine the design.
-    proof
-        Bound of the objective with its method.
-    details
-        Comparison with the best drawing.
-    """
-    is_feasible = max(final_worst.violation, design.violation) <= FEASIBILITY_TOL
-    zero_level = numerical_zero(problem, design.evaluation.engine)
-    certificate = make_certificate(
-        final_worst.bound, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method
-    )
-    prices: dict[Limit, float] = {}
-    for limit, price in (pair for prices_of_set in active.prices for pair in prices_of_set):
-        prices[limit] = prices.get(limit, 0.0) + price
-    limits = _limits_in_the_worst_case(problem, limit_values(problem, design.evaluation), final_worst, prices)
-    status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    violated = violated_limits(final_worst.limits)
-    message = f"the best design found breaks {' and '.join(map(repr, violated)) or 'a limit'} in some engines"
-    return Result(
-        problem=problem,
-        status=status if is_feasible else Status.FAILED,
-        objective=ObjectiveValue.of(problem, final_worst.bound, initial_worst.value),
-        certificate=certificate,
-        decisions=priced_decisions(design),
-        limits=limits,
-        initial=evaluate(problem),
-        final=design.evaluation,
-        message="" if is_feasible else message,
-        error=partial(objective_error, problem, details.worst_engine),
-        timing=timing,
-        details=details,
-    )  # fmt: skip

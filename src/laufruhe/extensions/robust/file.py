@@ -15,7 +15,6 @@ from laufruhe.extensions.robust.assembly import Assembly, Lot
 from laufruhe.extensions.robust.tolerance import (
     AddedDrive,
     Error,
-    ErrorDrive,
     FileDrive,
     Law,
     PistonDrive,
@@ -32,7 +31,7 @@ from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import ExtensionContext, Key, Note
 from laufruhe.files.rotors import name_of_unbalance
-from laufruhe.machine import Engine, Rotor
+from laufruhe.machine import Engine
 from laufruhe.machine.rotor import grade_of, permitted_unbalance
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.problem.problem import Path, Problem
@@ -78,20 +77,16 @@ class RobustTable(Table):
 
 @dataclass(frozen=True)
 class Mark:
-    """Tolerance as written at a number of a file.
+    """Tolerance as written at the number of a file with the keys `path`.
 
     Attributes
     ----------
-    path
-        Keys of the number.
     text
         Whole text.
     number, unit
         Number of the drawing as written, and its unit; None for an open number.
     size
         Largest error as written: with a unit, in percent, or a plain number.
-    law, scope
-        Distribution of errors, and extent if written.
     """
 
     path: Path
@@ -102,14 +97,9 @@ class Mark:
     law: Law
     scope: Scope | None
 
-    @property
-    def where(self) -> str:
-        """Key of the number, for messages."""
-        return key_path(self.path)
-
     def refused(self, rule: str, remedy: str) -> Refused:
         """Return an error with a rule and a remedy."""
-        return Refused(self.where, self.text, rule, remedy)
+        return Refused(key_path(self.path), self.text, rule, remedy)
 
     @property
     def is_share(self) -> bool:
@@ -237,7 +227,7 @@ def _tolerance(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> Toler
     else:
         return _file_tolerance(mark)
     scope = mark.scope or Scope.PIECE
-    name = f"{errors[0].name}.{key}" if mark.path[0] != "engine" else mark.where
+    name = f"{errors[0].name}.{key}" if mark.path[0] != "engine" else key_path(mark.path)
     if scope is Scope.BATCH:
         errors = [Error(name, tuple(drive for error in errors for drive in error.drives))]
     return Tolerance(name, unit, size, tuple(errors), mark.law, scope)
@@ -245,10 +235,9 @@ def _tolerance(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> Toler
 
 def _pistons(mark: Mark, engine: Engine) -> _Errors:
     size = _mass(mark)
-    drives = [(part.name, PistonDrive(k, size)) for k, part in enumerate(engine.slider_cranks)]
     if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
         raise mark.refused("is a tolerance of the whole mass or more", "give less")
-    return [Error(name, (drive,)) for name, drive in drives], size, "kg"
+    return [Error(part.name, (PistonDrive(k, size),)) for k, part in enumerate(engine.slider_cranks)], size, "kg"
 
 
 def _pins(mark: Mark, engine: Engine) -> _Errors:
@@ -258,13 +247,9 @@ def _pins(mark: Mark, engine: Engine) -> _Errors:
         if place in pin_places:
             continue
         pin_places.add(place)
-        pin = Rotor("pin", part.x, part.crank_radius * complex(math.cos(part.throw), math.sin(part.throw)), part.shaft)
-        errors.append(
-            Error(
-                f"throw of {part.name}",
-                (AddedDrive(f"error of the pin of {part.name}", part.x, size * pin.unbalance, part.shaft),),
-            )
-        )
+        arm = part.crank_radius * complex(math.cos(part.throw), math.sin(part.throw))
+        drive = AddedDrive(f"error of the pin of {part.name}", part.x, size * arm, part.shaft)
+        errors.append(Error(f"throw of {part.name}", (drive,)))
     return errors, size, "kg"
 
 
@@ -275,8 +260,13 @@ def _mass(mark: Mark) -> float:
 
 def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
     """Return the error of the size of a counterweight or a balancer, which is a share."""
-    names = _names(mark.path, tables)
-    decided = {drive.rotor: decision for decision in problem.decisions for drive in decision.rotor_drives}
+    table = tables[str(mark.path[0])][mark.path[1]]
+    if mark.path[0] == "counterweights":
+        name = str(table["name"])
+    else:
+        names = [unbalance.get("name") for unbalance in table["unbalances"]]
+        name = name_of_unbalance(table["name"], names, int(mark.path[3]))
+    decided = {drive.rotor for decision in problem.decisions for drive in decision.rotor_drives}
     if mark.is_share:
         share = mark.error
     elif mark.number:
@@ -286,21 +276,9 @@ def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
         raise mark.refused(rule, "give the tolerance in percent")
     if share >= 1.0:
         raise mark.refused("is a tolerance of the whole number or more", "give less")
-    errors = [Error(name, (ShareDrive(name, share),)) for name in names]
-    if not any(
-        rotor.name in names and (rotor.unbalance != 0.0 or rotor.name in decided) for rotor in problem.engine.rotors
-    ):
+    if not any(rotor.name == name and (rotor.unbalance != 0.0 or name in decided) for rotor in problem.engine.rotors):
         raise mark.refused("has a tolerance, but its unbalance is zero", "leave the tolerance out")
-    return errors, share, ""
-
-
-def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
-    table = tables[str(path[0])][path[1]]
-    if path[0] == "counterweights":
-        return [str(table["name"])]
-    return [
-        name_of_unbalance(table["name"], [unbalance.get("name") for unbalance in table["unbalances"]], int(path[3]))
-    ]
+    return [Error(name, (ShareDrive(name, share),))], share, ""
 
 
 def _file_tolerance(mark: Mark) -> Tolerance:
@@ -309,14 +287,16 @@ def _file_tolerance(mark: Mark) -> Tolerance:
         raise mark.refused(
             "is open, and among open numbers only masses and unbalances may have a tolerance", "fix it, or leave it out"
         )
-    if mark.scope is Scope.PIECE and not any(isinstance(part, int) for part in mark.path):
+    is_of_a_piece = any(isinstance(part, int) for part in mark.path)
+    if mark.scope is Scope.PIECE and not is_of_a_piece:
         raise mark.refused("is one number of the whole engine", "write batch, or leave the word out")
     gain = mark.error * (abs(mark.number) if mark.is_share else 1.0)
     dimension = (units.dimension_of(f"1 {mark.unit}") or "") if mark.unit else ""
     size = gain * (units.parse(f"1 {mark.unit}", dimension) if mark.unit else 1.0)
-    drive: ErrorDrive = FileDrive(mark.path, mark.number, gain, mark.unit)
-    scope = mark.scope or (Scope.PIECE if any(isinstance(part, int) for part in mark.path) else Scope.BATCH)
-    return Tolerance(mark.where, dimension, size, (Error(mark.where, (drive,)),), mark.law, scope)
+    drive = FileDrive(mark.path, mark.number, gain, mark.unit)
+    scope = mark.scope or (Scope.PIECE if is_of_a_piece else Scope.BATCH)
+    name = key_path(mark.path)
+    return Tolerance(name, dimension, size, (Error(name, (drive,)),), mark.law, scope)
 
 
 def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> list[Tolerance]:

@@ -39,13 +39,13 @@ def figure(result: Result) -> Figure:
     _bars(second, details, unit)
     worst = "worst case, which no engine exceeds" if details.exact else "worst engine drawn"
     legend = [
-        entry("best drawing", color=BEFORE), entry("decided", color=AFTER),
+        entry("nominal design", color=BEFORE), entry("robust design", color=AFTER),
         entry("as drawn", color=INK, linestyle=DRAWN), entry(worst, color=INK, linestyle=WORST),
     ]  # fmt: skip
-    lines = (
+    text = (
         f"{details.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
     )
-    return finish_page(layout, result, "The price of tolerances", lines, legend)
+    return finish_page(layout, result, "The price of tolerances", text, legend)
 
 
 def _bars(axes: Axes, details: RobustResult, unit: str) -> None:

@@ -2,42 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
 from laufruhe.extensions.robust.assembly import Assembly
 from laufruhe.extensions.robust.tolerance import Robust
-from laufruhe.problem.problem import Problem
-from laufruhe.solvers.methods import Decide, Reduction
-from laufruhe.solvers.result import Result
-
-_BEFORE = "constant limits"
+from laufruhe.solvers.methods import Reduction
 
 
-def _solve_assembly(problem: Problem, decide: Decide, rest: Decide) -> Result:
-    from laufruhe.extensions.robust.assembly_solver import solve_assembly
-
-    return solve_assembly(problem, decide, rest)
-
-
-def _refuse_assembly(problem: Problem) -> None:
-    from laufruhe.extensions.robust.assembly_solver import refuse
-
-    refuse(problem)
-
-
-def _solve_built(problem: Problem, decide: Decide, rest: Decide) -> Result:
-    from laufruhe.extensions.robust.solver import solve_built
-
-    return solve_built(problem, decide, rest)
-
-
-def _refuse_built(problem: Problem) -> None:
-    from laufruhe.extensions.robust.solver import refuse
-
-    refuse(problem)
+def _from(module: str, function: str) -> Callable[..., Any]:
+    # solvers are imported when a problem needs them
+    return lambda *arguments: getattr(import_module(f"laufruhe.extensions.robust.{module}"), function)(*arguments)
 
 
 ASSEMBLY = Reduction(
-    "assembly", lambda problem: problem.extra(Assembly) is not None, _solve_assembly, _refuse_assembly, _BEFORE
-)
+    "assembly", lambda problem: problem.extra(Assembly) is not None,
+    _from("assembly_solver", "solve_assembly"), _from("assembly_solver", "refuse"), "constant limits",
+)  # fmt: skip
 TOLERANCES = Reduction(
-    "tolerances", lambda problem: problem.extra(Robust) is not None, _solve_built, _refuse_built, _BEFORE
-)
+    "tolerances", lambda problem: problem.extra(Robust) is not None,
+    _from("solver", "solve_built"), _from("solver", "refuse"), "constant limits",
+)  # fmt: skip

@@ -22,8 +22,6 @@ class BuiltDesign:
 
     Attributes
     ----------
-    name
-        "best drawing" or "decided".
     decisions
         Name, value and unit of each decision.
     drawing
@@ -52,12 +50,8 @@ class PricedTolerance:
 
     Attributes
     ----------
-    name
-        Key of the file.
     size, unit
         Largest error [SI].
-    law, scope
-        Distribution of errors, and "piece" or "batch".
     errors
         Count of independent errors.
     price
@@ -89,9 +83,7 @@ class RobustResult(ResultDetails):
     share
         Share of engines for `BuiltDesign.share`.
     nominal, robust
-        Best drawing, and design for built engines.
-    tolerances
-        Priced tolerances, the most expensive first.
+        Optimum without errors, and design for built engines.
     scenarios
         Count of error sets in the program.
     divisions
@@ -149,20 +141,14 @@ class AssemblyResult(ResultDetails):
     ----------
     kinds
         Kinds of the lots.
-    places
-        Parts of each cylinder.
-    assemblies
-        Count of all assemblies.
+    assemblies, random
+        Counts of all assemblies, and of random ones.
     looked_at
         Count of nodes of branch and bound.
-    quantiles
-        Quantiles of random assemblies at SHARES.
-    worst
-        Largest objective of the random assemblies.
+    quantiles, worst
+        Quantiles at SHARES and maximum of the objectives of random assemblies.
     mean_parts
         Objective with parts of mean mass.
-    random
-        Count of random assemblies.
     """
 
     kinds: tuple[str, ...]

@@ -9,8 +9,6 @@ from laufruhe.extensions.robust.result import (
     CONFIDENCE,
     SHARES,
     AssemblyResult,
-    BuiltDesign,
-    Place,
     PricedTolerance,
     RobustResult,
 )
@@ -29,22 +27,21 @@ def _tolerance_tables(result: Result) -> list[Table]:
     worst = "worst case" if details.exact else "worst drawn"
     level, confidence = f"{100.0 * details.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"
     head = ("design", "as drawn", worst, level, confidence)
-    rows = [_design(design, unit) for design in (details.nominal, details.robust)]
+    rows = []
+    for design in (details.nominal, details.robust):
+        values = (figure(value, unit, 5) for value in (design.drawing, design.worst, design.share))
+        rows.append((design.name, *values, f"{number(design.low, 5)} to {number(design.high, 5)}"))
     pairs = ((getattr(details.nominal, key), getattr(details.robust, key)) for key in ("drawing", "worst", "share"))
     rows.append(("price", *(percent(robust / nominal - 1.0) if nominal else "-" for nominal, robust in pairs), ""))
     tolerance_head = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
     tolerance_rows = [_tolerance(tolerance, unit) for tolerance in details.tolerances]
+    count = f"Checked: of {details.engines:,} other engines {details.exceeding} exceed the objective"
+    check = f"{count}, so at most {100.0 * details.exceeding_at_most:.2g} % of all do ({confidence})."
     note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
     return [
-        Table(head, rows, title="Under tolerance", note=_tolerance_note(details), file="under-tolerance"),
+        Table(head, rows, title="Under tolerance", note=check, file="under-tolerance"),
         Table(tolerance_head, tolerance_rows, title="Tolerances", left=2, note=note, file="tolerances"),
     ]
-
-
-def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:
-    low, high = (number(value, 5) for value in (design.low, design.high))
-    values = (figure(value, unit, 5) for value in (design.drawing, design.worst, design.share))
-    return (design.name, *values, f"{low} to {high}")
 
 
 def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
@@ -59,38 +56,27 @@ def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
     return tolerance.name, f"± {size}", errors, price, figure(tolerance.saving, unit, 3)
 
 
-def _tolerance_note(details: RobustResult) -> str:
-    count = f"Checked: of {details.engines:,} other engines {details.exceeding} exceed the objective"
-    return f"{count}, so at most {100.0 * details.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."
-
-
 def _assembly_tables(result: Result) -> list[Table]:
     details, unit = result.details, objective_unit(result)
     assert isinstance(details, AssemblyResult)
-    head = ["cylinder"]
+    head, rows = ["cylinder"], []
     for kind in details.kinds:
         head += [kind, "mass [g]"]
-    rows = [_row(place) for place in details.places]
-    return [Table(head, rows, title="Assembly", note=_assembly_note(details, unit), file="assembly")]
-
-
-def _row(place: Place) -> tuple[str, ...]:
-    cells = [place.cylinder]
-    for part, masses in zip(place.parts, place.masses, strict=True):
-        cells += [f"no. {part}", " + ".join(f"{1e3 * mass:.1f}" for mass in masses if mass)]
-    return tuple(cells)
-
-
-def _assembly_note(details: AssemblyResult, unit: str) -> str:
+    for place in details.places:
+        cells = [place.cylinder]
+        for part, masses in zip(place.parts, place.masses, strict=True):
+            cells += [f"no. {part}", " + ".join(f"{1e3 * mass:.1f}" for mass in masses if mass)]
+        rows.append(cells)
     middle, maximum = (
         figure(details.quantiles[int(share * (len(details.quantiles) - 1))], unit) for share in (0.5, 0.95)
     )
     count = f"Of {details.assemblies:,.0f} assemblies; {details.random} of them at random"
     worst, mean = figure(details.worst, unit), figure(details.mean_parts, unit)
-    return (
+    note = (
         f"{count}: half above {middle}, one of twenty above {maximum}, the worst {worst}. "
         f"With parts of mean mass {mean}."
     )
+    return [Table(head, rows, title="Assembly", note=note, file="assembly")]
 
 
 def _tolerance_record(result: Result) -> dict[str, Any]:
@@ -138,7 +124,7 @@ ASSEMBLY = Section(
 )  # fmt: skip
 TOLERANCES_PICTURE = ResultPicture(
     "robust",
-    "The best drawing and the design decided, each built many times, and what each tolerance costs.",
+    "Nominal and robust design, each built many times, and the cost of each tolerance.",
     "laufruhe.extensions.robust.picture",
 )
 ASSEMBLY_PICTURE = ResultPicture(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +19,10 @@ from laufruhe.extensions.robust.built_engines import (
     Adversary,
     SampledEngines,
     WorstCaseAdversary,
-    WorstEngines,
     evaluate_built,
 )
-from laufruhe.extensions.robust.conclusion import ActiveErrors, compare_designs, infeasible_robust_result, robust_result
-from laufruhe.extensions.robust.tolerance import Population, robust_of, tolerances_of, with_errors, with_tolerances
+from laufruhe.extensions.robust.conclusion import ActiveErrors, RobustDesign, infeasible_robust_result, robust_result
+from laufruhe.extensions.robust.tolerance import robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import until_time_limit
@@ -37,13 +36,11 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
+from laufruhe.prove.certificate import best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     FEASIBLE,
     MAX_REFINEMENTS,
-    ProofData,
-    evaluate_design,
     unbalance_values,
 )
 from laufruhe.solvers.cones.conic import solve_cones
@@ -70,56 +67,8 @@ SHARE_ROUNDS = 12
 """Most rounds that select the engines that may exceed the objective."""
 
 
-@dataclass(frozen=True, eq=False)
-class RobustDesign:
-    """Design with an upper bound over its engines, and a lower bound over all designs.
-
-    Attributes
-    ----------
-    values
-        Values of the decisions.
-    worst
-        Worst engines of the design.
-    bound
-        Lower bound of the objective over all designs [SI].
-    active
-        Error sets that determine the design.
-    scenarios, angles
-        Counts of error sets and of samples in the program.
-    samples
-        Samples over the cycle for engines.
-    margin
-        Share by which limits were lowered, because peaks lie between samples.
-    conflict
-        Limits that no design satisfies in each engine; all other attributes are then undefined.
-    """
-
-    values: tuple[Value, ...]
-    worst: WorstEngines
-    bound: float
-    active: ActiveErrors
-    scenarios: int
-    angles: int
-    samples: int
-    margin: float = 0.0
-    conflict: tuple[str, ...] = ()
-
-
 def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
-    """Return the optimum for engines within tolerances.
-
-    Parameters
-    ----------
-    problem
-        Problem whose unbalances may be open.
-    solve
-        Solve the drawing, or one star of an open crank.
-
-    Raises
-    ------
-    ModelError
-        If other numbers are open, or measures are not affine in the errors.
-    """
+    """Return the optimum of unbalances for engines within tolerances; `solve` solves the drawing, or one star."""
     refuse(problem)
     if problem.phasing is not None:
         result = solve_star_by_star(problem, solve)
@@ -128,7 +77,6 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         if result.objective is None or initial is None:
             return result
         return replace(result, objective=replace(result.objective, initial=initial.value))
-    population = robust_of(problem).population
     started = time.perf_counter()
     with search_scope("drawing"):
         drawing = solve(problem.drawing)
@@ -139,27 +87,18 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalance_values(problem, drawing))
     report_progress("worst errors of the drawing")
-    adversary, robust = _decide(problem, population, start, drawing)
+    adversary, robust = _minimise(problem, start, drawing)
     adversary = replace(adversary, samples=robust.samples)
     initial_worst = adversary.at(problem.start, proven=False)
+    seconds = time.perf_counter() - started
     if robust.conflict:
-        return infeasible_robust_result(
-            problem, initial_worst, robust.conflict, {"solve": time.perf_counter() - started}
-        )
-    solved = time.perf_counter()
-    strength = ProofStrength.EXACT if population.share is None else ProofStrength.RELAXED
-    design = evaluate_design(problem, robust.values, robust.samples)
-    proof = ProofData(robust.bound, strength, robust.active.residual, _method(problem, robust))
-    details = compare_designs(problem, adversary, start, robust.values, robust.worst, robust.active, robust.scenarios)
-    timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    return robust_result(problem, design, initial_worst, robust.worst, robust.active, proof, details, timing)
+        return infeasible_robust_result(problem, initial_worst, robust.conflict, {"solve": seconds})
+    return robust_result(problem, adversary, start, initial_worst, robust, _method(problem, robust), seconds)
 
 
-def _decide(
-    problem: Problem, population: Population, start: tuple[Value, ...], drawing: Result
-) -> tuple[Adversary, RobustDesign]:
+def _minimise(problem: Problem, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, RobustDesign]:
     """Return the adversary for the tolerances, and the best design against it."""
-    tolerances, samples = tolerances_of(problem), problem.fidelity.samples
+    tolerances, population, samples = tolerances_of(problem), robust_of(problem).population, problem.fidelity.samples
     zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(population.seed)
     if population.share is None and tolerances.is_affine:
         adversary = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
@@ -220,8 +159,8 @@ def _method(problem: Problem, robust: RobustDesign) -> str:
 class _Program:
     """Cone program of several error sets, which grows as sets join."""
 
-    def __init__(self, problem: Problem, zero_level: float) -> None:
-        self.problem, self.zero_level, self.samples = problem, zero_level, problem.fidelity.samples
+    def __init__(self, problem: Problem) -> None:
+        self.problem, self.samples = problem, problem.fidelity.samples
         self.errors: list[Array] = []
         self.models: list[AffineModel] = []
         self.shares: list[float] = []
@@ -231,11 +170,7 @@ class _Program:
 
     def add(self, errors: Sequence[Array]) -> bool:
         """Add error sets that it lacks; return True if there are any. The least active sets leave a full program."""
-        added = [
-            error_set
-            for error_set in errors
-            if all(np.abs(error_set - entries).max(initial=0.0) > SAME for entries in self.errors)
-        ]
+        added = [z for z in errors if all(np.abs(z - present).max(initial=0.0) > SAME for present in self.errors)]
         while self.errors and len(self.errors) + len(added) > MAX_SCENARIOS:
             index = int(np.argmin(self.shares)) if self.shares else 0
             for entries in (self.errors, self.models, self.shares):
@@ -299,8 +234,7 @@ class _Program:
 
     def level(self, values: Sequence[Value]) -> float:
         """Return the largest objective of a design over the error sets of the program."""
-        evaluations = (evaluate_built(model.problem, values, self.samples) for model in self.models)
-        return max(objective_value(self.problem, evaluation) for evaluation in evaluations)
+        return max(objective_value(self.problem, evaluate_built(m.problem, values, self.samples)) for m in self.models)
 
 
 def _minimise_worst_case(
@@ -314,7 +248,7 @@ def _minimise_worst_case(
         engine = evaluate_built(with_errors(problem, worst.errors[0]), start, adversary.samples)
         best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=worst.violated)
         return _refine_sampling(adversary, best, zero_level)
-    program, values, bound = _Program(problem, zero_level), start, 0.0
+    program, values, bound = _Program(problem), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, previous_violation, is_solved = program.angles // COARSER, 0.0, math.inf, True
     for _ in until_time_limit(range(MAX_ROUNDS)):
@@ -381,7 +315,7 @@ def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) ->
 
 
 def _quantile(adversary: SampledEngines, values: Sequence[Value], share: float) -> float:
-    return float(np.sort(adversary.objective(values))[math.ceil(share * len(adversary.errors)) - 1])
+    return float(np.sort(adversary.objectives(values))[math.ceil(share * len(adversary.errors)) - 1])
 
 
 def _minimise_share(
@@ -391,7 +325,7 @@ def _minimise_share(
     count = math.ceil(share * len(adversary.errors))
     values, best = start, None
     for _ in until_time_limit(range(SHARE_ROUNDS)):
-        order = np.argsort(adversary.objective(values), kind="stable")
+        order = np.argsort(adversary.objectives(values), kind="stable")
         lower_share = adversary.subset(order[:count])
         candidate = _minimise_worst_case(problem, lower_share, values, zero_level)
         if best is not None and candidate.worst.value >= best.worst.value * (1.0 - SAME):

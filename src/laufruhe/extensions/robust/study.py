@@ -108,14 +108,16 @@ def worst_parts(engine: Engine, speed: float, tolerances: StudyTolerancesTable) 
 
     Unbalances may have any angle, so the sum of all causes is the worst case.
     """
-    tolerance_set, forces = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0)
+    tolerance_set, forces, first = tolerances.of(engine), dict.fromkeys(CAUSES, 0.0), 0
     added = _added_forces(engine, speed, tolerance_set)
     for cause in tolerance_set.tolerances:
-        slope = np.ascontiguousarray(np.moveaxis(added[tolerance_set.columns_of(cause.name)], 0, -1))
+        columns = Tolerances((cause,)).columns
+        count = columns[-1].stop
+        slope = np.ascontiguousarray(np.moveaxis(added[first : first + count], 0, -1))
         zero, steps = np.zeros(slope.shape[:2]), len(slope)
         norm = AffineNorm(MAXIMUM, zero, slope, Grid(np.full(steps, 1.0 / steps), steps))
-        columns = Tolerances((cause,)).columns
         forces[cause.name] = worst_case([(1.0, norm)], columns, CLOSE).bound
+        first += count
     return forces
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar, Protocol
+from typing import ClassVar, TypeAlias
 
 import numpy as np
 
@@ -36,17 +36,6 @@ class Scope(StrEnum):
 
     PIECE = "piece"
     BATCH = "batch"
-
-
-class ErrorDrive(Protocol):
-    """Part of an engine that an error changes."""
-
-    @property
-    def is_affine(self) -> bool:
-        """True if all loads are affine in this error, jointly with all other affine errors."""
-
-    def with_error(self, drawing: Drawing, error: complex, /) -> Drawing:
-        """Return the drawing with an error, in units of its largest size."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +131,10 @@ class FileDrive:
         return f"{value!r} {self.unit}" if self.unit else value
 
 
+ErrorDrive: TypeAlias = PistonDrive | AddedDrive | ShareDrive | FileDrive
+"""Part of an engine that an error changes; `is_affine` if all loads are affine in it and all other affine errors."""
+
+
 @dataclass(frozen=True)
 class Error:
     """Independent error.
@@ -196,23 +189,19 @@ class Tolerance:
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
         """Return random errors, shape (count, columns): uniform in interval or disc, or normal and truncated."""
-        parts = [self._one(random, count, error.width) for error in self.errors]
+        parts = []
+        for width in (error.width for error in self.errors):
+            if self.law is Law.NORMAL:
+                part = random.normal(0.0, 1.0 / SIGMAS, (count, width))
+                while (is_outside := np.hypot.reduce(part, axis=1) > 1.0).any():
+                    part[is_outside] = random.normal(0.0, 1.0 / SIGMAS, (int(is_outside.sum()), width))
+            elif width == 1:
+                part = random.uniform(-1.0, 1.0, (count, 1))
+            else:
+                size, angle = np.sqrt(random.uniform(0.0, 1.0, count)), random.uniform(0.0, 2.0 * np.pi, count)
+                part = np.stack([size * np.cos(angle), size * np.sin(angle)], axis=1)
+            parts.append(part)
         return np.concatenate(parts, axis=1)
-
-    def _one(self, random: np.random.Generator, count: int, width: int) -> Array:
-        if self.law is Law.NORMAL:
-            return _normal(random, count, width)
-        if width == 1:
-            return random.uniform(-1.0, 1.0, (count, 1))
-        size, angle = np.sqrt(random.uniform(0.0, 1.0, count)), random.uniform(0.0, 2.0 * np.pi, count)
-        return np.stack([size * np.cos(angle), size * np.sin(angle)], axis=1)
-
-
-def _normal(random: np.random.Generator, count: int, width: int) -> Array:
-    errors = random.normal(0.0, 1.0 / SIGMAS, (count, width))
-    while (is_outside := np.hypot.reduce(errors, axis=1) > 1.0).any():
-        errors[is_outside] = random.normal(0.0, 1.0 / SIGMAS, (int(is_outside.sum()), width))
-    return errors
 
 
 @dataclass(frozen=True)
@@ -233,31 +222,17 @@ class Population:
     engines: int = 1000
     seed: int = 0
 
-    def objective_name(self, measure: str, is_affine: bool) -> str:
-        """Return the name of the objective, with the engines that it covers."""
-        if self.share is not None:
-            return f"{measure}, {100.0 * self.share:g} % of engines below"
-        return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
-
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Tolerances of a problem; all their errors form one vector.
-
-    Attributes
-    ----------
-    tolerances
-        In the order of the file.
-    """
+    """Tolerances of a problem in the order of its file; all their errors form one vector."""
 
     tolerances: tuple[Tolerance, ...]
 
     @property
     def nonzero(self) -> Tolerances:
         """Tolerances with a size above zero."""
-        return replace(
-            self, tolerances=tuple(tolerance for tolerance in self.tolerances if tolerance.size * tolerance.scale > 0.0)
-        )
+        return Tolerances(tuple(t for t in self.tolerances if t.size * t.scale > 0.0))
 
     @cached_property
     def errors(self) -> tuple[Error, ...]:
@@ -280,23 +255,9 @@ class Tolerances:
         """True if all loads are affine in all errors jointly."""
         return all(error.is_affine for error in self.errors)
 
-    def columns_of(self, name: str) -> slice:
-        """Return the slice of one tolerance in the vector of all errors."""
-        start = 0
-        for tolerance in self.tolerances:
-            width = sum(error.width for error in tolerance.errors)
-            if tolerance.name == name:
-                return slice(start, start + width)
-            start += width
-        raise KeyError(name)
-
     def scaled(self, name: str, factor: float) -> Tolerances:
         """Return the tolerances with one of them times a factor."""
-        tolerances = tuple(
-            replace(tolerance, scale=factor * tolerance.scale) if tolerance.name == name else tolerance
-            for tolerance in self.tolerances
-        )
-        return replace(self, tolerances=tolerances)
+        return Tolerances(tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.tolerances))
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
         """Return random errors of many engines, shape (count, columns)."""
@@ -325,15 +286,7 @@ class Tolerances:
 
 @dataclass(frozen=True)
 class Robust(Extra):
-    """Objective and limits over built engines.
-
-    Attributes
-    ----------
-    tolerances
-        Tolerances of the engines.
-    population
-        Engines that objective and limits cover.
-    """
+    """Objective and limits over the built engines of a population within tolerances."""
 
     tolerances: Tolerances
     population: Population
@@ -341,7 +294,10 @@ class Robust(Extra):
 
     def objective_name(self, name: str) -> str:
         """Return the name of the objective, with the engines that it covers."""
-        return self.population.objective_name(name, self.tolerances.is_affine)
+        share, engines = self.population.share, self.population.engines
+        if share is not None:
+            return f"{name}, {100.0 * share:g} % of engines below"
+        return f"{name}, worst case" if self.tolerances.is_affine else f"{name}, worst of {engines} drawn engines"
 
 
 def robust_of(problem: Problem) -> Robust:

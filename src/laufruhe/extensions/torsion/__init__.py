@@ -21,5 +21,5 @@ EXTENSION = Extension(
     ),
     methods=(f"{_HERE}.solver:METHOD",),
     sections=(f"{_HERE}.section:SECTION",),
-    pictures=(f"{_HERE}.pictures:MODES", f"{_HERE}.pictures:RESPONSE"),
+    pictures=(f"{_HERE}.section:MODES", f"{_HERE}.section:RESPONSE"),
 )

@@ -152,24 +152,20 @@ class TwistBoxes:
         if any(inertia_bound.minimum(chains) > maximum * (1.0 + SLACK) for maximum, inertia_bound in self._uneven):
             return math.inf, int(np.argmax(widths))
         twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
-        if any(
-            _root_bound([(1.0, self._under(q, chains, twists))]) > maximum * (1.0 + SLACK)
-            for maximum, q in self._limits
-        ):
+        limited = ((maximum, _root_bound([(1.0, self._under(q, chains, twists))])) for maximum, q in self._limits)
+        if any(bound > maximum * (1.0 + SLACK) for maximum, bound in limited):
             return math.inf, int(np.argmax(widths))
         if any(self._overheats(limit, chains, twists) for limit in self._heat):
             return math.inf, int(np.argmax(widths))
         terms = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
-        bound, pull = (
-            _root_bound(terms),
-            np.nan_to_num(sum((w * under.scores[0] for w, under in terms), np.zeros(len(widths)))),
-        )
-        pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
         turning = sum(weight * inertia_bound.minimum(chains) for weight, inertia_bound in self._turning)
-        if not self._terms:
-            # each goes one way with every inertia, and nothing else moves it
+        if terms:
+            pull = np.nan_to_num(sum((w * under.scores[0] for w, under in terms), np.zeros(len(widths))))
+            pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
+        else:
+            # the rotating inertia is monotone in every inertia, and no other number moves it
             pull = widths
-        return self._constant + turning + bound, int(np.argmax(pull + _SAME * widths))
+        return self._constant + turning + _root_bound(terms), int(np.argmax(pull + _SAME * widths))
 
     def _lines_at(self, loads: PointLoads) -> _Lines:
         """Return the orders that contribute anywhere in the bounds, judged at their middle and corners."""
@@ -212,17 +208,8 @@ class TwistBoxes:
             for side, row in zip(sides, coordinates.owners, strict=True)
         ])  # fmt: skip
         inside = along.inside(np.moveaxis(np.array(sides), 0, 1))
-        return _Lines(
-            loads,
-            highest,
-            orders,
-            drives,
-            torques.coefficients[0].real,
-            middle_stiffness,
-            np.array(sides),
-            along,
-            inside,
-        )
+        mean = torques.coefficients[0].real
+        return _Lines(loads, highest, orders, drives, mean, middle_stiffness, np.array(sides), along, inside)
 
     def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
         root = np.sqrt(inertias(chain))
@@ -271,14 +258,10 @@ class TwistBoxes:
             return answer
         moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
         twist_response = mapped(twist, moved)
-        maximum = (
-            np.abs(twist_response.value)
-            + np.abs(twist_response.slopes).sum(axis=2)
-            + twist_response.remainder[..., None]
-        )
-        return replace(
-            answer, remainder=answer.remainder + np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1)
-        )
+        maximum = np.abs(twist_response.value) + np.abs(twist_response.slopes).sum(axis=2)
+        maximum = maximum + twist_response.remainder[..., None]
+        excess = np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1)
+        return replace(answer, remainder=answer.remainder + excess)
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]

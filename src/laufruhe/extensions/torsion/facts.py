@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -24,7 +25,6 @@ from laufruhe.extensions.torsion.physics import (
     throw_torques,
     vector_sums,
 )
-from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import bisect_property
 from laufruhe.problem.evaluation import Evaluation
@@ -120,22 +120,17 @@ def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
     main, criticals = main_orders(engine, HIGHEST), []
     for order, modes_at, weights in zip(orders, met, sums, strict=True):
         for m, (frequency, weight) in enumerate(zip(modes_at.frequencies, weights, strict=True)):
-            speed = critical_speed(float(frequency), order)
+            speed, torque = critical_speed(float(frequency), order), None
             if low <= speed <= high:
-                torque = _torque_at_critical_speed(design, replace(fastest, speed=speed), order)
+                torques = throw_torques(engine, replace(fastest, speed=speed), design.fidelity).at(order)
+                # without damping the torque has no bound
+                with suppress(ModelError):
+                    flexible = receptances(chain, np.array([order]), speed)[0]
+                    stiff = section_stiffness(chain, np.array([order]), speed)[0]
+                    torque = float(np.abs(stiff * (flexible @ torques)).max())
                 criticals.append(Critical(speed, order, m + 1, float(weight), order in main, torque))
     criticals.sort(key=lambda entry: -np.inf if entry.torque is None else -entry.torque)
     return TorsionFacts(modes, orders, met, sums, main, tuple(criticals))
-
-
-def _torque_at_critical_speed(design: Evaluation, point: OperatingPoint, order: float) -> float | None:
-    chain, torques = chain_of(design.engine), throw_torques(design.engine, point, design.fidelity)
-    try:
-        flexible = receptances(chain, np.array([order]), point.speed)[0]
-    except ModelError:
-        return None
-    stiff = section_stiffness(chain, np.array([order]), point.speed)[0]
-    return float(np.abs(stiff * (flexible @ torques.at(order))).max())
 
 
 def speeds_between(design: Evaluation, low: float, high: float) -> Array:
@@ -201,19 +196,13 @@ def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
 
 def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[float, float]]:
     state = [is_barred(float(speed)) for speed in speeds]
-    ranges: list[tuple[float, float]] = []
-    start = float(speeds[0]) if state[0] else None
+    ends = [float(speeds[0])] if state[0] else []
     for k in range(1, len(speeds)):
         if state[k] != state[k - 1]:
-            edge = _edge(is_barred, float(speeds[k - 1]), float(speeds[k]), state[k])
-            if start is None:
-                start = edge
-            else:
-                ranges.append((start, edge))
-                start = None
-    return [*ranges, (start, float(speeds[-1]))] if start is not None else ranges
-
-
-def _edge(is_barred: Callable[[float], bool], low: float, high: float, after: bool) -> float:
-    low, high = bisect_property(lambda speed: is_barred(speed) != after, low, high, _HALVINGS)
-    return low if after else high
+            edge = bisect_property(
+                lambda speed, was=state[k - 1]: is_barred(speed) == was,  # type: ignore[misc]
+                float(speeds[k - 1]), float(speeds[k]), _HALVINGS,
+            )  # fmt: skip
+            ends.append(edge[0] if state[k] else edge[1])
+    ends += [float(speeds[-1])] if state[-1] else []
+    return list(zip(ends[::2], ends[1::2], strict=True))

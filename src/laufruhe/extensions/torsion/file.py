@@ -116,17 +116,11 @@ class _OpenNumbers:
         self.decisions: list[Decision] = []
 
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
-        """The number that some parts have, or start from."""
+        """Return the number of some parts, or its start if it is open."""
         number = Open.from_value(value)
         drives = (NumberDrive(TORSION, (part, key)) for part in parts)
         self.decisions += number.decisions(f"torsion.{name}.{key}", unit, *drives)
         return number.start
-
-
-def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> Problem:
-    chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
-    _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if context.file.flywheel is None else "flywheel")
-    return replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
 
 
 def _chain(
@@ -144,10 +138,12 @@ def _chain(
     open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
     front, rear = (
-        [Disc(one.name, open_numbers.number(one.inertia, "inertia", "kg m^2", one.name, [one.name]), one.damping)
-         for _, one in ends[end]]
-        for end in ("front", "rear")
-    )  # fmt: skip
+        [
+            Disc(d.name, open_numbers.number(d.inertia, "inertia", "kg m^2", d.name, [d.name]), d.damping)
+            for _, d in disc_tables
+        ]
+        for disc_tables in (ends["front"], ends["rear"])
+    )
     discs = (*front, *discs_of_throws, *rear)
     names = [disc.name for disc in discs]
     links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
@@ -173,7 +169,7 @@ def _chain(
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:
-    """A disc a throw from the front, with what its pistons and rods reduce to the crank."""
+    """Return a disc for each throw from the front, with the reduced inertia of its pistons and rods."""
     places = sorted({throw.x for throw in throws}, reverse=True)
     at = [[k for throw in throws if throw.x == x for k in throw.cylinders] for x in places]
     # the mass of a throw that turns, without its rods
@@ -237,16 +233,11 @@ def _section(
 def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
     diameter = Open.from_value(piece.diameter)
     if diameter.is_open and count > 1:
-        raise Refused(
-            f"{where}.diameter",
-            None,
-            "is open, and its shaft has other pieces",
-            "fix the diameter, or give a single piece",
-        )
+        rule = "is open, and its shaft has other pieces"
+        raise Refused(f"{where}.diameter", None, rule, "fix the diameter, or give a single piece")
     if piece.bore >= diameter.lower:
-        raise Refused(
-            f"{where}.bore", units.quantity_text(piece.bore, "m"), "is as wide as its shaft", "give it a wall"
-        )
+        bore = units.quantity_text(piece.bore, "m")
+        raise Refused(f"{where}.bore", bore, "is as wide as its shaft", "give it a wall")
     return piece.length, diameter.start, piece.bore
 
 
@@ -280,20 +271,22 @@ def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]
     return list(values) * count if len(values) == 1 else list(values)
 
 
-def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Problem, where: str) -> None:
-    """Refuse a rotating inertia that contradicts the discs (V14)."""
+def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> Problem:
+    """Return the problem with its chain; refuse a rotating inertia that contradicts the discs (V14)."""
+    chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
     wheel = problem.engine.flywheel
+    result = replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
     if wheel is None:
-        return
+        return result
+    where = "fidelity.crank_inertia" if context.file.flywheel is None else "flywheel"
     discs = {(disc.name, "inertia") for disc in chain.discs}
-    for decision in (*problem.decisions, *decisions):
+    for decision in result.decisions:
         if decision.kind is Kind.FLYWHEEL:
             rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
             raise Refused(decision.name, None, rule, "leave [flywheel] out, and open a disc")
         if any(key in discs for key in decision.keys(TORSION)):
-            raise Refused(
-                where, None, f"gives an inertia that follows from {decision.name}, which is open", "leave it out"
-            )
+            rule = f"gives an inertia that follows from {decision.name}, which is open"
+            raise Refused(where, None, rule, "leave it out")
     inertia, without_rings = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
     maximum = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
     if not without_rings * (1.0 - _ROUNDED) <= inertia <= maximum * (1.0 + _ROUNDED):
@@ -301,6 +294,7 @@ def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Probl
         rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
         remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"
         raise Refused(where, units.quantity_text(inertia, "kg m^2"), rule, remedy)
+    return result
 
 
 def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Protocol, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
@@ -35,39 +35,22 @@ _FREE = 1e-9
 _NONE = 1e-13
 
 
-class Resonance(Protocol):
-    """Crank speed or order for which natural modes are computed."""
-
-    def numbers(self, chain: Torsion) -> Array:
-        """Return the resonance number of every mode in ascending order, shape (modes,)."""
-
-    def inertia(self, chain: Torsion) -> Array:
-        """Return the inertia matrix of discs and rings [kg m2], shape (discs and rings, discs and rings)."""
-
-    def share(self, absorber: Absorber) -> float | None:
-        """Return the effective inertia of a ring at its disc over its own inertia; None if it is not constant."""
-
-
 @dataclass(frozen=True)
 class AtSpeed:
     """Natural frequencies [Hz] at a crank speed [rad/s], which sets the stiffness of pendulums (V4, V11)."""
 
     speed: float
 
-    def modes(self, chain: Torsion) -> TorsionalModes:
-        """Return the modes at this crank speed."""
-        return _modes(chain, self.inertia(chain), [absorber.stiffness_at(self.speed) for absorber in chain.absorbers])
-
     def numbers(self, chain: Torsion) -> Array:
-        """Return the natural frequencies [Hz]."""
-        return self.modes(chain).frequencies
+        """Return the natural frequencies [Hz] in ascending order, shape (modes,)."""
+        return natural_modes(chain, self.speed).frequencies
 
     def inertia(self, chain: Torsion) -> Array:
-        """Return the diagonal inertia matrix [kg m2]."""
+        """Return the inertia matrix of discs and rings [kg m2], which is diagonal."""
         return np.diag(inertias(chain))
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return 1; None for a pendulum, whose stiffness grows with its inertia."""
+        """Return the inertia of a ring at its disc over its own: 1; None for a pendulum, stiffer with more inertia."""
         return None if absorber.order else 1.0
 
 
@@ -77,13 +60,9 @@ class InOrder:
 
     order: float
 
-    def modes(self, chain: Torsion) -> TorsionalModes:
-        """Return the modes that the order meets."""
-        return _modes(chain, self.inertia(chain), [absorber.stiffness for absorber in chain.absorbers])
-
     def numbers(self, chain: Torsion) -> Array:
-        """Return the critical speeds [rad/s] (V6)."""
-        return np.asarray(math.tau * self.modes(chain).frequencies / self.order)
+        """Return the critical speeds [rad/s] in ascending order, shape (modes,) (V6)."""
+        return np.asarray(math.tau * critical_modes(chain, self.order).frequencies / self.order)
 
     def inertia(self, chain: Torsion) -> Array:
         """Return the inertia matrix [kg m2], with J - (n/h)^2 J for each pendulum between ring and disc (V15)."""
@@ -98,6 +77,10 @@ class InOrder:
             return None
         denominator = 1.0 - (self.order / absorber.order) ** 2
         return 1.0 / denominator if denominator else 0.0
+
+
+Resonance: TypeAlias = AtSpeed | InOrder
+"""Crank speed or order for which natural modes are computed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,12 +104,12 @@ class TorsionalModes:
 
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
     """Return the undamped modes at a crank speed [rad/s], which sets the stiffness of pendulums (V4)."""
-    return AtSpeed(speed).modes(chain)
+    return _modes(chain, np.diag(inertias(chain)), [absorber.stiffness_at(speed) for absorber in chain.absorbers])
 
 
 def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
     """Return the undamped modes that an order meets, each at its critical speed (V15)."""
-    return InOrder(order).modes(chain)
+    return _modes(chain, InOrder(order).inertia(chain), [absorber.stiffness for absorber in chain.absorbers])
 
 
 def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
@@ -164,9 +147,10 @@ def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) 
     """
     swings, fires = [], []
     for disc, shape in zip(chain_of(engine).discs, modes.shapes, strict=True):
-        for part in _driving(engine, disc.cylinders):
-            swings.append(shape)
-            fires.append(-as_turn(part.firing_angle) / engine.cycle.turns)
+        for part in engine.slider_cranks:
+            if part.name in disc.cylinders:
+                swings.append(shape)
+                fires.append(-as_turn(part.firing_angle) / engine.cycle.turns)
     multiples = np.array([round(order * engine.cycle.turns) for order in orders])
     sums = phasors(fires, multiples) @ np.array(swings)
     floor = (len(fires) + 2) * np.finfo(float).eps * np.abs(swings).sum(axis=0)
@@ -185,13 +169,7 @@ def critical_speed(frequency: float, order: float) -> float:
 
 
 def chain_of(engine: Engine) -> Torsion:
-    """Return the chain of an engine that has one.
-
-    Raises
-    ------
-    ModelError
-        If it has none.
-    """
+    """Return the chain of an engine; raise `ModelError` if it has none."""
     chain = engine.extra(Torsion)
     if chain is None:
         raise ModelError("twist of the crankshaft needs its discs and shafts; add [torsion]")
@@ -206,10 +184,7 @@ def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the torque of gas, pistons and rods on every disc, shape (n, discs) [N m] (T1).
 
-    Raises
-    ------
-    ModelError
-        If the crank speed is uneven, or a cylinder works on another shaft.
+    An uneven crank speed, or a cylinder on another shaft, raises `ModelError`.
     """
     if fidelity.is_uneven:
         raise ModelError("twist is modelled about an even crank speed; leave crank_inertia out")
@@ -245,12 +220,8 @@ def _throw_torques(
 def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     """Return the twist of every section for one N m on every disc, shape (orders, sections, discs) [rad/(N m)] (V5).
 
-    Of order zero the load takes the torque at its disc, and what stands between them twists.
-
-    Raises
-    ------
-    ModelError
-        If an order stands on a natural frequency that nothing damps.
+    Of order zero the load takes the torque at its disc, and the sections between them twist. An order on a natural
+    frequency without damping raises `ModelError`.
     """
     count, sections = len(chain.discs), np.arange(len(chain.sections))
     flexibility = np.zeros((len(orders), len(sections), count), dtype=complex)
@@ -328,9 +299,16 @@ def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
 
 def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     """Return K + i H + i h w C - (h w)^2 J by order [N m/rad], affine in inertia, stiffness and damping (V5)."""
-    rate = (orders * speed)[:, None, None]
-    dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(inertias(chain))
-    return np.asarray(dynamic)
+    rate, discs = (orders * speed)[:, None, None], len(chain.discs)
+    springs = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
+    dampers = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
+    for ring, a in _rings(chain):
+        disc = chain.index(a.on)
+        springs.append((disc, ring, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
+        dampers.append((disc, ring, complex(a.damping_at(speed))))
+    damping = _linked(chain, dampers).real
+    damping[np.arange(discs), np.arange(discs)] += [disc.damping for disc in chain.discs]
+    return np.asarray(_linked(chain, springs) + 1j * rate * damping - rate**2 * np.diag(inertias(chain)))
 
 
 def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
@@ -362,20 +340,6 @@ def inertias(chain: Torsion) -> Array:
     return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
 
 
-def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
-    links = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
-    for k, a in _rings(chain):
-        links.append((chain.index(a.on), k, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
-    return _linked(chain, links)
-
-
-def _damping(chain: Torsion, speed: float) -> Array:
-    links = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
-    links += [(chain.index(a.on), k, complex(a.damping_at(speed))) for k, a in _rings(chain)]
-    against_block = [disc.damping for disc in chain.discs] + [0.0] * len(chain.absorbers)
-    return np.asarray(_linked(chain, links).real + np.diag(against_block))
-
-
 def _rings(chain: Torsion) -> list[tuple[int, Absorber]]:
     return list(enumerate(chain.absorbers, len(chain.discs)))
 
@@ -389,7 +353,3 @@ def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> Comple
         matrix[a, b] -= value
         matrix[b, a] -= value
     return matrix
-
-
-def _driving(engine: Engine, names: Sequence[str]) -> list[SliderCrank]:
-    return [part for part in engine.slider_cranks if part.name in names]

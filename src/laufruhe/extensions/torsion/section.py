@@ -1,4 +1,4 @@
-"""Report section on torsional vibration: natural modes, critical speeds and barred speed ranges of the crankshaft."""
+"""Report section and pictures of torsional vibration: natural modes, critical speeds and barred speed ranges."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from laufruhe.extensions.torsion.facts import (
 from laufruhe.extensions.torsion.physics import absorber_heat, chain_of
 from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, RPM, fixed, number
+from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import FINAL, INITIAL, Result
@@ -148,3 +149,13 @@ SECTION = Section(
         "critical-speeds": (is_twisted, _critical_speeds),
     },
 )  # fmt: skip
+MODES = ResultPicture(
+    "twist_modes",
+    "Torsional natural modes of the crankshaft, and the speeds at which orders meet them.",
+    "laufruhe.extensions.torsion.modes_picture",
+)
+RESPONSE = ResultPicture(
+    "twist_response",
+    "Torque in the crankshaft over crank speed, and speed ranges barred by a limit.",
+    "laufruhe.extensions.torsion.response_picture",
+)
