@@ -3,73 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import replace
 
 from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
-from laufruhe.machine.layouts.build import Mechanism, Throw, build
+from laufruhe.machine.layouts.build import Throw, build
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.slider_crank import SliderCrank, as_kind
-
-
-@dataclass(frozen=True, kw_only=True)
-class MasterRod(Mechanism):
-    """Shared numbers of the cylinders of a radial, and the articulated rods.
-
-    Attributes
-    ----------
-    master
-        Number of the cylinder on the master rod.
-    master_bank
-        Its bank angle [rad].
-    knuckle_radius
-        [m]; 0 puts all rods on the crank pin.
-    knuckle_angles
-        Of every cylinder's knuckle pin from the master rod [rad], that of the master not used.
-    length
-        Of the articulated rods [m]; without one every piston comes as high as the master's.
-    piston_mass
-        Without any rod's share [kg], where `rod` is given.
-    knuckle_mass
-        At every knuckle pin, without the rod's share [kg].
-    rod
-        Mass, centre of gravity from the knuckle pin and inertia of an articulated rod.
-    """
-
-    master: int
-    master_bank: float
-    knuckle_radius: float
-    knuckle_angles: tuple[float, ...]
-    length: float | None
-    piston_mass: float
-    knuckle_mass: float
-    rod: Mapping[str, float] | None
-
-    def cylinder(self, number: int, *place: Any, **others: Any) -> SliderCrank:
-        """Return the master's slider-crank, or an articulated one."""
-        plain = super().cylinder(number, *place, **others)
-        if number == self.master:
-            return plain
-        rod_of_master = SliderCrank(
-            "master rod", 0.0, self.crank_radius, self.rod_length, 0.0, 0.0, self.master_bank, self.offset
-        )
-        knuckle = Knuckle(rod_of_master, self.knuckle_radius, self.knuckle_angles[number - 1])
-        top = complex(math.sqrt((self.rod_length + self.crank_radius) ** 2 - self.offset**2), self.offset)
-        length = self.length or knuckle.length_to(top, plain.bank)
-        rod = None if self.rod is None else rod_of("articulated_rod", self.rod, length, "knuckle pin")
-        articulated = replace(
-            plain,
-            rod_length=length,
-            reciprocating_mass=self.reciprocating_mass if rod is None else self.piston_mass + rod.reciprocating_mass,
-            rotating_mass=self.knuckle_mass + (0.0 if rod is None else rod.rotating_mass),
-            rod_inertia_deficit=self.rod_inertia_deficit if rod is None else rod.inertia_deficit,
-        )
-        if self.knuckle_radius == 0.0:
-            return articulated
-        return as_kind(ArticulatedCrank, articulated, knuckle=knuckle)
 
 
 class Radial(LayoutKind):
@@ -102,15 +44,17 @@ class Radial(LayoutKind):
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Return cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
-        count = inputs.cylinders
-        banks, none = _banks(count), (0.0,) * count
-        rods = _master_rod(inputs)
+        count, none = inputs.cylinders, (0.0,) * inputs.cylinders
+        _check(inputs)
+        banks = tuple(math.tau * k / count for k in range(count))
+        on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, bank, 0.0) for k, bank in enumerate(banks)]
         try:
-            late = tuple(rods.cylinder(k + 1, 0.0, 0.0, banks[k], 0.0).fires_at for k in range(count))
+            late = tuple(part.fires_at for part in _hinged(inputs, on_crank))
         except KeyedError:
             raise
         except ModelError as error:
-            raise KeyedError("articulated_rod_length" if rods.length else "knuckle_radius", str(error)) from None
+            key = "articulated_rod_length" if inputs.options["articulated_rod_length"] else "knuckle_radius"
+            raise KeyedError(key, str(error)) from None
         return Layout("radial", none, banks, (0,) * count, none, (0.0,), late=late, throws=(banks[0] + late[0],))
 
     def parts(
@@ -119,22 +63,14 @@ class Radial(LayoutKind):
         """Return the slider-cranks of master and articulated rods; on four strokes every second one fires."""
         turns, count = inputs.cycle.turns, inputs.cylinders
         order = [k + 1 for start in range(turns) for k in range(start, count, turns)]
-        return build(inputs.cycle, layout, _master_rod(inputs), throws, inputs.firing_order or order)
+        on_crank, cranks = build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order or order)
+        return _hinged(inputs, on_crank), cranks
 
 
-def _banks(count: int) -> tuple[float, ...]:
-    return tuple(math.tau * k / count for k in range(count))
-
-
-def _master_rod(inputs: LayoutInput) -> MasterRod:
-    """Return the master rod that [engine] describes."""
+def _check(inputs: LayoutInput) -> None:
     options, count = inputs.options, inputs.cylinders
-    radius, master, knuckle_angles = (
-        options["knuckle_radius"],
-        options["master_cylinder"] or 1,
-        options["knuckle_angles"],
-    )
-    if radius is None:
+    master, knuckle_angles = options["master_cylinder"] or 1, options["knuckle_angles"]
+    if options["knuckle_radius"] is None:
         raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
     if math.isinf(inputs.mechanism.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
@@ -142,21 +78,37 @@ def _master_rod(inputs: LayoutInput) -> MasterRod:
         raise KeyedError("master_cylinder", f"is none of {count} cylinders; count them from 1", str(master))
     if inputs.rod is not None and options["articulated_rod"] is None:
         raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
-    banks = _banks(count)
     if knuckle_angles is not None and len(knuckle_angles) != count - 1:
         rule = f"has {counted(len(knuckle_angles), 'angle')} for {counted(count - 1, 'articulated rod')}"
         raise KeyedError("knuckle_angles", f"{rule}; give one each, by cylinder")
-    even = [bank - banks[master - 1] for bank in banks]
-    angles = even if knuckle_angles is None else [*knuckle_angles[: master - 1], 0.0, *knuckle_angles[master - 1 :]]
-    shared = {number.name: getattr(inputs.mechanism, number.name) for number in fields(inputs.mechanism)}
-    return MasterRod(
-        **shared,
-        master=master,
-        master_bank=banks[master - 1],
-        knuckle_radius=radius,
-        knuckle_angles=tuple(angles),
-        length=options["articulated_rod_length"],
-        piston_mass=inputs.piston_mass,
-        knuckle_mass=options["knuckle_mass"],
-        rod=options["articulated_rod"],
-    )
+
+
+def _hinged(inputs: LayoutInput, on_crank: Sequence[SliderCrank]) -> tuple[SliderCrank, ...]:
+    """Return the slider-cranks with every rod but the master's on a knuckle pin of the master rod.
+
+    Without a length of articulated rods every piston comes as high as the master's; a knuckle radius of zero leaves
+    all rods on the crank pin.
+    """
+    options, mechanism, index = inputs.options, inputs.mechanism, (inputs.options["master_cylinder"] or 1) - 1
+    radius, length, master_bank = mechanism.crank_radius, mechanism.rod_length, on_crank[index].bank
+    master = SliderCrank("master rod", 0.0, radius, length, 0.0, 0.0, master_bank, mechanism.offset)
+    top = complex(math.sqrt((length + radius) ** 2 - mechanism.offset**2), mechanism.offset)
+    parts = list(on_crank)
+    for k, part in enumerate(on_crank):
+        if k == index:
+            continue
+        angles = options["knuckle_angles"]
+        angle = part.bank - master_bank if angles is None else angles[k - (k > index)]
+        knuckle = Knuckle(master, options["knuckle_radius"], angle)
+        length = options["articulated_rod_length"] or knuckle.length_to(top, part.bank)
+        articulated = replace(part, rod_length=length, rotating_mass=options["knuckle_mass"])
+        if options["articulated_rod"] is not None:
+            rod = rod_of("articulated_rod", options["articulated_rod"], length, "knuckle pin")
+            articulated = replace(
+                articulated,
+                reciprocating_mass=inputs.piston_mass + rod.reciprocating_mass,
+                rotating_mass=options["knuckle_mass"] + rod.rotating_mass,
+                rod_inertia_deficit=rod.inertia_deficit,
+            )
+        parts[k] = as_kind(ArticulatedCrank, articulated, knuckle=knuckle) if knuckle.radius else articulated
+    return tuple(parts)
