@@ -366,7 +366,7 @@ class TestEqualPower:
             loads.append(shaking_loads(engine, OperatingPoint("speed", speed)))
         for order in (1, 2, 3, 4):
             reference, scaled = (spectrum.at(order) for spectrum in loads)
-            np.testing.assert_allclose(scaled[:3], reference[:3] * scale.force, rtol=1e-12, atol=1e-12 * FORCE)
+            np.testing.assert_allclose(scaled[:3], reference[:3] * scale.length**2, rtol=1e-12, atol=1e-12 * FORCE)
             np.testing.assert_allclose(
-                scaled[3:], reference[3:] * scale.force * scale.length, rtol=1e-12, atol=1e-12 * FORCE * SPACING
+                scaled[3:], reference[3:] * scale.length**3, rtol=1e-12, atol=1e-12 * FORCE * SPACING
             )
