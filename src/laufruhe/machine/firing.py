@@ -36,19 +36,13 @@ class FiringLattice:
     Attributes
     ----------
     steps
-        R, the number of different crank angles at which a cylinder fires, within one turn
-        counted as one.
+        R, the number of different crank angles within one turn at which a cylinder fires.
     slots
         Step of each of the n firings of a cycle, in their order.
     """
 
     steps: int
     slots: tuple[int, ...]
-
-    @property
-    def capacity(self) -> tuple[int, ...]:
-        """Firings on every step."""
-        return tuple(self.slots.count(step) for step in range(self.steps))
 
 
 def firing_lattice(cycle: Cycle, cylinders: int) -> FiringLattice:
@@ -101,7 +95,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     pins = pin_steps(layout, lattice)
     if len(set(pins)) > 1:
         raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
-    steps, maximum, pin = lattice.steps, lattice.capacity[0], pins[0]
+    steps, maximum, pin = lattice.steps, lattice.slots.count(0), pins[0]
     # the last place that loads each step: what is not full then stays so
     last = {(step - p) % steps: p for p in range(steps) for step in pin}
 

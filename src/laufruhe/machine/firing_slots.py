@@ -85,10 +85,7 @@ class FiringSlots:
     def patterns(self, throw_slots: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
         """Return all ways to fire within the bounds, or the least broken ones, and True if none was left out.
 
-        Parameters
-        ----------
-        throw_slots
-            Firings of the cylinders of every throw, where the firing order is given.
+        A given firing order says which firings the cylinders of every throw take.
         """
         even, slack, complete = self.cycle.angle / self.count, 0.0, True
 

@@ -291,9 +291,7 @@ def elastic_mounting(
     return _elastic_mounting(block, tuple(mounts), answering)
 
 
-@lru_cache(maxsize=4)
-def _elastic_mounting(block: Block, mounts: tuple[Mount, ...], answering: tuple[int, ...] | None) -> ElasticMounting:
-    return ElasticMounting(block, mounts, answering)
+_elastic_mounting = lru_cache(maxsize=4)(ElasticMounting)
 
 
 def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:

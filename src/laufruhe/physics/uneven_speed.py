@@ -53,21 +53,17 @@ class _Turning:
     start: float
     pace: Spectrum
 
-    @property
-    def bends(self) -> Array:
-        """Times of kinks of the gas torque, and so of the acceleration."""
-        if self.torque.kinks is None:
-            return np.zeros(0)
-        angles, shift = self.torque.kinks.angles, self.pace.integral
-        return np.asarray(angles + shift.values(angles) - shift.values(np.zeros(1)))
-
     def at(self, times: Array) -> CrankMotion:
         """Return the motion at some times."""
         return _motion_at(self, times.tobytes())
 
     def loads(self, wrench: Callable[[CrankMotion], Array]) -> Spectrum:
         """Return the loads (n, 6) of a wrench that follows from the motion (F5), in orders of the mean speed."""
-        steps, bends = self.fidelity.samples, self.bends
+        steps, bends = self.fidelity.samples, np.zeros(0)
+        if self.torque.kinks is not None:
+            # times of kinks of the gas torque, and so of the acceleration
+            angles, shift = self.torque.kinks.angles, self.pace.integral
+            bends = angles + shift.values(angles) - shift.values(np.zeros(1))
         return spectrum_with_kinks(lambda times: wrench(self.at(times)), steps, self.torque.base, bends, len(bends))
 
 

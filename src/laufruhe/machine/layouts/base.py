@@ -138,14 +138,9 @@ class LayoutKind(ABC):
         return said
 
     def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:
-        """Return the shared numbers of cylinders of a layout without pistons.
+        """Return the shared numbers of cylinders of a layout without pistons, from options as in `LayoutInput`.
 
-        Parameters
-        ----------
-        options
-            As in `LayoutInput`.
-        shared
-            What [engine] says of all mechanisms: `rotating_mass` and `big_end`.
+        `rotating_mass` and `big_end` are what [engine] says of all mechanisms.
         """
         raise NotImplementedError(f"layout '{self.name}' has pistons")
 

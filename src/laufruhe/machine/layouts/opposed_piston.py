@@ -21,14 +21,8 @@ def facing_pistons(
 ) -> tuple[SliderCrank, ...]:
     """Return the second pistons of opposed-piston cylinders, upside down on a crank of their own.
 
-    Parameters
-    ----------
-    lower
-        Upright slider-cranks on the crankshaft, one for each cylinder.
-    lead
-        Crank angle by which the second pistons come to their dead centre first [rad].
-    pin_mass
-        Rotating mass at their crank pins without the rods' shares [kg].
+    The lower ones stand upright on the crankshaft; the second ones come to their dead centre first by the lead [rad].
+    The mass at their crank pins is without the rods' shares [kg].
     """
     if abs(crank.ratio) != 1.0:
         raise ModelError(f"an opposed-piston engine needs a crank ratio of 1 or -1, got {crank.ratio:g}")
