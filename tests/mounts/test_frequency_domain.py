@@ -110,7 +110,7 @@ def test_stiff_mounts_become_rigid_ones():
     load, errors = wrench(1), []
     for stiffer in (1e5, 1e7, 1e9):
         elastic = powertrain(stiffer=stiffer)
-        rigid = rigid_mounting([replace(m, position=m.position) for m in elastic.mounts]).forces(load).coefficients
+        rigid = rigid_mounting(tuple(replace(m, position=m.position) for m in elastic.mounts)).forces(load).coefficients
         found = elastic.forces(load, 1500 * RPM).coefficients
         errors.append(np.abs(found - rigid).max() / np.abs(rigid).max())
     assert errors[2] < 1e-6

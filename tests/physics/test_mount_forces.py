@@ -65,7 +65,7 @@ def driven(wrench: NDArray[np.complex128]) -> Spectrum:
 
 
 def forces(mounts: Sequence[Mount], wrench: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    return rigid_mounting(mounts).forces(driven(wrench)).coefficients[1]
+    return rigid_mounting(tuple(mounts)).forces(driven(wrench)).coefficients[1]
 
 
 def resultant(mounts: Sequence[Mount], found: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -208,7 +208,7 @@ class TestUncarried:
     def test_is_refused_by_name(self, mounts: Sequence[Mount], component: str) -> None:
         """The message names the order and the direction that is driven, and what to do."""
         with pytest.raises(UncarriedLoadError, match=rf"order 1 drives the engine along {component}, .*; give"):
-            rigid_mounting(mounts).forces(driven(100.0 * unit(component)))
+            rigid_mounting(tuple(mounts)).forces(driven(100.0 * unit(component)))
 
     @pytest.mark.parametrize(
         ("mounts", "carried"),

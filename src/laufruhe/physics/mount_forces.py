@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any
@@ -69,17 +68,9 @@ class RigidMounting:
             )
 
 
-def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
-    """Return the mounting F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w, by singular values (M1, M2).
-
-    Directions that no mount carries are left to `check_carried`; the scene may not
-    drive them.
-    """
-    return _rigid_mounting(tuple(mounts))
-
-
 @lru_cache(maxsize=256)
-def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
+def rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
+    """Return the mounting F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w, by singular values (M1, M2)."""
     positions = np.array([mount.position for mount in mounts])
     arm = float(np.linalg.norm(positions, axis=1).max(initial=0.0)) or 1.0
     scales = _scales(arm)
