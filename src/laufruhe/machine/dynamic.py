@@ -4,27 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array, ComplexArray
-
-
-class Dynamic(Protocol):
-    """A spring along one axis of a mount, in parallel with its constant stiffness."""
-
-    @property
-    def axis(self) -> int:
-        """Index of the own axis."""
-
-    @property
-    def static(self) -> float:
-        """Stiffness at rest [N/m]."""
-
-    def at(self, omegas: Array) -> ComplexArray:
-        """Return complex stiffness at angular frequencies [N/m], shape of `omegas`; at rest the static one."""
 
 
 @dataclass(frozen=True)
@@ -100,3 +85,7 @@ class MeasuredStiffness:
         values = np.array(self.values)
         real, imag = (np.interp(omegas, self.omegas, part) for part in (values.real, values.imag))
         return np.asarray(np.where(omegas == 0.0, self.static, real + 1j * imag), dtype=complex)
+
+
+Dynamic: TypeAlias = FluidTrack | MeasuredStiffness
+"""Spring along one axis of a mount, in parallel with its constant stiffness."""
