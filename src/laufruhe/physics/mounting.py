@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
@@ -15,12 +15,8 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mount_forces import RigidMounting, rigid_mounting
 from laufruhe.physics.steady_state import TimeMounting
 
-
-class Mounting(Protocol):
-    """Rigid or elastic mounting; linear in the wrench in the frequency domain."""
-
-    def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7)."""
+Mounting: TypeAlias = RigidMounting | ElasticMounting | TimeMounting
+"""Mounting of an engine; linear in the wrench in the frequency domain."""
 
 
 def mounting_of(engine: Engine, fidelity: Fidelity = EXACT) -> Mounting | None:
