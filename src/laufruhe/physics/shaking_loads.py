@@ -43,20 +43,22 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     if fidelity.is_uneven:
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
-    moving, pins = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
-    total = moving + _turning_loads(pins, engine.rotors, point.speed, engine.cycle)
+    cycle, speed = engine.cycle, point.speed
+    moving, pins, pin_indices = _slider_crank_loads(cycle, engine.slider_cranks, speed, gas, fidelity)
+    rotors, rotor_indices = _turning(engine.rotors, speed, cycle)
+    total = moving + _summed(pins + rotors, pin_indices + rotor_indices, cycle)
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
 @lru_cache(maxsize=64)
 def _slider_crank_loads(
     cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
-) -> tuple[Spectrum, _Turning]:
+) -> tuple[Spectrum, list[_Parts], list[int]]:
     engine = Engine("pistons, rods and gas", cycle, parts)
     total = star_loads(engine, speed, lambda part: chain(*effects_of(part, fidelity)))
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    return fidelity.truncated(total), _turning(engine.pins, speed, cycle)
+    return fidelity.truncated(total), *_turning(engine.pins, speed, cycle)
 
 
 def forget() -> None:
@@ -74,24 +76,19 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
 
     It is linear in the unbalances and their conjugates.
     """
-    return _turning_loads(_BALANCED, tuple(rotors), speed, cycle)
+    return _summed(*_turning(tuple(rotors), speed, cycle), cycle)
 
 
-_Turning: TypeAlias = tuple[list[_Parts], tuple[int, ...]]
-"""The wrench of each of some rotors, and the index of its order among those of a cycle."""
-_BALANCED: _Turning = ([], ())
+def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> tuple[list[_Parts], list[int]]:
+    # the wrench of each rotor, and the index of its order among those of a cycle
+    wrenches = [_wrench(rotor, speed) for rotor in rotors]
+    return wrenches, [order_index(cycle, abs(rotor.shaft.ratio)) for rotor in rotors]
 
 
-def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> _Turning:
-    return _wrenches(rotors, speed), tuple([order_index(cycle, abs(rotor.shaft.ratio)) for rotor in rotors])
-
-
-def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> Spectrum:
-    (wrenches, indices), (turning, turning_indices) = known, _turning(rotors, speed, cycle)
-    if not wrenches and not turning:
+def _summed(wrenches: list[_Parts], indices: list[int], cycle: Cycle) -> Spectrum:
+    if not wrenches:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    every = np.array(wrenches + turning, dtype=complex)
-    return Spectrum(cycle.base_order, cancelling_sums(every, indices + turning_indices))
+    return Spectrum(cycle.base_order, cancelling_sums(np.array(wrenches, dtype=complex), tuple(indices)))
 
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -112,14 +109,10 @@ def added_rotor_loads(
 
 def rotor_wrench(rotor: Rotor, speed: float) -> ComplexArray:
     """Return the coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
-    return np.array(_wrenches((rotor,), speed)[0], dtype=complex)
+    return np.array(_wrench(rotor, speed), dtype=complex)
 
 
-def _wrenches(rotors: Sequence[Rotor], speed: float) -> list[_Parts]:
-    wrenches: list[_Parts] = []
-    for rotor in rotors:
-        shaft = rotor.shaft
-        forward = shaft.ratio > 0.0
-        force = (shaft.ratio * speed) ** 2 * (rotor.unbalance if forward else rotor.unbalance.conjugate())
-        wrenches.append(plane_parts(force * (-1j if forward else 1j), force, rotor.x, shaft))
-    return wrenches
+def _wrench(rotor: Rotor, speed: float) -> _Parts:
+    shaft, forward = rotor.shaft, rotor.shaft.ratio > 0.0
+    force = (shaft.ratio * speed) ** 2 * (rotor.unbalance if forward else rotor.unbalance.conjugate())
+    return plane_parts(force * (-1j if forward else 1j), force, rotor.x, shaft)
