@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from laufruhe.errors import ModelError, UncarriedLoadError
 from laufruhe.machine import Block, Mount, Seiliger
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting, single_transmissibility
+from laufruhe.physics.elastic_mounts import ElasticMounting, ResonanceError, elastic_mounting, single_transmissibility
 from laufruhe.physics.modes import (
     free_motion,
     sag_for_critical_speed,
@@ -45,6 +45,12 @@ ENERGY = np.array(
 )
 RPM = np.pi / 30.0
 CUBE = Block(100.0, ((4.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, 6.0)))
+
+
+def motion(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
+    """Motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
+    amplitudes = mounting.responses(wrench.orders * speed, wrench.coefficients)
+    return Spectrum(wrench.base, amplitudes @ mounting.modes.shapes.T)
 
 
 def four(loss: float = 0.1, stiffness=(1e5, 1e5, 4e5), block: Block = CUBE, **more):
@@ -127,7 +133,7 @@ def test_reciprocity(seed, rpm, count):
     centre = np.array(mounting.block.centre_of_gravity)
 
     def displacement(load):
-        q = mounting.motion(Spectrum(Fraction(1), load), rpm * RPM).coefficients[1]
+        q = motion(mounting, Spectrum(Fraction(1), load), rpm * RPM).coefficients[1]
         # about the origin, as the wrench is
         return np.concatenate([q[:3] + np.cross(q[3:], -centre), q[3:]])
 
@@ -140,7 +146,7 @@ def test_reciprocity(seed, rpm, count):
 def test_work_done_is_lost_in_the_mounts(seed, rpm):
     mounting, load = random_mounting(seed), wrench(seed, orders=3)
     speed = rpm * RPM
-    q, travel = mounting.motion(load, speed).coefficients, mounting.travel(load, speed).coefficients
+    q, travel = motion(mounting, load, speed).coefficients, mounting.travel(load, speed).coefficients
     centre = np.array(mounting.block.centre_of_gravity)
     for h in range(1, 4):
         w, omega = load.coefficients[h], h * speed
@@ -157,7 +163,7 @@ def test_forces_and_inertia_balance_the_load(seed, rpm):
     mounting, load, speed = random_mounting(seed), wrench(seed), rpm * RPM
     forces = mounting.forces(load, speed).coefficients
     omega = load.orders * speed
-    inertia = -(omega[:, None] ** 2) * (mounting.motion(load, speed).coefficients @ mounting.block.mass_matrix)
+    inertia = -(omega[:, None] ** 2) * (motion(mounting, load, speed).coefficients @ mounting.block.mass_matrix)
     pulled = np.einsum("mai,nma->ni", mounting.motions, forces)
     centre = np.array(mounting.block.centre_of_gravity)
     about = load.coefficients.copy()
@@ -180,7 +186,7 @@ def test_modal_route_agrees_with_the_plain_system():
         w[3:] -= np.cross(centre, w[:3])
         loss, damping = mounting.total(mounting.losses), mounting.total(mounting.dampers)
         system = mounting.stiffness + 1j * loss + 1j * omega * damping - omega**2 * mounting.block.mass_matrix
-        assert mounting.motion(load, speed).coefficients[h] == pytest.approx(np.linalg.solve(system, w), rel=1e-9)
+        assert motion(mounting, load, speed).coefficients[h] == pytest.approx(np.linalg.solve(system, w), rel=1e-9)
 
 
 def test_free_modes_that_damping_couples_follow_the_plain_system():
@@ -192,7 +198,7 @@ def test_free_modes_that_damping_couples_follow_the_plain_system():
     assert mounting.modes.free.sum() == 3
     values = wrench(5).coefficients
     values[0] = [0.0, 0.0, 400.0, 0.0, 0.0, 0.0]
-    found = mounting.motion(Spectrum(Fraction(1), values), speed).coefficients
+    found = motion(mounting, Spectrum(Fraction(1), values), speed).coefficients
     assert np.linalg.lstsq(mounting.stiffness, values[0].real)[0] == pytest.approx(found[0], abs=1e-15)
     for h in range(1, 5):
         system = mounting.stiffness + 1j * mounting.total(mounting.losses) - (h * speed) ** 2 * CUBE.mass_matrix

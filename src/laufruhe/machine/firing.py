@@ -96,7 +96,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     if len(set(pins)) > 1:
         raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
     steps, maximum, pin = lattice.steps, lattice.slots.count(0), pins[0]
-    # the last place that loads each step: what is not full then stays so
+    # last place whose throws load each step; a step that is not full after it stays so
     last = {(step - p) % steps: p for p in range(steps) for step in pin}
 
     def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
@@ -207,7 +207,7 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
     relative[relative > 1.0 - SAME_TURN] = 0.0
     others, start, size = len(relative) - 1, 0, 64
     looked_at = min(cycle.turns**others, ORDERS_LOOKED_AT)
-    # numbers to the base of the turns, a digit for each cylinder but the first
+    # values of digits to the base of the turns, a digit for each cylinder but the first
     worth = np.array([min(cycle.turns**k, looked_at) for k in reversed(range(others))], dtype=np.intp)
     while start < looked_at:
         numbers = np.arange(start, min(start + size, looked_at))

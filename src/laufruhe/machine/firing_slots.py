@@ -23,7 +23,7 @@ Cover: TypeAlias = tuple[tuple[int, Shape], ...]
 _MAX_COVERS = 500
 _MAX_BROKEN = 40
 _MAX_LOOKED_AT = 20_000
-# of the unevenness allowed
+# shares of the unevenness allowed, tried one after the other
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _SLACK = 1e-9
 # a broken interval counts this often as much as one that is merely uneven
@@ -135,7 +135,7 @@ class FiringSlots:
                     if max(d * low, cycle_angle - (count - d) * high) <= last + _SLACK
                     and min(d * high, cycle_angle - (count - d) * low) >= first - _SLACK
                 ]
-            # those that hardly bend the intervals come first
+            # shapes that hardly change the intervals come first
             shapes.sort(key=lambda part: abs(0.5 * sum(ends) + part[1] - part[0] * cycle_angle / count))
             choices.append(shapes)
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
@@ -183,7 +183,7 @@ class FiringSlots:
 
         count, cycle_angle = self.count, self.cycle.angle
         even = cycle_angle / count
-        # moments of the firings, angle between the banks, unevenness, what is broken
+        # unknowns: moments of the firings, angle between the banks, unevenness, violation
         size = count + 3
         steps = np.zeros((count, size))
         for k in range(count):

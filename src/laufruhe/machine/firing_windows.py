@@ -23,7 +23,7 @@ from laufruhe.numerics.arrays import Array, Indices
 
 SLACK = 1e-7
 """By which firing intervals may miss their bounds [rad]: a rounding of the programs that place throws."""
-# a circle of bounds that is negative by a rounding
+# a circle of bounds may be negative by this rounding error
 _ROUNDING = 1e-10
 # rounds in which throws and open angles narrow each other
 _ROUNDS = 3
@@ -71,7 +71,7 @@ class CylinderAngles:
         np.minimum.at(high, self.throws, paths[-1, :-1] - minimum)
         np.maximum.at(low, self.throws, -paths[:-1, -1] - maximum)
         first, second = self._differences
-        # shares . angles is at most this
+        # shares @ angles is at most the room
         rows = [self.shares[second] - self.shares[first], self.shares, -self.shares]
         room = [paths[first, second], paths[-1, :-1] - low[self.throws], paths[:-1, -1] + high[self.throws]]
         for row, most_of_it in zip(np.concatenate(rows), np.concatenate(room), strict=True):
@@ -208,7 +208,7 @@ class FiringBounds:
         """Yield the window of every order and choice of dead centres that some throws keep."""
         firsts = [self.order[0] - 1] if self.order else [0]
         if self.order is None and self.maximum > math.tau + SLACK:
-            # whose first dead centre comes more than a turn after the last of the others need not be cylinder 1
+            # the cylinder whose first dead centre comes more than a turn after all others need not be cylinder 1
             firsts = list(range(len(self.layout.positions)))
         for first in firsts:
             yield from self._grown((first,), {first: 0}, self._start())
@@ -268,15 +268,15 @@ class FiringBounds:
         still = math.tau * (lap_after - lap_before) - late[after] + late[before]
         still += self.cycle.angle if wrapped else 0.0
         maximum = self.maximum if wrapped else min(self.maximum, math.tau)
-        # of orders that are one another turned on, the one with cylinder 1 first, unless only this one says it
+        # of orders that are rotations of each other, only the one with cylinder 1 first counts
         minimum = max(self.minimum, math.tau) if wrapped and after and self.order is None else self.minimum
         p, q = self._angle_index[before], self._angle_index[after]
-        # least <= theta_p - theta_q + still <= most
+        # minimum <= theta_p - theta_q + still <= maximum
         ahead, behind = maximum - still + SLACK, still - minimum + SLACK
         if p == q:
             return paths if min(ahead, behind) >= -_ROUNDING else None
         there, back = float(paths[q, p]), float(paths[p, q])
-        # paths are shortest: the most negative circle through a new bound returns by one of them
+        # as paths are shortest, the most negative circle through a new bound returns by one of them
         if min(ahead + back, behind + min(ahead, there)) < -_ROUNDING:
             return None
         return _tightened(_tightened(paths, q, p, ahead), p, q, behind)

@@ -316,7 +316,7 @@ def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
     free = np.setdiff1d(np.arange(2 * len(x)), supports)
     moved = np.zeros((2 * len(x), len(supports)))
     moved[supports, np.arange(len(supports))] = 1.0
-    # what a support carries of a load is how far the beam comes down there as that support does (Maxwell, Betti)
+    # a support carries as much of a load as the beam comes down there when that support does (Maxwell, Betti)
     moved[free] = -np.linalg.solve(stiffness[np.ix_(free, free)], stiffness[np.ix_(free, supports)])
     return np.asarray(moved[loaded].T)
 

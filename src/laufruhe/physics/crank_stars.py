@@ -23,7 +23,7 @@ from laufruhe.numerics.exact_angles import phasors
 
 Stars = NDArray[np.uint8]
 
-# rows of a table of joined throws: small enough for the second-level cache
+# a table of joined throws with so many rows fits into the second-level cache
 _TABLE_ROWS = 300
 _CHUNK = 1 << 15
 

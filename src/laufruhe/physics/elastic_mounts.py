@@ -128,7 +128,7 @@ class ElasticMounting:
     def drives(self, wrenches: ComplexArray) -> ComplexArray:
         """Return the drive of every mode by wrenches about the origin, shape (n, 6) to (n, 6), roundings removed."""
         drive = wrenches @ self._about_centre.T
-        # what cancels in the sum counts against the size of its terms
+        # a sum that cancels is compared with the size of its terms
         size = np.abs(wrenches) @ np.abs(self._about_centre).T
         floor = UNDRIVEN * np.maximum(size, np.abs(drive).max(axis=-1, keepdims=True, initial=0.0))
         return np.where((np.abs(drive) > floor) & self._answers, drive, 0.0)
@@ -193,7 +193,7 @@ class ElasticMounting:
         square = omegas[:, None] ** 2
         near = np.abs(self.modes.squares - square) <= RESONANCE * square
         undamped = np.diag(self._loss) + omegas[:, None] * np.diag(self._damping) <= RESONANCE * square
-        # what springs that depend on frequency make of a mode is seen with its whole impedance
+        # modes with springs that depend on frequency are judged by their whole impedance
         struck = near & undamped & (drive != 0.0) & ~(np.diag(self._met) & (omegas[:, None] > 0.0))
         if not np.any(struck):
             return
@@ -206,10 +206,6 @@ class ElasticMounting:
             f"the {self.modes.names[mode]} mode at {omegas[k] / math.tau:.6g} Hz is driven at its own frequency and "
             "nothing damps it; give the mounts a loss factor or damping"
         )
-
-    def motion(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Return the motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
-        return Spectrum(wrench.base, self._modal_motion(wrench, speed) @ self.modes.shapes.T)
 
     def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
         """Return the displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
@@ -245,7 +241,7 @@ class ElasticMounting:
         return struck, why
 
     def _modal_motion(self, wrench: Spectrum, speed: float) -> ComplexArray:
-        # forces and travel are of one motion; the wrench is kept, so that it stays itself
+        # forces and travel follow from one motion, which is kept with its wrench
         if not (self._moved and self._moved[0][0] is wrench and self._moved[0][1] == speed):
             loaded = np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1))
             motion = np.zeros((len(wrench.coefficients), 6), dtype=complex)

@@ -60,7 +60,7 @@ class _CylinderKey:
 
 @lru_cache(maxsize=64)
 def _one_cylinder(gas: GasModel, key: _CylinderKey, cycle: Cycle, samples: int) -> Spectrum:
-    # its kinks are taken out before the transform (L5a)
+    # the kinks of the torque are taken out before the transform (L5a)
     part = key.part
 
     def torque_at(angles: Array) -> Array:

@@ -143,7 +143,7 @@ def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
 
 
 def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    # any mechanism; of two orders it has as many of each load as a slider-crank
+    # with two-order kinematics any mechanism has as many orders of each load as a slider-crank
     table = momentum_orders(part)
     limit = fidelity.local_orders(part.shaft.ratio)
     shape = part, fidelity.kinematics, limit

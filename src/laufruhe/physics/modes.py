@@ -71,7 +71,7 @@ def modes_of(mass: Array, stiffness: Array, loss: Array | None = None) -> Modes:
     squares, vectors = np.linalg.eigh(0.5 * (scaled + scaled.T))
     squares = np.where(squares > FREE_STIFFNESS * max(squares[-1], 0.0), squares, 0.0)
     shapes = inverse.T @ vectors
-    # the sign of a mode is free: its largest entry is positive
+    # the sign of a mode is free, and its largest entry is made positive
     shapes *= np.sign(vectors[np.argmax(np.abs(vectors), axis=0), np.arange(6)])
     energy = shapes * (mass @ shapes)
     lost = np.zeros(6) if loss is None else np.einsum("ij,ik,kj->j", shapes, loss, shapes)

@@ -46,7 +46,7 @@ class RigidMounting:
         return Mapped(wrench, self._forces_of)
 
     def _forces_of(self, loads: NDArray[Any]) -> NDArray[Any]:
-        # in memory mount by mount, as norms read their rows
+        # memory holds mount by mount, as norms read their rows
         return np.asarray((loads @ self._columns).swapaxes(0, 1))
 
     @cached_property

@@ -20,7 +20,7 @@ def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
     """
-    # late, for it takes longer than all the rest of a small problem
+    # imported late, as it takes longer than all the rest of a small problem
     from scipy.interpolate import PchipInterpolator
 
     period = cycle.angle / pace

@@ -60,7 +60,7 @@ def order_index(cycle: Cycle, order: float) -> int:
 
 
 def _wrench_of(direction: Direction, part: SliderCrank) -> tuple[float, ...]:
-    # of a unit load of a cylinder
+    # wrench of a unit load of a cylinder
     if direction is Direction.ROLL:
         return 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
     axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)

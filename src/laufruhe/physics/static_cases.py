@@ -117,12 +117,12 @@ def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
             return q
         here, share = energy(q), 1.0
         for _ in range(HALVINGS):
-            # at a gap what is left to fall is less than what energies are rounded by
+            # near a gap the fall that is left is below the rounding error of energies
             if energy(q + share * step) <= here - 1e-4 * share * float(pull @ step) + ROUNDED * abs(here):
                 break
             share *= 0.5
         else:
-            # nothing falls any more but roundings
+            # only rounding errors are left
             return q
         q = q + share * step
     raise SolverError("no balance was found under a load case; check the stiffness of bump stops")

@@ -25,7 +25,7 @@ from laufruhe.physics.time_model import TimeModel, time_model
 
 MAX_SHOTS = 60
 CLOSED = 1e-9
-# what integration over a period makes of its tolerance
+# error of integration over a period, over its tolerance
 ROUNDING = 100.0
 
 
@@ -63,7 +63,7 @@ def periodic_state(
     loads, orders = wrench.coefficients[loaded] @ model.load.T, wrench.orders[loaded]
 
     rates = motion_rates(model, lambda t: (np.exp(1j * orders * speed * t) @ loads).real)
-    # what an even star cancels leaves a shorter period, which closes faster and farther from any resonance
+    # an even star cancels orders: the period is shorter, and closes faster and farther from any resonance
     shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
 
     def ends(first: Array) -> Array:
@@ -154,7 +154,7 @@ class TimeMounting:
         return spectrum_of(self._state(wrench, speed).travels, wrench.base)
 
     def _state(self, wrench: Spectrum, speed: float) -> SteadyState:
-        # forces and travel are of one integration; the wrench is kept, so that its id stays its own
+        # forces and travel follow from one integration; the wrench is kept, so that no other one takes its id
         key = id(wrench), speed
         if key not in self._states:
             state = periodic_state(self.mounting, wrench, speed, self.samples, INTEGRATION)

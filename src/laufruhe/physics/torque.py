@@ -74,7 +74,7 @@ def work_stored(torque: Spectrum, samples: int) -> float:
 def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
     """Return mean, extremes and stored work of the torque, and the irregularity of the crank speed."""
     torque = crank_torque(engine, point, fidelity)
-    # it bends where the gas does: its ends may stand there
+    # the torque has kinks where the gas has, and its ends may stand there
     values = np.concatenate([torque.sample(FINE_WORK * fidelity.samples), torque.values(torque.kink_angles)])
     mean = float(torque.coefficients[0].real)
     inertia = turning_inertia(engine, fidelity)
@@ -157,7 +157,7 @@ class Swing:
         energy = start_energy(self.work, inertia + self.inertia, self.speed)
         work = np.concatenate([self.work, self.bent_work])
         total = inertia + np.concatenate([self.inertia, self.bent_inertia])
-        # between the angles that tell the energy it may fall under zero
+        # between the angles that determine the energy the sum may fall under zero
         return np.asarray(np.sqrt(2.0 * np.maximum(energy + work, 0.0) / total))
 
     def irregularity(self, inertia: float) -> float:

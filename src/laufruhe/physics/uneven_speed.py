@@ -125,12 +125,12 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
     def wrench(motion: CrankMotion) -> Array:
         total = _rotor_loads((*engine.pins, *engine.rotors), motion)
         for part in engine.slider_cranks:
-            # L7 with the second derivative by time in full
+            # L7 with both terms of the second derivative by time
             square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
             moving, axis = part.motion(np, _alpha(part, motion.angle)), cis(as_turn(part.bank))
             total += cylinder_wrench(part, moving, axis, square, turning, with_rods=fidelity.rod == "rigid").T
         total[:, 3] += torque.values(motion.angle)
-        # parts that accelerate with the crank (L8)
+        # geared inertia accelerates with the crank (L8)
         total[:, 3] += geared_factor(engine) * fidelity.crank_inertia * motion.acceleration
         return total
 

@@ -135,5 +135,5 @@ class RotaryUnit(SliderCrank):
 
     def housing(self, turn: Any) -> Any:
         """Return the peritrochoid of the apexes, at angles of an apex about the rotor's centre (Y1; textbook eq. 7)."""
-        # at alpha = 0 the flank, and no apex, looks to where it fires
+        # at alpha = 0 the middle of a flank points in the firing direction
         return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)

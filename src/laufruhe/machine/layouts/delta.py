@@ -60,12 +60,12 @@ class Triangle:
         """Return the crank angle of a piston's dead centre with the lower throw upright, in turns."""
         at: Turn = self.axis(0, 0)
         for k in range(bank):
-            # over to the other piston of bank k, then to the next bank on that crank
+            # step over to the other piston of bank k, then to the next bank on its crank
             at = at + self.leads[k] + self.ratios[(k + 1) % 3] * (self.axis(k + 1, k + 1) - self.axis(k + 1, k))
         return at if corner == bank else at + self.leads[bank]
 
 
-# by the crank that is reversed; the crankshaft turns forward, so where it is that one the others turn back
+# indexed by the crank that is reversed; the crankshaft turns forward, so if it is reversed, the others turn back
 _RATIOS = ((1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1))
 
 
