@@ -73,10 +73,11 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
                 raise Refused(f"{where}.name", name, "is the name of another bearing", "give each its own name")
             reach = 0.5 * ((bearing.width or 0.0) + (placed.width or 0.0))
             if bearing.shaft == placed.shaft and abs(bearing.x - placed.x) <= reach:
-                rule = f"lets its journal overlap that of bearing {placed.name}"
-                raise Refused(
-                    f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move one of them, or make it narrower"
+                rule, remedy = (
+                    f"lets its journal overlap that of bearing {placed.name}",
+                    "move one, or make it narrower",
                 )
+                raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, remedy)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
             rule = "is the place of a crank pin"
             raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, "move it beside the throw")

@@ -20,22 +20,9 @@ _PHASES = ("throws", "firing_order")
 
 @dataclass(frozen=True)
 class CatalogueEngine:
-    """Published engine with its data.
+    """Published engine with its values of [engine].
 
-    Attributes
-    ----------
-    key
-        Name in a problem file.
-    source
-        Source of all data that are not assumed.
-    displacement
-        Published displacement, a check of bore and stroke.
-    assumed
-        Keys of `engine` without a source.
-    note
-        Remark for users.
-    engine
-        Keys and values of [engine].
+    Values at the keys in `assumed` have no source. The published displacement checks bore and stroke.
     """
 
     key: str
@@ -45,19 +32,6 @@ class CatalogueEngine:
     assumed: tuple[str, ...]
     note: str
     engine: Mapping[str, Any]
-
-    def assumption(self, table: Mapping[str, Any]) -> str:
-        """Return the sentence about assumed values that [engine] of a problem does not give; empty if it gives all."""
-        left = [f"{key.replace('_', ' ')} {as_text(self.engine[key])}" for key in self.assumed if key not in table]
-        return f"{self.name}: assumed, not published: {', '.join(left)}." if left else ""
-
-    def under(self, table: Mapping[str, Any]) -> dict[str, Any]:
-        """Return [engine] of a problem with the data of the catalogue as defaults."""
-        dropped = {KEY, *(key for pair in _EITHER if any(one in table for one in pair) for key in pair)}
-        if any(table.get(key) == "open" for key in _PHASES):
-            dropped |= {*_PHASES}
-        defaults = {key: value for key, value in self.engine.items() if key not in dropped}
-        return {**defaults, **{key: value for key, value in table.items() if key != KEY}}
 
 
 @cache
@@ -87,9 +61,15 @@ def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
         return tables
     engine = engine_named(table[KEY], "engine" if isinstance(value, str) else f"engine.{KEY}")
     assumptions, source = tables.get("assumptions", []), tables.get("source", "")
-    completed = {**tables, "engine": engine.under(table)}
+    dropped = {key for pair in _EITHER if any(one in table for one in pair) for key in pair}
+    if any(table.get(key) == "open" for key in _PHASES):
+        dropped |= {*_PHASES}
+    defaults = {key: entry for key, entry in engine.engine.items() if key not in dropped}
+    completed = {**tables, "engine": {**defaults, **{key: entry for key, entry in table.items() if key != KEY}}}
+    left = [f"{key.replace('_', ' ')} {as_text(engine.engine[key])}" for key in engine.assumed if key not in table]
     if isinstance(assumptions, list):
-        completed["assumptions"] = [*assumptions, *filter(None, (engine.assumption(table),))]
+        sentences = [f"{engine.name}: assumed, not published: {', '.join(left)}."] if left else []
+        completed["assumptions"] = [*assumptions, *sentences]
     if isinstance(source, str):
         completed["source"] = f"{source}; engine: {engine.source}" if source else engine.source
     return completed

@@ -183,16 +183,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
 
 
 class Refused(LaufruheError):
-    """Refusal of a key while a problem is assembled; the reader adds the name of the file.
+    """Refusal of a key such as engine.throws[2] while a problem is assembled; the reader adds the name of the file.
 
-    Parameters
-    ----------
-    where
-        Key, such as engine.throws[2].
-    value
-        Value in the file; None to leave it out of the message.
-    rule, remedy
-        Broken rule as the end of a sentence about the key, and remedy as an instruction.
+    The rule is the end of a sentence about the key, the remedy an instruction. A value of None is left out.
     """
 
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
@@ -201,13 +194,7 @@ class Refused(LaufruheError):
 
 
 def read_number(number: Number, place: Sequence[str | int], raw: Any) -> float | Open:
-    """Return the number that a field reads from a raw value of a file [SI].
-
-    Raises
-    ------
-    Refused
-        At `place`, if the value is no number that the field allows.
-    """
+    """Return the number that a field reads from a raw value of a file [SI]; raise `Refused` at `place` if it cannot."""
     try:
         return number.read(raw)
     except PydanticCustomError as error:
@@ -227,16 +214,7 @@ def errors_in_file(source: object) -> Iterator[None]:
 def si_value(text: str | float, unit: str, where: str, unit_text: str | None = None) -> float:
     """Return the SI value of a text such as '120 mm', or of a plain number.
 
-    Parameters
-    ----------
-    text
-        Number with its unit.
-    unit
-        SI unit that fixes the dimension.
-    where
-        Key for complaints.
-    unit_text
-        Unit in the file, for keys that give a unit without a number; None for others.
+    Complaints about the key `where` show `unit_text` if the file gives a unit without a number there.
     """
     try:
         return units.parse(str(text), unit)
@@ -258,20 +236,9 @@ def errors_at_key(where: str, value: str = "") -> Iterator[None]:
 
 
 def require_one_of(table: BaseModel, where: str, key: str, other: str, value: Any = None, named: str = "") -> None:
-    """Raise `Refused` unless exactly one of two keys is given.
+    """Raise `Refused` unless exactly one of two keys of the table at `where` is given.
 
-    Parameters
-    ----------
-    table
-        Table with the keys.
-    where
-        Path of the table.
-    key, other
-        The two keys.
-    value
-        Value in the message.
-    named
-        Name of the other key in the remedy; by default the key.
+    The message shows `value`, and the remedy calls the other key `named`.
     """
     present = [getattr(table, k) not in (None, []) for k in (key, other)]
     if present[0] == present[1]:

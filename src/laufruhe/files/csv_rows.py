@@ -13,16 +13,8 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
     """Return the numbers in the first columns of a CSV file, one tuple for each row.
 
     Columns are separated by commas, semicolons or tabs; with the latter two a comma may be the decimal sign. The first
-    row may be a heading, and rows that begin with # are skipped.
-
-    Parameters
-    ----------
-    file, path
-        Name in the problem file, and path.
-    key
-        Key of the problem file for complaints.
-    columns
-        Names of the columns for complaints.
+    row may be a heading, and rows that begin with # are skipped. Complaints are about the key of the problem file and
+    name the columns.
     """
     remedy, row_name = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
     try:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from laufruhe import units
 from laufruhe.files.catalogue import engine_named
@@ -22,6 +23,7 @@ _ASIDE = 0.25
 _OVERHANG = 0.1
 # smallest fraction of one cylinder's force, or of its moment about the middle, at which balancing an order pays
 _WORTH = 0.02
+_FORCE, _COUPLE = slice(3), slice(4, 6)
 _HEAD = """\
 {schema}
 # Numbers with a dimension are text with a unit: "120 mm", "1.25 kg", "2500 rpm"; bare ones are degrees or plain.
@@ -53,19 +55,6 @@ alternating = true              # without the steady reaction to the mean torque
 # limit = "maximum mount force"
 # max = "900 N"
 """
-
-
-@dataclass(frozen=True)
-class _Excitation:
-    """Free force [N] and couple [N m] of one order; `is_large` is True if balancing pays."""
-
-    order: int
-    force: float
-    couple: float
-    is_large: bool
-
-    def __str__(self) -> str:
-        return f"order {self.order}: force {self.force:.4g} N, couple {self.couple:.4g} N m"
 
 
 def draft_of_engine(name: str) -> str:
@@ -105,36 +94,25 @@ def _draft(title: str, engine: str, built_engine: Engine) -> str:
     )
 
 
-def _free(engine: Engine) -> list[_Excitation]:
-    """Return the free forces and couples of first and second order, without the roll moment."""
-    speed = units.parse(SPEED, "rad/s")
-    wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
-    parts = engine.slider_cranks
-    unit_force = max(part.reciprocating_mass * part.crank_radius for part in parts) * speed**2
-    arm = max((abs(part.x) for part in parts), default=0.0) or 0.1
-    excitations = []
-    for order in (1, 2):
-        amplitudes = wrench.at(order)
-        force = float(order_amplitude(amplitudes[:3]))
-        couple = float(order_amplitude(amplitudes[4:]))
-        is_large = force > _WORTH * unit_force or couple > _WORTH * unit_force * arm
-        force, couple = (
-            0.0 if value < 1e-9 * scale else value for value, scale in ((force, unit_force), (couple, unit_force * arm))
-        )
-        excitations.append(_Excitation(order, force, couple, is_large))
-    return excitations
-
-
 def _balance(engine: Engine) -> str:
-    """Return the lines with counterweights and balancer shafts that may balance free forces and couples."""
-    free = _free(engine)
-    lines = [f"# Free at {SPEED}: {'; '.join(map(str, free))}."]
-    half = max(abs(part.x) for part in engine.slider_cranks)
-    moment = sum(part.reciprocating_mass * part.crank_radius for part in engine.slider_cranks)
-    if free[0].is_large:
+    """Return the lines with counterweights and balancer shafts that may balance free forces and couples.
+
+    The free ones are those of first and second order without the roll moment; balancing pays for large ones.
+    """
+    parts, speed = engine.slider_cranks, units.parse(SPEED, "rad/s")
+    wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
+    moments = [part.reciprocating_mass * part.crank_radius for part in parts]
+    half, moment = max(abs(part.x) for part in parts), sum(moments)
+    scales = np.array([1.0, half or 0.1]) * max(moments) * speed**2
+    loads = [np.array([order_amplitude(wrench.at(order)[axes]) for axes in (_FORCE, _COUPLE)]) for order in (1, 2)]
+    is_large = [bool(np.any(load > _WORTH * scales)) for load in loads]
+    free = [np.where(load < 1e-9 * scales, 0.0, load) for load in loads]
+    texts = (f"order {order}: force {load[0]:.4g} N, couple {load[1]:.4g} N m" for order, load in enumerate(free, 1))
+    lines = [f"# Free at {SPEED}: {'; '.join(texts)}."]
+    if is_large[0]:
         lines += _webs(half, moment)
-    if free[1].is_large:
-        ratio = max(part.rod_ratio for part in engine.slider_cranks)
+    if is_large[1]:
+        ratio = max(part.rod_ratio for part in parts)
         lines += ["# two shafts at twice crank speed, against each other"]
         for name, speed, y in (("left", 2, 100), ("right", -2, -100)):
             lines += [
@@ -145,7 +123,7 @@ def _balance(engine: Engine) -> str:
                 named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
                 lines += ["[[balancer_shafts.unbalances]]", *named, *_open(0.25 * ratio * moment)]
             lines.append("")
-    if not any(excitation.is_large for excitation in free):
+    if not any(is_large):
         lines += ["# Nothing of first or second order is left to balance; weights are shown as an example."]
         lines += _webs(half, moment)
     return "\n".join(lines) + "\n"

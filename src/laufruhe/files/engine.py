@@ -142,9 +142,9 @@ class EngineTable(Table):
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
 
     @property
-    def piston_mass(self) -> Open:
-        """Reciprocating mass without a share of the rod [kg]; it may be open."""
-        return Open.from_value(self.reciprocating_mass or 0.0)
+    def piston_mass(self) -> float:
+        """Reciprocating mass without a share of the rod, at its start if it is open [kg]."""
+        return Open.from_value(self.reciprocating_mass).start
 
     @property
     def open_masses(self) -> dict[str, Open]:
@@ -253,7 +253,7 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
             raise Refused(f"engine.{key}", None, rule, "make them agree")
     check_order(table.listed_order, count)
     mechanism, rod = _mechanism(table, numbers)
-    return LayoutInput(cycle_of(table), count, mechanism, numbers | rods, order, table.piston_mass.start, rod, gas)
+    return LayoutInput(cycle_of(table), count, mechanism, numbers | rods, order, table.piston_mass, rod, gas)
 
 
 def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
@@ -303,7 +303,7 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
     plain = Mechanism(
         crank_radius=radius,
         rod_length=rod_length,
-        reciprocating_mass=table.piston_mass.start + (rod.reciprocating_mass if rod else 0.0),
+        reciprocating_mass=table.piston_mass + (rod.reciprocating_mass if rod else 0.0),
         rotating_mass=table.rotating_mass,
         rod_rotating_mass=rod.rotating_mass if rod else 0.0,
         rod_inertia_deficit=rod.inertia_deficit if rod else table.rod_inertia_deficit,
@@ -333,14 +333,12 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     rod = length if length is not None else (radius / ratio if ratio else math.inf)
     turning = (radius + abs(table.offset)) / rod
     if turning >= 1.0:
-        key, value = (
-            ("rod_length", units.quantity_text(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
-        )
         rule = f"blocks the crank: (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
-        remedy = "lengthen the rod"
-        if ratio is not None and ratio >= 1.0:
-            remedy = "give crank radius over rod length, for example 0.27; for a length write rod_length"
-        raise Refused(f"engine.{key}", value, rule, remedy)
+        if length is not None:
+            raise Refused("engine.rod_length", units.quantity_text(rod, "m"), rule, "lengthen the rod")
+        is_length = ratio is not None and ratio >= 1.0
+        advice = "give crank radius over rod length, for example 0.27; for a length write rod_length"
+        raise Refused("engine.rod_ratio", f"{ratio:g}", rule, advice if is_length else "lengthen the rod")
     return radius, rod
 
 
@@ -380,14 +378,7 @@ def piston_masses(
 ) -> list[Decision]:
     """Return decisions about open masses of slider-cranks: common ones of [engine], and those of single parts.
 
-    Parameters
-    ----------
-    table
-        Table [engine].
-    parts
-        Slider-cranks of the engine.
-    weights
-        Counterweights, which may not have balance factors if a mass is open.
+    Counterweights may not have balance factors if a mass is open.
     """
     second = getattr(table, _SECOND)
     decisions = list[Decision]()
@@ -402,8 +393,7 @@ def piston_masses(
         names = [part.name for part, mass_of in zip(parts, part_masses, strict=True) if mass_of is None]
         decide(key.replace("_", " "), mass, names, key)
     if isinstance(second, Open):
-        names = [part.name for part in parts if part.shaft != CRANKSHAFT]
-        decide("second reciprocating mass", second, names)
+        decide("second reciprocating mass", second, [part.name for part in parts if part.shaft != CRANKSHAFT])
     for part, row in zip(parts, table.slider_cranks, strict=False):
         if isinstance(row.reciprocating_mass, Open):
             decide(f"reciprocating mass of {part.name}", row.reciprocating_mass, [part.name])

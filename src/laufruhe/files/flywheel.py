@@ -85,10 +85,8 @@ def _rim(table: RimTable) -> Rim:
     diameter, width, height = (Open.from_value(getattr(table, key)) for key in _SECTION)
     hole = diameter.lower - height.upper
     if hole <= 0.0:
-        rule = "leaves no hole in the rim"
-        raise Refused(
-            "flywheel.rim.height", units.quantity_text(height.upper, "m"), rule, "make it less than the diameter"
-        )
+        text, remedy = units.quantity_text(height.upper, "m"), "make it less than the diameter"
+        raise Refused("flywheel.rim.height", text, "leaves no hole in the rim", remedy)
     arms = None
     if table.arms is not None:
         if table.arms.hub_diameter >= hole:

@@ -139,18 +139,9 @@ def needs_bore(table: GasTable | None) -> bool:
 
 
 def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> GasModel | None:
-    """Return the gas model of the engine; None without [gas].
+    """Return the gas model of the engine, or None without [gas]; traces are in the folder of the problem file.
 
-    Parameters
-    ----------
-    table
-        Table [gas].
-    folder
-        Folder of the problem file and of its traces.
-    cycle
-        Working cycle.
-    parts
-        Slider-cranks, whose chambers are checked.
+    The chambers of the slider-cranks are checked.
     """
     if table is None:
         return None

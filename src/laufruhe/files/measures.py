@@ -121,22 +121,12 @@ class MeasureContext:
     points: tuple[OperatingPoint, ...]
 
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
-        """Return the measure of a quantity with the keys of its table, checked for this engine.
-
-        Parameters
-        ----------
-        name
-            Name of the quantity in the file.
-        table
-            Table with the keys that narrow it.
-        where
-            Key of the file for complaints.
-        """
+        """Return the measure of a quantity with the keys of its table, checked for this engine."""
         if name not in MEASURES:
             home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
-            raise Refused(
-                where, name, *(missing_extension(home) if home else ("is no quantity", nearest(name, list(MEASURES))))
-            )
+            if home:
+                raise Refused(where, name, *missing_extension(home))
+            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         key, names, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
         if not channel.needs.of(self.engine):
@@ -245,14 +235,7 @@ def objectives_of(
 ) -> tuple[PriorityLevel, ...]:
     """Return the objectives in order of priority; without [objective] the mean mount force of an engine on mounts.
 
-    Parameters
-    ----------
-    tables
-        Tables [objective]; None without them.
-    scene
-        Engine and operating points.
-    single
-        Keys of the file that require a single objective.
+    The keys of the file in `single` require a single objective.
     """
     if tables is None:
         return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
@@ -307,8 +290,8 @@ def limits_of(tables: Sequence[ConstraintTable], scene: MeasureContext) -> tuple
         for high in numbers:
             if low.measure == high.measure and low.minimum > high.maximum:
                 lower, upper = (units.quantity_text(value, low.measure.unit) for value in (low.minimum, high.maximum))
-                contradiction = f"'{low.name}' and '{high.name}' contradict each other"
-                subject = contradiction if low is not high else f"'{low.name}' contradicts itself"
+                both = f"'{low.name}' and '{high.name}' contradict each other"
+                subject = both if low is not high else f"'{low.name}' contradicts itself"
                 rule = f"{subject}: at least {lower} and at most {upper}"
                 raise Refused("constraints", None, rule, "move the limits apart")
     return tuple(limits)
@@ -354,14 +337,14 @@ def _check_unique(limits: Sequence[Limit]) -> None:
     for k, limit in enumerate(limits):
         sides = (("max", limit.maximum < math.inf), ("min", limit.minimum > -math.inf), ("outside", limit.outside))
         for side in (side for side, is_given in sides if is_given):
-            previous = first.setdefault(
-                (limit.measure, limit.name, side, limit.outside if side == "outside" else None), k
-            )
+            band = limit.outside if side == "outside" else None
+            previous = first.setdefault((limit.measure, limit.name, side, band), k)
             if previous != k:
-                rule = (
-                    f"limits '{limit.name}' once more, beside constraints[{previous + 1}] ('{limits[previous].name}')"
+                other = f"constraints[{previous + 1}] ('{limits[previous].name}')"
+                rule, remedy = (
+                    f"limits '{limit.name}' once more, beside {other}",
+                    "keep the tighter one, or give each a name",
                 )
-                remedy = "keep the tighter one, or give each a name"
                 raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
 
 

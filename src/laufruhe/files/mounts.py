@@ -12,7 +12,15 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_distinct, si_value
+from laufruhe.files.complaints import (
+    Refused,
+    errors_at_key,
+    nearest,
+    refuse_keys,
+    require_distinct,
+    require_one_of,
+    si_value,
+)
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Block, Mount
@@ -154,18 +162,9 @@ class LoadCaseTable(Table):
 
 @dataclass(frozen=True)
 class MountsInput:
-    """Mounts of a file.
+    """Mounts of a file with joined springs in one place, and the block that elastic ones carry.
 
-    Attributes
-    ----------
-    mounts
-        Mounts, with joined springs in one place.
-    block
-        Block on elastic mounts; None for rigid ones.
-    numbers
-        Fourteen numbers of each elastic spring (E13).
-    decisions
-        Decisions about these numbers.
+    The numbers are the fourteen of each elastic spring (E13); decisions are about them.
     """
 
     mounts: tuple[Mount, ...] = ()
@@ -177,26 +176,15 @@ class MountsInput:
 def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsInput:
     """Return the mounts of a file: rigid ones, or elastic ones with the block on them.
 
-    Parameters
-    ----------
-    table
-        Table [mounts]; None without mounts.
-    block
-        Table [block]; required for elastic mounts.
-    folder
-        Folder of the problem file and of its CSV files.
+    The folder is that of the problem file and of its CSV files.
     """
     if table is None or table.kind == "rigid":
         if block is not None:
             raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
         return MountsInput(_rigid(table)) if table else MountsInput()
     if block is None:
-        raise Refused(
-            "block",
-            None,
-            "is missing, but elastic mounts need the mass and inertia of the block",
-            "add [block] with mass and inertia",
-        )
+        rule = "is missing, but elastic mounts need the mass and inertia of the block"
+        raise Refused("block", None, rule, "add [block] with mass and inertia")
     (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
     x, y, z = block.centre_of_gravity
     with errors_at_key("block"):
@@ -205,9 +193,7 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
 
 
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
-    if bool(table.positions) == bool(table.places):
-        state = "is missing" if not table.positions else "is given twice, as positions and as places"
-        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
+    require_one_of(table, "mounts", "positions", "places", named="[[mounts.places]]")
     places = list(table.places) or [MountTable.model_construct(position=list(p)) for p in table.positions]
     names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
     if len(names) != len(places):
@@ -390,8 +376,7 @@ class _Numbers:
 def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple[LoadCase, ...]:
     """Return the static load cases."""
     if tables and block is None:
-        rule = "needs elastic mounts"
-        raise Refused("load_cases", None, rule, 'add [mounts] with kind = "elastic", and [block]')
+        raise Refused("load_cases", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
     require_distinct([table.name for table in tables], "load_cases", "load cases have one name")
     cases = []
     for k, table in enumerate(tables, 1):

@@ -6,18 +6,17 @@ read with their start values, and the engine is built again for each other value
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, read_number
 from laufruhe.files.nested import Place, annotations_at, at, number_at, tables_on, walk, with_value_at
-from laufruhe.files.problem_file import EXTENSION_KEYS, Note, ProblemFile, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, Note, file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
-from laufruhe.problem.problem import Problem
 
 _SIZES = ("mass", "unbalance")
 _PISTONS = ("reciprocating_mass", "second_reciprocating_mass")
@@ -48,11 +47,11 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
     return closed, tuple(decisions)
 
 
-def _with_decisions(decisions: Sequence[Decision], problem: Problem, _: ProblemFile, __: Mapping[str, Any]) -> Problem:
-    return replace(problem, decisions=(*problem.decisions, *decisions))
-
-
-NOTE = Note("open numbers", without_open, _with_decisions)
+NOTE = Note(
+    "open numbers",
+    without_open,
+    lambda decisions, problem, _, __: replace(problem, decisions=(*problem.decisions, *decisions)),
+)
 
 
 def _name(tables: Mapping[str, Any], place: Place) -> str:
@@ -62,9 +61,7 @@ def _name(tables: Mapping[str, Any], place: Place) -> str:
     for key in place:
         entry = node[key]
         name = entry.get("name") if isinstance(key, int) and isinstance(entry, dict) else None
-        is_unique = (
-            isinstance(name, str) and "." not in name and sum(sibling.get("name") == name for sibling in node) == 1
-        )
+        is_unique = isinstance(name, str) and "." not in name and [row.get("name") for row in node].count(name) == 1
         parts.append(str(name) if is_unique else str(key + 1) if isinstance(key, int) else key)
         node = entry
     return ".".join(parts)

@@ -60,20 +60,9 @@ class FrictionTable(Table):
 
 
 class Brake:
-    """Conversion of loads at the brake into indicated mean pressures by [friction].
+    """Conversion of loads at the brake into indicated mean pressures by [friction], for a displacement [m3].
 
-    Attributes
-    ----------
-    table
-        Table [friction].
-    displacement
-        Displacement of the engine [m3].
-    turns
-        Turns of the crank in one cycle.
-    said
-        Sentences for the report, one for each converted load.
-    tests
-        Measurements behind the converted loads.
+    Each converted load adds a sentence to `said`, and the measurements behind it to `tests`, both for the report.
     """
 
     def __init__(self, table: FrictionTable, folder: Path, displacement: float, cycle: Cycle) -> None:
@@ -112,9 +101,8 @@ class Brake:
             rule = f"is less than its uncertainty, {units.quantity_text(friction.deviation, 'Pa')} times deviations"
             remedy = "measure more points, or lower friction.deviations"
             raise Refused("friction", units.quantity_text(friction.mean, "Pa"), rule, remedy)
-        lowest, middle, maximum, loss, deviation = (
-            f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation)
-        )
+        bars = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
+        lowest, middle, maximum, loss, deviation = bars
         self.said.append(
             f"Indicated mean pressure at {where} {middle} bar, {lowest} to {maximum} bar: {1e-5 * brake:.4g} bar at "
             f"the brake and {loss} bar of friction, {self.table.deviations:g} deviations of {deviation} bar to either "
@@ -150,20 +138,9 @@ def operating_points(
     tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
     brake: Brake | None,
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
-    """Return the operating points of a file.
+    """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    Parameters
-    ----------
-    tables
-        Tables [[operating_points]].
-    gas
-        Gas of [gas], for points that give no load; None without gas.
-    cycle
-        Working cycle.
-    stroke
-        Stroke, which turns a mean piston speed into a crank speed [m]; None without pistons.
-    brake
-        Conversion of loads at the brake; None without [friction].
+    The stroke turns a mean piston speed into a crank speed [m]; an engine without pistons has none.
     """
     points = []
     for k, table in enumerate(tables, 1):

@@ -78,19 +78,7 @@ def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
 def open_phasing(
     engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
 ) -> Problem:
-    """Return the problem with open phasing; its engine is the first candidate that the phasing allows.
-
-    Parameters
-    ----------
-    engine
-        Table [engine] with open throws, firing order or bank angles.
-    shafts
-        Tables [[balancer_shafts]], some of them perhaps optional.
-    table
-        Table [phasing]; None for its defaults.
-    assemble
-        Function that returns the problem of an engine without open phasing.
-    """
+    """Return the problem with open phasing; its engine is the first candidate that the phasing allows."""
     table = table or PhasingTable()
     for key in _OPENABLE:
         if key not in engine.kind.openable and _has_open(engine.value_of(key)):
@@ -182,11 +170,11 @@ def _intervals(table: IntervalsTable | None, engine: EngineTable, cycle: Cycle, 
         # throws with angles or bounds of their own need no limits of intervals
         is_free = isinstance(engine.throws, list) and (_has_open(engine.throws) or engine.firing_order != "open")
         return Intervals(0.0, cycle.angle) if is_free else Intervals(even - spread, even + spread)
-    low = table.min if table.min is not None else 0.0
-    high = table.max if table.max is not None else cycle.angle
     deviation = table.largest_deviation
     if table.min is None and table.max is None and deviation is None:
         raise Refused("phasing.intervals", None, "is empty", "give min, max or largest_deviation")
+    low = table.min if table.min is not None else 0.0
+    high = table.max if table.max is not None else cycle.angle
     if deviation is not None:
         if deviation < 0.0:
             where, text = "phasing.intervals.largest_deviation", units.quantity_text(deviation, "rad")
@@ -253,9 +241,8 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         rule = "allows even firing alone, and throws between bounds fire unevenly"
-        raise Refused(
-            "phasing.intervals", None, rule, 'allow uneven intervals, leave the key out, or write throws = "open"'
-        )
+        remedy = 'allow uneven intervals, leave the key out, or write throws = "open"'
+        raise Refused("phasing.intervals", None, rule, remedy)
     if phasing.intervals.minimum > phasing.intervals.maximum:
         raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
 
@@ -310,6 +297,5 @@ def without_shafts(problem: Problem, shafts: Collection[str]) -> Problem:
     if not shafts:
         return problem
     gone = {rotor.name for rotor in problem.engine.rotors if rotor.shaft.name in shafts}
-    rotors = tuple(rotor for rotor in problem.engine.rotors if rotor.name not in gone)
-    engine = replace(problem.engine, rotors=rotors)
+    engine = replace(problem.engine, rotors=tuple(r for r in problem.engine.rotors if r.name not in gone))
     return replace(problem, engine=engine, decisions=without_rotors(problem.decisions, gone))

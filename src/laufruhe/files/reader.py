@@ -96,17 +96,14 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
                 problem_of_star = replace(problem_of_star, rebuild=partial(_rebuilt, closed, path, candidate))
                 for note in notes():
-                    problem_of_star = (
-                        note.put(parts[note], problem_of_star, file, closed) if parts[note] else problem_of_star
-                    )
+                    if parts[note]:
+                        problem_of_star = note.put(parts[note], problem_of_star, file, closed)
                 return problem_of_star
 
             if any(parts.values()):
-                phasing = problem.phasing
-                problem = finished(problem, None)
+                phasing, problem = problem.phasing, finished(problem, None)
                 if phasing is not None:
-                    realise = phasing.realise
-                    stars = replace(phasing, realise=lambda star: finished(realise(star), star))
+                    stars = replace(phasing, realise=lambda star: finished(phasing.realise(star), star))
                     problem = replace(problem, phasing=stars)
             _check_decisions(problem)
             return replace(problem, origin=Origin(tables, path, _apply_edit))
@@ -161,10 +158,8 @@ def _rebuilt(
     except (ValidationError, Refused, ModelError) as error:
         values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
         faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
-        faults_text = " and ".join(map(str, faults))
-        raise ModelError(
-            f"this engine cannot be built, {values}: {faults_text}; narrow its bounds or tolerances"
-        ) from None
+        why = " and ".join(map(str, faults))
+        raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
     return Drawing(rebuilt.engine, rebuilt.points, rebuilt.decisions, rebuilt.mount_numbers)
 
 
@@ -188,14 +183,10 @@ def tables_of(path: Path) -> dict[str, Any]:
 
 
 def _merged(tables: dict[str, Any], path: Path) -> dict[str, Any]:
-    # checked tables, an engine of the catalogue written out
-    _check_shape(tables, path)
-    with errors_in_file(path):
-        return with_catalogue(tables)
+    """Return the tables with an engine of the catalogue written out.
 
-
-def _check_shape(tables: dict[str, Any], path: Path) -> None:
-    """Raise `InputError` for control characters in texts, and for tables that are too deep or too long."""
+    Raise `InputError` for control characters in texts, and for tables that are too deep or too long.
+    """
     for place, node in walk(tables):
         where = key_path(place)
         if len(place) > DEEPEST:
@@ -205,10 +196,11 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
             rule = f"contains U+{ord(strange.group()):04X}, which is not a printable character"
             raise refused(where, "", rule, "remove it; in a path write / for \\", path)
         if isinstance(node, dict | list) and len(node) > MAX_ENTRIES:
-            maximum = f"at most {MAX_ENTRIES} are read"
-            raise refused(where or "file", "", f"has {len(node)} entries", maximum, path)
+            raise refused(where or "file", "", f"has {len(node)} entries", f"at most {MAX_ENTRIES} are read", path)
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
             raise refused(where, "", "is a whole number of more than 64 bits", "write a smaller one", path)
+    with errors_in_file(path):
+        return with_catalogue(tables)
 
 
 @cache
@@ -257,16 +249,13 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
     on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
-    rotors, (wheel, wheel_decisions) = (
-        tuple(collected.rotors),
-        flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia")),
-    )
+    wheel, wheel_decisions = flywheel_of(file.flywheel, file.fidelity.value_of("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, on_mounts.mounts, on_mounts.block, bearings, wheel, geared,
-        load_cases_of(file.load_cases, on_mounts.block),
+        file.title, cycle, cylinders, tuple(collected.rotors), on_mounts.mounts, on_mounts.block, bearings, wheel,
+        geared, load_cases_of(file.load_cases, on_mounts.block),
     )  # fmt: skip
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     problem = Problem(
@@ -326,12 +315,8 @@ def _check_decisions(problem: Problem) -> None:
         drawings = list[Drawing]()
         for bound in (decision.lower, decision.upper) if decision.address_drives else ():
             with suppress(ModelError):
-                drawings.append(
-                    problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives})
-                )
-        if len(drawings) > 1 and all(
-            (drawing.engine, drawing.points, drawing.mount_numbers) == as_given for drawing in drawings
-        ):
+                drawings.append(problem.rebuild({d.path: d.written(bound) for d in decision.address_drives}))
+        if len(drawings) > 1 and all((d.engine, d.points, d.mount_numbers) == as_given for d in drawings):
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
         if any([point.name for point in drawing.points] != names for drawing in drawings):
             rule = f"is open and changes the speeds that name the operating points ({', '.join(names)})"

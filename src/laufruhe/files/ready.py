@@ -22,17 +22,7 @@ _LIST, _OTHER = "uses.csv", "other uses"
 
 @dataclass(frozen=True)
 class Ready:
-    """Ready problem or study of the package.
-
-    Attributes
-    ----------
-    use
-        Application that it is an example of.
-    path
-        File in the package.
-    needs
-        Names of further files in its folder that it refers to.
-    """
+    """Ready problem or study of the package, an example of a use; it needs further files of its folder."""
 
     name: str
     title: str
@@ -83,9 +73,8 @@ def copies(names: Iterable[str]) -> dict[str, str]:
         texts.setdefault(entry.path.name, f"{schema_line(entry.is_study)}\n{entry.path.read_text(encoding='utf-8')}")
         texts.setdefault(*schema_file(entry.is_study))
         for needed in (name for name in entry.needs if name not in texts):
-            problem_entry = ready().get(needed.removesuffix(".toml"))
-            if problem_entry is not None:
-                left.append(problem_entry)
+            if problem := ready().get(needed.removesuffix(".toml")):
+                left.append(problem)
             else:
                 texts[needed] = (folder() / needed).read_text(encoding="utf-8")
     return texts
@@ -99,4 +88,4 @@ def schema_line(is_study: bool = False) -> str:
 def schema_file(is_study: bool = False) -> tuple[str, str]:
     """Return name and text of the schema for a file."""
     name = STUDY_SCHEMA if is_study else SCHEMA
-    return name, (Path(__file__).parent / name).read_text(encoding="utf-8")
+    return name, Path(__file__).with_name(name).read_text(encoding="utf-8")

@@ -123,17 +123,7 @@ class RotorList:
 def counterweights(
     tables: Sequence[CounterweightTable], cylinders: Sequence[SliderCrank], throws: Sequence[Throw], into: RotorList
 ) -> None:
-    """Add the counterweights of a file to a list of rotors: opposite each throw, or single ones.
-
-    Parameters
-    ----------
-    tables
-        Tables [[counterweights]].
-    cylinders, throws
-        Slider-cranks and throws of the engine.
-    into
-        List that receives rotors and decisions.
-    """
+    """Add the counterweights of a file to a list of rotors: opposite each throw, or single ones."""
     pins = []
     for throw in throws:
         parts = [cylinders[k] for k in throw.cylinders]
@@ -221,12 +211,10 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
             raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
         with errors_at_key(f"{where}.ratio"):
-            shaft = Shaft(
-                table.name, table.ratio, *(Open.from_value(coordinate).start for coordinate in table.position)
-            )
+            shaft = Shaft(table.name, table.ratio, *(Open.from_value(place).start for place in table.position))
         for j, unbalance in enumerate(table.unbalances):
             key = f"{where}.unbalances[{j + 1}]"
-            name = name_of_unbalance(table.name, [unbalance_table.name for unbalance_table in table.unbalances], j)
+            name = name_of_unbalance(table.name, [other.name for other in table.unbalances], j)
             if unbalance.coupled is not None:
                 _follow(name, unbalance, unbalance.coupled, shaft, key, into)
             else:
@@ -245,9 +233,8 @@ def name_of_unbalance(shaft: str, names: Sequence[str | None], j: int) -> str:
 
 def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaft, where: str, into: RotorList) -> None:
     if table.unbalance is not None or table.mass is not None or table.angle != 0.0:
-        raise Refused(
-            f"{where}.coupled", coupled.to, "cannot stand beside a size or an angle of its own", "leave one out"
-        )
+        rule = "cannot stand beside a size or an angle of its own"
+        raise Refused(f"{where}.coupled", coupled.to, rule, "leave one out")
     leaders = {rotor.name: rotor for rotor in into.rotors if rotor.role is Role.BALANCER}
     if coupled.to not in leaders:
         remedy = nearest(coupled.to, list(leaders)) if leaders else "define the other one first"
@@ -255,9 +242,8 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     leader = leaders[coupled.to]
     sign, mirrored = _HOW[coupled.how]
     value = sign * (leader.unbalance.conjugate() if mirrored else leader.unbalance)
-    into.add(
-        Rotor(name, Open.from_value(table.x).start, value, shaft, Role.BALANCER, table.radius or leader.radius), where
-    )
+    x, radius = Open.from_value(table.x).start, table.radius or leader.radius
+    into.add(Rotor(name, x, value, shaft, Role.BALANCER, radius), where)
     into.drive(name, coupled.to, sign, mirrored)
 
 
@@ -287,11 +273,8 @@ def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)
     if size.lower > 0.0:
-        smallest, rule = (
-            units.quantity_text(size.lower, _UNITS[key]),
-            "is a smallest size above zero while the angle is open",
-        )
-        raise Refused(f"{where}.{key}", smallest, rule, "let the size start at zero, or fix the angle")
+        smallest, remedy = units.quantity_text(size.lower, _UNITS[key]), "let the size start at zero, or fix the angle"
+        raise Refused(f"{where}.{key}", smallest, "is a smallest size above zero while the angle is open", remedy)
     low, high = angle.bounds
     if high - low >= math.tau * (1.0 - 1e-9):
         return Sector(size.upper, (low, low + math.tau))

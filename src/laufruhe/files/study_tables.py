@@ -30,13 +30,10 @@ def _single(raw: object) -> object:
     return raw
 
 
-def _single_as_list(raw: object) -> object:
-    return [_single(entry) for entry in raw] if isinstance(raw, list) else _single(raw)
-
-
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
 Setting: TypeAlias = Annotated[
-    bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_as_list)
+    bool | int | float | str | list[bool | int | float | str],
+    BeforeValidator(lambda raw: [_single(entry) for entry in raw] if isinstance(raw, list) else _single(raw)),
 ]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
@@ -156,18 +153,10 @@ def field_at(where: str) -> f.Number | None:
 
 @dataclass(frozen=True)
 class SweepAxis:
-    """Swept quantity with its values.
+    """Swept quantity, a path in the problem file, with its values as in a problem file.
 
-    Attributes
-    ----------
-    quantity
-        Path in the problem file.
-    values
-        Values as in a problem file.
-    unit
-        Unit of the study file; "1" for plain numbers, "" for labels.
-    numbers
-        Values as numbers in this unit; None for labels.
+    The numbers are the values in the unit of the study file, which is "1" for plain numbers. Labels have the unit ""
+    and no numbers.
     """
 
     quantity: str
@@ -212,20 +201,10 @@ def axis_of(sweep: SweepTable) -> SweepAxis:
 
 @dataclass(frozen=True)
 class Span:
-    """Range of a quantity that is drawn at random.
+    """Range of a quantity, a path in the problem file, that is drawn at random.
 
-    Attributes
-    ----------
-    quantity
-        Path in the problem file.
-    unit
-        Unit of the study file; "1" for plain numbers.
-    low, high
-        Ends of the range in this unit.
-    is_log
-        True if the logarithm is uniform.
-    is_text
-        True if a problem file gives the value as text with its unit.
+    The ends are in the unit of the study file, which is "1" for plain numbers. The quantity or its logarithm is
+    uniform, and `is_text` is True if a problem file gives it as text with its unit.
     """
 
     quantity: str

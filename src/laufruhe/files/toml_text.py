@@ -56,19 +56,15 @@ def _lines(table: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[str]:
     inner = {
         key: tables
         for key, tables in lists.items()
-        if tables
-        and all(isinstance(table_of_list, Mapping) and "between" not in table_of_list for table_of_list in tables)
+        if tables and all(isinstance(entry, Mapping) and "between" not in entry for entry in tables)
     }
     yield from (f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items() if key not in inner)
     for key, tables in inner.items():
         path = (*above, key)
         name = ".".join(map(toml_key, path))
-        for table_of_list in tables:
-            yield from (
-                "",
-                f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]",
-                *_lines(table_of_list, path),
-            )
+        head = f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]"
+        for entry in tables:
+            yield from ("", head, *_lines(entry, path))
 
 
 def toml_key(key: str) -> str:
