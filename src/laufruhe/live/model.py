@@ -43,16 +43,9 @@ NO_SLIDERS = "Nothing that is open here can be moved live."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
-    """Return the page's model of a problem.
+    """Return the page's model of a problem as read; numbers that are not affine keep the values of its result.
 
-    Parameters
-    ----------
-    problem
-        Problem as read.
-    result
-        Its result; numbers that are not affine keep their values.
-    is_served
-        True if a server decides and evaluates numbers that do not follow.
+    `is_served` is True if a server decides and evaluates numbers that do not follow.
     """
     file = f"{problem.name}.toml"
     model = LiveModel(
@@ -61,9 +54,11 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
     )  # fmt: skip
     values = decided(result.problem, {entry.name: entry.value for entry in result.decisions})
     how = SERVED if is_served else HOW.format(file=file)
-    moving = _moving(result.problem, values)
-    fixed = tuple(_unmoved(result.problem, how))
-    model = replace(model, unmoved=fixed, why_not="" if moving.decisions else NO_SLIDERS)
+    fixed = [decision for decision in result.problem.decisions if not decision.is_affine]
+    reduced = result.problem.fixed_at([values[decision.name] for decision in fixed], fixed)
+    moving = replace(reduced, phasing=None, extras=())
+    unmoved = tuple(_unmoved(result.problem, how))
+    model = replace(model, unmoved=unmoved, why_not="" if moving.decisions else NO_SLIDERS)
     try:
         filled = _filled(model, problem, moving, result, values, is_served)
     except ModelError as error:
@@ -85,12 +80,6 @@ def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
     return values
 
 
-def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
-    fixed = [decision for decision in problem.decisions if not decision.is_affine]
-    reduced = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
-    return replace(reduced, phasing=None, extras=())
-
-
 def _filled(
     bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value], is_served: bool
 ) -> LiveModel:
@@ -100,10 +89,11 @@ def _filled(
     source_text = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
     aside = f"cannot be followed live; {source_text.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)
-    curves = _curves(collected, result)
+    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.depends_on_unbalances]
+    block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
+    curves = tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
     measures = collected.measures()
-    start = decision_vector(affine.domains)
-    designs = [("given", start)]
+    designs = [("given", decision_vector(affine.domains))]
     if result.decisions:
         designs.append(("optimum", decision_vector(affine.domains, [values[d.name] for d in moving.decisions])))
     designs.append(("between", _between(affine.domains)))
@@ -138,54 +128,45 @@ class _Collected:
 
     def measures(self) -> tuple[DisplayedMeasure, ...]:
         """Return terms of all objectives, and limits."""
-        problem, measures = self.model.problem, []
-        for term in problem.objective:
-            measures += self._measure(term.measure, OBJECTIVE, term.measure.name, weight=term.weight)
-        for rank in problem.ranks[1:]:
-            for term in rank.terms:
-                measures += self._measure(term.measure, "rank", term.measure.name)
-        for limit in problem.limits:
-            measures += self._measure(limit.measure, "limit", limit.name, limit)
-        return tuple(measures)
+        problem = self.model.problem
+        later = [term.measure for rank in problem.ranks[1:] for term in rank.terms]
+        return (
+            *(
+                self._measure(term.measure, OBJECTIVE, term.measure.name, weight=term.weight)
+                for term in problem.objective
+            ),
+            *(self._measure(measure, "rank", measure.name) for measure in later),
+            *(self._measure(limit.measure, "limit", limit.name, limit) for limit in problem.limits),
+        )
 
     def _measure(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
-    ) -> list[DisplayedMeasure]:
+    ) -> DisplayedMeasure:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
         follows = (measure.is_mass or measure.is_load) and is_affine(measure.channel, self.kinds, self.model.problem)
         follows = follows and measure.norm.name in NORMS_OF_PAGE
         self.queries.append(measure if follows and not stays else None)
-        base = DisplayedMeasure(
-            role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit)
-        )
+        sides = () if limit is None else sides_of(limit)
+        norm = measure.norm
+        base = DisplayedMeasure(role, name, measure.unit, norm.name, norm.refinement, None, weight, sides)
         if stays and limit is None:
-            return [replace(base, value=self.model.bare.value(measure))]
+            return replace(base, value=self.model.bare.value(measure))
         if stays and limit is not None:
             limit_state = self.model.bare.check_limit(limit)
-            return [replace(base, sides=((limit_state.side, limit_state.edge),), value=limit_state.value)]
+            return replace(base, sides=((limit_state.side, limit_state.edge),), value=limit_state.value)
         if follows:
-            return [replace(base, signal=self.signal(measure))]
+            return replace(base, signal=self.signal(measure))
         self.unmoved.append((name, self.aside))
-        limit_value = self.decided.get(name)
         base = replace(base, followed=False, value=math.nan)
-        return [
-            replace(base, value=limit_value.value, sides=((limit_value.side, limit_value.limit),))
-            if limit_value
-            else base
-        ]
+        if (limit_value := self.decided.get(name)) is None:
+            return base
+        return replace(base, value=limit_value.value, sides=((limit_value.side, limit_value.limit),))
 
 
-def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:
-    if limit is None:
-        return ()
+def sides_of(limit: Limit) -> tuple[tuple[str, float], ...]:
+    """Return sense and edge of the finite sides of a limit [SI]."""
     sides = (("at least", limit.minimum), ("at most", limit.maximum))
     return tuple((sense, edge) for sense, edge in sides if math.isfinite(edge))
-
-
-def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
-    forces = [(places.title, places.channel) for places in places_of(result) if places.channel.depends_on_unbalances]
-    block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
-    return tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
 
 
 def _slider(domain: Domain, problem: Problem) -> Slider:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import base64
 import json
-from dataclasses import asdict, dataclass
+import zlib
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from laufruhe.live.packing import PackedBlock, pack_part, with_unit
 from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
 from laufruhe.present.numbers import share
 from laufruhe.prove.certificate import Proof
+from laufruhe.units import readable
 
 VERSION = 1
 MAX_MB = 2.0
@@ -22,18 +25,12 @@ MAX_MB = 2.0
 
 @dataclass(frozen=True)
 class Slider:
-    """An open number that loads are affine in.
+    """An open number that loads are affine in, with the bounds of its size and of an open angle [rad].
 
     Attributes
     ----------
-    name, unit
-        Name in results, and SI unit.
     column, width
         First column in the decision vector, and 1 for a real number or 2 for size and angle.
-    lower, upper
-        Bounds of the size.
-    angles
-        Bounds of the angle [rad], where that is open.
     angle
         Name of the angle in results.
     shown, factor
@@ -60,18 +57,14 @@ class DisplayedMeasure:
     ----------
     role
         `objective` for a term of it, `rank` for one of a later objective, or `limit`.
+    refinement
+        Factor on the number of steps at which the norm is taken.
     signal
-        Number of its signal; None of what stays as it is.
-    norm, refinement
-        Name, and times as many steps.
-    weight
-        Weight in the objective.
+        Number of its signal; None for a constant.
     sides
         Sense and edge of a limit, "at most" or "at least" [SI].
     value
-        Value of a constant.
-    followed
-        True if known for every design; else `value` is that of the decided design.
+        Value of a constant; of the decided design if no other is `followed`.
     """
 
     role: str
@@ -123,14 +116,10 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class LiveModel:
-    """A problem as a live page shows it.
+    """A problem as a live page shows it, with the names of its operating points and the turns in a cycle.
 
     Attributes
     ----------
-    points
-        Names of the operating points.
-    turns
-        Turns of the crank in a cycle.
     designs
         Given design, decided design if different, and one between the bounds for the page's self-check.
     reference
@@ -202,3 +191,43 @@ class LiveModel:
 
 def _or_none(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else value
+
+
+class PackedBlock:
+    """Concatenated arrays, each addressed by offset and shape."""
+
+    def __init__(self) -> None:
+        self._parts: list[np.ndarray] = []
+        self._length = 0
+
+    def add(self, values: ArrayLike) -> list[Any]:
+        """Append an array and return its offset and shape; a complex array gets a last axis of two."""
+        array = np.asarray(values)
+        if np.iscomplexobj(array):
+            array = np.stack([array.real, array.imag], axis=-1)
+        flat = np.ascontiguousarray(array, dtype="<f8").ravel()
+        self._parts.append(flat)
+        self._length += len(flat)
+        return [self._length - len(flat), list(array.shape)]
+
+    def text(self) -> str:
+        """Return all numbers deflated, as base64."""
+        numbers = np.concatenate([np.zeros(0), *self._parts]).astype("<f8")
+        return base64.b64encode(zlib.compress(numbers.tobytes(), 6)).decode("ascii")
+
+
+def with_unit(unit: str) -> dict[str, Any]:
+    """Return the SI unit, the readable unit and its factor."""
+    name, factor = readable(unit)
+    return {"unit": unit, "shown": name, "factor": factor}
+
+
+def pack_part(part: Any, block: PackedBlock) -> Any:
+    """Return a part of a signal field by field; its numbers are in the block."""
+    if isinstance(part, np.ndarray):
+        return block.add(part)
+    if isinstance(part, tuple):
+        return [pack_part(entry, block) for entry in part]
+    if not is_dataclass(part):
+        return part
+    return {field.name: pack_part(getattr(part, field.name), block) for field in fields(part)}

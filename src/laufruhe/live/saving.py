@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +14,8 @@ from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
 from laufruhe.files.nested import texts_in
 from laufruhe.files.reader import load_tables, tables_and_path
-from laufruhe.files.toml_text import toml_text
+from laufruhe.files.toml_text import toml_text, toml_value
 from laufruhe.machine import Engine
-from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.prices import angle_name
@@ -34,7 +33,7 @@ class Saved:
     Attributes
     ----------
     text
-        TOML, each place a text "@name@"; empty where there is none.
+        TOML with texts "@name@" for numbers; empty without a file.
     numbers
         Placeholder, name in results and SI unit of every number.
     note
@@ -53,41 +52,36 @@ def saved_file(problem: Problem, result: Result, moving: Problem, values: Mappin
     """Return the file of a design with placeholders for moving decisions; empty if it would not read back."""
     if problem.origin is None:
         return NOT_SAVED
-    tables, path = problem.origin.tables, problem.origin.path
-    marks = _marks(moving.decisions)
+    tables: Mapping[str, Any] = problem.origin.tables
+    numbers, starts = list[tuple[str, str, str]](), list[float]()
+    for decision in moving.decisions:
+        entries = ((decision.name, decision.unit), (angle_name(decision), "rad"))[: decision.set.width]
+        numbers += [(f"@{name}@", name, unit) for name, unit in entries]
+        starts += decision.set.split(decision.start)[: decision.set.width]
     try:
-        tables = _fixed(dict(tables), result, values)
-        for mark, name, _ in marks:
+        for decision in result.problem.decisions:
+            if not decision.is_affine:
+                number = float(values[decision.name].real)
+                value = number if decision.unit == "" else f"{number!r} {decision.unit}"
+                fixed = math.degrees(number) if decision.unit == "rad" else value
+                tables = edits.fix_number(tables, decision.name, fixed)
+        if result.problem.phasing is not None:
+            tables = _with_star(tables, result)
+        for mark, name, _ in numbers:
             tables = edits.fix_number(tables, name, mark)
-        text = toml_text({key: table for key, table in tables.items() if key not in SEARCHED})
-        filled = _filled(text, marks, moving)
-        read = load_tables(tables_and_path(filled)[0], path)
+        filled = text = toml_text({key: table for key, table in tables.items() if key not in SEARCHED})
+        for (mark, _, unit), start in zip(numbers, starts, strict=True):
+            filled = filled.replace(toml_value(mark), file_number(start, unit))
+        read = load_tables(tables_and_path(filled)[0], problem.origin.path)
     except (Refused, InputError) as error:
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
-    if not _equal_engines(read.engine, moving.engine) or read.fidelity != moving.fidelity:
+    engine, moving_engine = _numbers(read.engine), _numbers(moving.engine)
+    is_same = engine.shape == moving_engine.shape and np.allclose(moving_engine, engine, SAME, SAME)
+    if not is_same or read.fidelity != moving.fidelity:
         return Saved(note="This design cannot be written as a problem file that gives the same engine.")
     files = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
     note = f"Save it in the folder of {' and '.join(files)}." if files else ""
-    return Saved(text, marks, note)
-
-
-def _marks(decisions: Sequence[Decision]) -> tuple[tuple[str, str, str], ...]:
-    marks = []
-    for decision in decisions:
-        marks.append((f"@{decision.name}@", decision.name, decision.unit))
-        if decision.set.width > 1:
-            name = angle_name(decision)
-            marks.append((f"@{name}@", name, "rad"))
-    return tuple(marks)
-
-
-def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -> str:
-    numbers: dict[str, float] = {}
-    for decision in moving.decisions:
-        numbers[decision.name], numbers[angle_name(decision)] = decision.set.split(decision.start)
-    for mark, name, unit in marks:
-        text = text.replace(toml_text({"k": mark})[4:-1], file_number(numbers[name], unit))
-    return text
+    return Saved(text, tuple(numbers), note)
 
 
 def file_number(value: float, unit: str) -> str:
@@ -97,16 +91,7 @@ def file_number(value: float, unit: str) -> str:
     return f'"{float(value)!r} {unit}"'
 
 
-def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) -> dict[str, Any]:
-    for decision in result.problem.decisions:
-        if not decision.is_affine:
-            number = float(values[decision.name].real)
-            text = number if decision.unit == "" else f"{number!r} {decision.unit}"
-            tables = edits.fix_number(tables, decision.name, math.degrees(number) if decision.unit == "rad" else text)
-    return tables if result.problem.phasing is None else _with_star(tables, result)
-
-
-def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
+def _with_star(tables: Mapping[str, Any], result: Result) -> dict[str, Any]:
     decided = {entry.name: entry.value for entry in result.decisions}
     throws = [math.degrees(decided[name]) for k in range(len(decided)) if (name := f"throw {k + 1}") in decided]
     star: dict[str, Any] = {"throws": throws} if throws and "throws" in tables["engine"] else {}
@@ -118,13 +103,6 @@ def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
         star["firing_order"] = [k + 1 for k in sorted(range(len(parts)), key=lambda k: parts[k].firing_angle)]
     gone = [name.removesuffix(" built") for name, value in decided.items() if name.endswith(" built") and not value]
     return edits.with_star(tables, star, gone)
-
-
-def _equal_engines(engine: Engine, other_engine: Engine) -> bool:
-    numbers, other_numbers = map(_numbers, (engine, other_engine))
-    return numbers.shape == other_numbers.shape and bool(
-        np.all(np.abs(numbers - other_numbers) <= SAME * (1.0 + np.abs(numbers)))
-    )
 
 
 def _numbers(engine: Engine) -> np.ndarray:

@@ -43,14 +43,10 @@ class Waves:
 
 @dataclass(frozen=True, eq=False)
 class PiecewiseSignal:
-    """Kinks of a signal: a smooth series and polynomials between the kinks (L5a).
+    """Kinks of a signal: a smooth series and polynomials between the corners [rad], shape (k,) (L5a).
 
     Attributes
     ----------
-    smooth
-        The series without corners.
-    corners
-        Angles [rad], shape (k,).
     pieces
         Coefficients by power of (share of the period after a kink - 1/2), shape (powers, k, places, d).
     at
@@ -65,20 +61,18 @@ class PiecewiseSignal:
 
 @dataclass(frozen=True, eq=False)
 class PointSignal:
-    """A signal at one operating point.
+    """A signal at one operating point, with its share in a mean over operating points.
 
     Attributes
     ----------
-    share
-        Weight in a mean over operating points.
     series
         Series at a decision vector of zero, shape (orders, places, d).
     bends
-        Kinks of the signal, or None.
+        Kinks of the series, or None.
     slope
         Change per unit of every column, shape (orders, places, d, columns).
     bent
-        Columns that bend by themselves, and how.
+        Columns with kinks of their own, and these kinks.
     """
 
     share: float
@@ -90,12 +84,10 @@ class PointSignal:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """Load over one period, affine in the decision vector.
+    """Load over one period, affine in the decision vector, with the name and SI unit of its channel.
 
     Attributes
     ----------
-    name, unit
-        Name of the channel, and SI unit.
     places
         Names along the second axis.
     base
@@ -103,7 +95,7 @@ class Signal:
     samples
         Steps over the period at which means are taken; a peak is sought among so many times as its norm refines.
     adds
-        True if rows are masses to add, not samples of a load.
+        True if the values are masses to add, not samples of a load.
     """
 
     name: str
@@ -116,27 +108,29 @@ class Signal:
 
 
 def signal_of(model: AffineModel, measure: Measure) -> Signal:
-    """Return the rows of a measure."""
-    return _of_load(model, measure) if measure.is_load else _of_masses(model, measure)
-
-
-def _of_load(model: AffineModel, measure: Measure) -> Signal:
+    """Return the signal of a load or of masses."""
+    if not measure.is_load:
+        rows, first = model.norm(measure, 1), np.zeros(1, dtype=np.intp)
+        constant, slope = (Waves(first, part[None].astype(complex)) for part in (rows.constant, rows.slope))
+        names = tuple(str(k + 1) for k in range(len(rows.constant)))
+        point = PointSignal(1.0, constant, None, slope)
+        return Signal(measure.channel.name, measure.unit, names, 1.0, 1, (point,), adds=True)
     problem, channel = model.problem, measure.load
     pairs = model.spectra(channel)
     every = [signal for constant_signal, by in pairs for signal in (constant_signal, *by)]
     # the period of one evaluation, in whose steps its means and peaks are sought
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
-    constant = with_common_base(base, [constant_signal for constant_signal, _ in pairs])
+    constants = with_common_base(base, [constant_signal for constant_signal, _ in pairs])
     columns = [with_common_base(base, by) for _, by in pairs]
     # kinks of all signals, for every norm
-    signals = [reduce(add, by, constant_signal) for constant_signal, by in zip(constant, columns, strict=True)]
+    signals = [reduce(add, by, constant_signal) for constant_signal, by in zip(constants, columns, strict=True)]
     bends = kinks_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []
-    for share, constant_signal, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
+    for share, constant_signal, by, at in zip(measure.shares(problem.points), constants, columns, bends, strict=True):
         counted = [narrow_signal(measure, signal, problem.engine) for signal in (constant_signal, *by)]
         points.append(_point(float(share), counted[0], counted[1:], at))
-    names = channel.places(problem.engine)
-    places = tuple(names[k] for k in measure.places(names)) or ("block",)
+    every_place = channel.places(problem.engine)
+    places = tuple(every_place[k] for k in measure.places(every_place)) or ("block",)
     return Signal(channel.name, channel.unit, places, float(base), problem.fidelity.samples, tuple(points))
 
 
@@ -156,13 +150,3 @@ def _piecewise(signal: Spectrum, at: Array) -> PiecewiseSignal:
     if corners is None:
         return PiecewiseSignal(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
     return PiecewiseSignal(smooth, corners.angles, corners.pieces(signal.period), at)
-
-
-def _of_masses(model: AffineModel, measure: Measure) -> Signal:
-    rows = model.norm(measure, 1)
-    first = np.zeros(1, dtype=np.intp)
-    point = PointSignal(
-        1.0, Waves(first, rows.constant[None].astype(complex)), None, Waves(first, rows.slope[None].astype(complex))
-    )
-    places = tuple(str(k + 1) for k in range(len(rows.constant)))
-    return Signal(measure.channel.name, measure.unit, places, 1.0, 1, (point,), adds=True)

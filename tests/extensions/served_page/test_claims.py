@@ -168,7 +168,8 @@ def test_words_of_what_is_simpler() -> None:
     both = Simplification(("these mounts", "this crank"), ("tolerances",))
     assert both.phrase == " for these mounts and this crank without tolerances"
     told = conflict_claim(3, ("a", "b"), Simplification(("these mounts",)))
-    assert told.text == "No design found: 'a' and 'b' contradict each other for these mounts. Move one of the limits"
+    assert told.lead == "No design found:"
+    assert told.words == "'a' and 'b' contradict each other for these mounts. Move one of the limits"
     assert conflict_claim(3, ("a",), is_last=True).lead == "No design exists:"
 
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, wraps
 from itertools import islice
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
-from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
+from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, refused
 from laufruhe.extensions.served_page import serialise
 from laufruhe.extensions.served_page.claims import (
     Simplification,
@@ -21,8 +21,7 @@ from laufruhe.extensions.served_page.claims import (
     preview_claim,
     settled_claim,
 )
-from laufruhe.extensions.served_page.controls import as_json, as_typed, controls_of, offered_by
-from laufruhe.extensions.served_page.fixed_values import fixing_edits, ranking_of
+from laufruhe.extensions.served_page.controls import as_typed, controls_of, offered_by
 from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit, PageState
 from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
 from laufruhe.extensions.served_page.scenes import scene_of
@@ -47,20 +46,14 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Source:
-    """The problem file as last read.
-
-    Attributes
-    ----------
-    content
-        Hash of the files that it names.
-    """
+    """The problem file as last read, and a hash of the content of the files that it names."""
 
     tables: Mapping[str, Any]
     path: Path
     content: str = ""
 
 
-_fronts: dict[str, object] = {}
+_fronts: dict[str, ParetoFront] = {}
 _solved: dict[str, Result] = {}
 
 
@@ -97,10 +90,9 @@ def _answered(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callabl
         except InputError as error:
             answer = {"error": str(error)}
         except ModelError as error:
-            answer = {
-                "error": str(InputError(source.path.name, (Complaint.from_error(error, error.where or "problem"),)))
-            }
-        except (SolverError, LaufruheError) as error:
+            complaint = Complaint.from_error(error, error.where or "problem")
+            answer = {"error": str(InputError(source.path.name, (complaint,)))}
+        except LaufruheError as error:
             answer = {"error": f"{source.path.name}: {error}"}
         except MemoryError:
             answer = {"error": f"{source.path.name}: needs more memory than there is"}
@@ -113,25 +105,21 @@ def _answered(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callabl
 def begin(source: Source) -> dict[str, Any]:
     """Return the problem and the controls of its page."""
     problem = load_tables(source.tables, source.path)
-    ranks = [rank.terms[0].measure.name for rank in problem.ranks]
+    try:
+        load_tables(Edit("open crank", CRANK, 1)(source.tables), source.path)
+        can_open_crank = True
+    except LaufruheError:
+        can_open_crank = False
     return {
         "title": problem.title,
         "file": source.path.name,
         "summary": problem.summary,
-        "controls": as_json(controls_of(source.tables, problem)),
-        "objectives": ranks,
-        "crank": _opens(source),
+        "controls": [{**asdict(control), "step": control.step} for control in controls_of(source.tables, problem)],
+        "objectives": [rank.terms[0].measure.name for rank in problem.ranks],
+        "crank": can_open_crank,
         "openCrank": problem.phasing is not None,
         "doubts": [str(doubt) for doubt in problem.plausibility_warnings],
     }
-
-
-def _opens(source: Source) -> bool:
-    try:
-        load_tables(Edit("open crank", CRANK, 1)(source.tables), source.path)
-    except LaufruheError:
-        return False
-    return True
 
 
 @_answered
@@ -151,11 +139,10 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
     else:
         assert value is not None
         claim = preview_claim(state.position, scene.problem, value, simpler, limits)
-    decided = followed is not None and not followed.conflict
     answer: dict[str, Any] = {
         **serialise.answer(claim, limits, problem, followed.conflict if followed else ()),
         "key": scene.key,
-        "design": serialise.design(scene.problem, followed.values) if followed is not None and decided else None,
+        "design": serialise.design(scene.problem, followed.values) if followed and not followed.conflict else None,
     }
     if state.has not in (scene.key, LATER):
         answer |= scene.drawn(problem.limits, design, followed)
@@ -179,13 +166,17 @@ def settle(source: Source, state: PageState, seconds: float) -> dict[str, Any]:
     """Solve and prove the whole problem as `laufruhe solve` does."""
     began = time.perf_counter()
     tables, problem = _requested(source, state, with_fixed=False)
-    try:
-        result = solve(replace(problem, sharply=True), time_limit=seconds)
-    except SolverError as error:
-        return {"error": f"{source.path.name}: {error}"}
+    result = solve(replace(problem, sharply=True), time_limit=seconds)
     _solved.clear()
     _solved[_solution_key(source, state)] = result
-    return {**_settled(result, tables, state.position), "seconds": time.perf_counter() - began}
+    claim = settled_claim(state.position, result)
+    return {
+        **serialise.answer(claim, result.limits, result.problem, result.conflict),
+        "design": {entry.name: entry.value for entry in result.decisions} if result.status.has_design else None,
+        "ranking": serialise.ranking_of(result),
+        "holds": serialise.fixing_edits(result, tables),
+        "seconds": time.perf_counter() - began,
+    }
 
 
 def _solution_key(source: Source, state: PageState) -> str:
@@ -206,32 +197,19 @@ def picture(source: Source, state: PageState, k: int) -> dict[str, Any]:
     return {"name": names[k], "caption": PICTURES[names[k]].caption, "image": image, "of": len(names)}
 
 
-def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[str, Any]:
-    has_design = result.status.has_design
-    claim = settled_claim(position, result)
-    return {
-        **serialise.answer(claim, result.limits, result.problem, result.conflict),
-        "design": {entry.name: entry.value for entry in result.decisions} if has_design else None,
-        "ranking": ranking_of(result),
-        "holds": fixing_edits(result, tables),
-    }
-
-
 def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simplification]:
     tables, whole_problem = _requested(source, state, with_fixed=True)
     scene = scene_of(whole_problem, tables, source.content)
     problem = replace(scene.problem, limits=whole_problem.limits)
     edges = [(limit.name, limit.minimum, limit.maximum, limit.outside) for limit in problem.limits]
     key = f"{scene.key} {across} {edges}"
-    if _fronts.get("key") != key:
+    if key not in _fronts:
         measures = partners(problem)
         if across not in measures:
             raise refused("front", across, "is no measure of this problem", "", source.path.name)
         _fronts.clear()
-        _fronts.update(key=key, front=ParetoFront(problem, measures[across]))
-    current = _fronts["front"]
-    assert isinstance(current, ParetoFront)
-    return current, scene.simpler(_held_kinds(source, state))
+        _fronts[key] = ParetoFront(problem, measures[across])
+    return _fronts[key], scene.simpler(_held_kinds(source, state))
 
 
 @_answered

@@ -9,7 +9,7 @@ from enum import StrEnum
 
 from laufruhe.present.numbers import figure, number
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
@@ -36,15 +36,7 @@ class ClaimKind(StrEnum):
 
 @dataclass(frozen=True)
 class Simplification:
-    """Simplifications while a slider moves; false without any.
-
-    Attributes
-    ----------
-    fixed_parts
-        Phrases for fixed numbers: "these mounts".
-    left_out
-        Phrases for neglected requirements: "tolerances".
-    """
+    """Phrases for fixed numbers ("these mounts") and neglected requirements while a slider moves; false without any."""
 
     fixed_parts: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -64,16 +56,12 @@ COMPLETE = Simplification()
 
 @dataclass(frozen=True)
 class Claim:
-    """Words about the displayed design.
+    """Words about the displayed design: a number in the lead, and the claim about it.
 
     Attributes
     ----------
-    kind
-        Strength of the claim.
     position
         Number of the page settings that the claim is about; the page shows it for no other settings.
-    lead, words
-        Number, and the claim about it.
     value
         Objective of the design [SI]; None where there is no design.
     reference
@@ -92,11 +80,6 @@ class Claim:
     reference: str = ""
     breaks: str = ""
     is_last: bool = False
-
-    @property
-    def text(self) -> str:
-        """Claim as one line."""
-        return "; ".join(part for part in (f"{self.lead} {self.words}".strip(), self.breaks) if part)
 
 
 def is_broken(limit: LimitValue) -> bool:
@@ -119,17 +102,7 @@ def breaks_words(limits: Iterable[LimitValue]) -> str:
 def preview_claim(
     position: int, problem: Problem, value: float, simpler: Simplification, limits: Iterable[LimitValue]
 ) -> Claim:
-    """Return the claim about a design that follows a slider.
-
-    Parameters
-    ----------
-    value
-        Objective of the design [SI].
-    simpler
-        Simplifications of the decided problem.
-    limits
-        Values of the design for all limits of the whole problem.
-    """
+    """Return the claim about a design that follows a slider, from its objective [SI] and all limits of the problem."""
     kind = ClaimKind.SIMPLIFIED if simpler else ClaimKind.ESTIMATE
     lead = f"Estimate {figure(value, problem.objective_unit or '')}"
     words = f"{problem.objective_name}{simpler.phrase}"
@@ -167,27 +140,16 @@ def settled_claim(position: int, result: Result) -> Claim:
     minimum = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
     is_proven = result.status is Status.OPTIMAL and not breaks
     # the page shows the drawing without extras
-    is_drawn = not result.problem.extras
-    reference = "the proven optimum" if is_proven else "the best design found"
-    return Claim(
-        ClaimKind.PROVEN if is_proven else ClaimKind.BEST,
-        position,
-        f"{'Optimum' if is_proven else 'Best design found'} {value}",
-        f"{objective.name}, proven: {minimum}"
-        if is_proven
-        else f"{objective.name}; {_gap_words(certificate, minimum)}",
-        objective.value,
-        reference if is_drawn else "",
-        breaks,
-        is_last=True,
-    )
-
-
-def _gap_words(certificate: Certificate, minimum: str) -> str:
-    if certificate.kind is Proof.NONE or not certificate.is_useful:
-        return "no useful bound was found in the time given"
-    local = ", a local optimum" if certificate.kind is Proof.LOCAL else ""
-    return f"{minimum} (gap {number(100.0 * certificate.gap, 2)} %{local})"
+    reference = "" if result.problem.extras else "the proven optimum" if is_proven else "the best design found"
+    kind, lead = (ClaimKind.PROVEN, "Optimum") if is_proven else (ClaimKind.BEST, "Best design found")
+    if is_proven:
+        words = f"{objective.name}, proven: {minimum}"
+    elif certificate.kind is Proof.NONE or not certificate.is_useful:
+        words = f"{objective.name}; no useful bound was found in the time given"
+    else:
+        local = ", a local optimum" if certificate.kind is Proof.LOCAL else ""
+        words = f"{objective.name}; {minimum} (gap {number(100.0 * certificate.gap, 2)} %{local})"
+    return Claim(kind, position, f"{lead} {value}", words, objective.value, reference, breaks, is_last=True)
 
 
 def join_phrases(phrases: Sequence[str]) -> str:

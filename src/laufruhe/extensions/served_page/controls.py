@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from laufruhe import units
@@ -29,18 +29,9 @@ _NARROW, _WIDE, _STEPS = 0.25, 2.0, 200
 
 @dataclass(frozen=True)
 class Control:
-    """A number with a slider.
+    """A number with a slider, which an edit of this way and name moves; `unit` is that of a file.
 
-    Attributes
-    ----------
-    way, name
-        Kind and name of the edit that moves it.
-    group, label
-        Group on the page, and label.
-    value, low, high
-        Value and range in `unit`, as in a file.
-    open
-        True if it is decided unless the page fixes it.
+    An open number is decided unless the page fixes it. A limit has its name.
     """
 
     way: str
@@ -75,11 +66,6 @@ def offered_by(tables: Mapping[str, Any], problem: Problem) -> list[str]:
     """Return the names that edits may have: controls, open numbers, and whole-problem edits."""
     decided = [decision.name for decision in problem.decisions]
     return [STAR, CRANK, OBJECTIVE, *(control.name for control in controls_of(tables, problem)), *decided]
-
-
-def as_json(controls: list[Control]) -> list[dict[str, Any]]:
-    """Return the controls as JSON values."""
-    return [{**asdict(control), "step": control.step} for control in controls]
 
 
 def _number(entry: Any) -> tuple[float, str] | None:

@@ -6,8 +6,6 @@ import math
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from laufruhe.machine import Rotor, SliderCrank
 from laufruhe.machine.rotor import Role
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, bore_of
@@ -30,7 +28,7 @@ def drawing_of(problem: Problem) -> dict[str, Any] | None:
         "cycle": math.degrees(engine.cycle.angle),
         "bore": 1e3 * bore_of(engine),
         "disc": 1.5e9 / (STEEL * THICKNESS),
-        "parts": _parts(parts, engine.cycle.angle),
+        "parts": [_part(part, engine.cycle.angle) for part in parts],
         "rotors": [_rotor(problem, rotor) for rotor in engine.rotors if rotor.role is not Role.THROW],
         "mounts": [{"name": m.name, "at": [_mm(m.position[1]), _mm(m.position[2])]} for m in engine.mounts],
     }
@@ -40,14 +38,9 @@ def _steps(cycle: float) -> int:
     return round(STEPS * cycle / math.tau)
 
 
-@lru_cache(maxsize=4)
-def _parts(parts: tuple[SliderCrank, ...], cycle: float) -> list[dict[str, Any]]:
-    angles = np.arange(_steps(cycle)) * cycle / _steps(cycle)
-    return [_part([Pose.at_angle(part, float(phi)) for phi in angles]) for part in parts]
-
-
-def _part(poses: list[Pose]) -> dict[str, Any]:
-    part = poses[0].part
+@lru_cache(maxsize=4 * _MAX_PARTS)
+def _part(part: SliderCrank, cycle: float) -> dict[str, Any]:
+    poses = [Pose.at_angle(part, k * cycle / _steps(cycle)) for k in range(_steps(cycle))]
     return {
         "name": part.name,
         "x": _mm(part.x),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import stat
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -21,13 +21,7 @@ EVERY = 0.4
 
 
 class FileWatcher:
-    """A problem file and every file that it names, polled while it is served.
-
-    Parameters
-    ----------
-    path
-        Path of a valid problem file (`InputError` otherwise).
-    """
+    """A problem file and every file that it names, polled while it is served; `InputError` if it is not valid."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -77,15 +71,16 @@ class FileWatcher:
         self._stamps[self.path] = _stamp_of(self.path)
         tables = tables_of(self.path)
         _check_inside(tables, self.path)
-        named = tuple(_named_in(tables, self.path.parent))
+        named = [self.path.parent / text for text in sorted({text for _, text in texts_in(tables)})]
         self._stamps = {self.path: self._stamps[self.path], **{path: _stamp_of(path) for path in named}}
-        content = _hash_of(named)
+        digest = hashlib.sha256()
+        for path in named:
+            with suppress(OSError, ValueError):
+                if path.is_file():
+                    with path.open("rb") as stream:
+                        digest.update(hashlib.file_digest(stream, "sha256").digest())
         load_tables(tables, self.path)
-        return Source(tables, self.path, content)
-
-
-def _named_in(tables: Mapping[str, Any], folder: Path) -> Iterator[Path]:
-    yield from (folder / text for text in sorted({text for _, text in texts_in(tables)}))
+        return Source(tables, self.path, digest.hexdigest())
 
 
 def _stamp_of(path: Path) -> tuple[int, int]:
@@ -95,16 +90,6 @@ def _stamp_of(path: Path) -> tuple[int, int]:
         if stat.S_ISREG(status.st_mode):
             return status.st_mtime_ns, status.st_size
     return 0, 0
-
-
-def _hash_of(paths: tuple[Path, ...]) -> str:
-    digest = hashlib.sha256()
-    for path in paths:
-        with suppress(OSError, ValueError):
-            if path.is_file():
-                with path.open("rb") as stream:
-                    digest.update(hashlib.file_digest(stream, "sha256").digest())
-    return digest.hexdigest()
 
 
 def _check_inside(tables: Mapping[str, Any], path: Path) -> None:

@@ -6,7 +6,7 @@ is a design, its value at twice as many samples, and a bound for the whole cycle
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -33,16 +33,12 @@ _FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 @dataclass(frozen=True, eq=False)
 class SliderOptimum:
-    """Optimum for the current limits.
+    """Optimum for the current limits: objective at the samples, lower bound over all feasible designs [SI], and gap.
 
     Attributes
     ----------
     values
         Values of the decisions; empty without a design.
-    value, bound
-        Objective at the samples, and its lower bound over all feasible designs [SI].
-    gap
-        Relative gap between value and bound.
     standing, prices
         Value of every limit's measure, and its shadow price.
     conflict
@@ -71,17 +67,9 @@ def can_follow(problem: Problem) -> bool:
 
 
 class Follower:
-    """Fast optimum of one problem under changing limits.
+    """Fast optimum of one problem, which satisfies `can_follow`, under changing limits.
 
-    Parameters
-    ----------
-    problem
-        Problem that satisfies `can_follow`.
-
-    Raises
-    ------
-    ModelError
-        If its loads are not affine in what is open.
+    A `ModelError` says that its loads are not affine in what is open.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -95,11 +83,15 @@ class Follower:
 
     def at(self, limits: Sequence[Limit]) -> SliderOptimum:
         """Return the optimum under the given limits."""
-        limit_of_measure = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
-        coarse, fine, averaged = (
-            self._under(rows, limit_of_measure) for rows in (self._coarse, self._fine, self._averaged)
-        )
-        names = [limit.name for limit in self._problem.load_limits]
+        maximum_of = {limit.measure: limit.maximum for limit in limits if limit.maximum < np.inf}
+        load_limits = self._problem.load_limits
+
+        def limited(rows: AffineProblem) -> AffineProblem:
+            pairs = zip(load_limits, rows.limits, strict=True)
+            return replace(rows, limits=tuple((maximum_of.get(x.measure, old), norm) for x, (old, norm) in pairs))
+
+        coarse, fine, averaged = map(limited, (self._coarse, self._fine, self._averaged))
+        names = [limit.name for limit in load_limits]
         solution = solve_cones(coarse)
         if solution.x is None:
             # averaged rows never overestimate: their contradiction proves one of the whole cycle
@@ -115,12 +107,13 @@ class Follower:
         x, value = solution.x, fine.objective(solution.x)
         price = dict(zip(names, bound.multipliers.shadow_prices(averaged), strict=True))
         limit_values = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
-        broken = tuple(
-            n for n, (maximum, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), maximum)
+        broken_constants = tuple(
+            name
+            for name, (maximum, norm) in zip(names, fine.limits, strict=True)
+            if norm.value(x) > maximum * (1.0 + FEASIBILITY_TOL) and not norm.slope.any()
         )
-        constant_names = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
-        if set(broken) & set(constant_names):
-            return _conflict(tuple(n for n in broken if n in constant_names))
+        if broken_constants:
+            return _conflict(broken_constants)
         return SliderOptimum(
             values=tuple(domain.complex_value(x) for domain in self._model.domains),
             value=value,
@@ -129,20 +122,6 @@ class Follower:
             standing=tuple(limit_values.get(limit.name, np.nan) for limit in limits),
             prices=tuple(price.get(limit.name, 0.0) for limit in limits),
         )
-
-    def _under(self, rows: AffineProblem, limit_of_measure: Mapping[Measure, Limit]) -> AffineProblem:
-        pairs = zip(self._problem.load_limits, rows.limits, strict=True)
-        return replace(
-            rows,
-            limits=tuple(
-                (limit_of_measure[x.measure].maximum if x.measure in limit_of_measure else maximum, n)
-                for x, (maximum, n) in pairs
-            ),
-        )
-
-
-def _breaks(value: float, maximum: float) -> bool:
-    return value > maximum * (1.0 + FEASIBILITY_TOL)
 
 
 def _conflict(conflict: tuple[str, ...]) -> SliderOptimum:

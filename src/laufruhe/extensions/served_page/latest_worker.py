@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import BrokenExecutor, CancelledError, Future
+from concurrent.futures import BrokenExecutor, CancelledError
 from typing import ParamSpec, TypeVar
 
 from laufruhe.errors import SolverError
@@ -26,10 +26,7 @@ class Late(SolverError):
 class LatestWorker:
     """Runs the newest request in its own process; older waiting requests are dropped.
 
-    Parameters
-    ----------
-    patience
-        Seconds that a newer request waits for one at work, before that is ended with its process.
+    A newer request waits `patience` seconds for one at work, before that is ended with its process.
     """
 
     def __init__(self, patience: float) -> None:
@@ -43,21 +40,16 @@ class LatestWorker:
     def ask(self, seconds: float, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Run the work in the process and return its result.
 
-        Parameters
-        ----------
-        seconds
-            Time limit of the work.
-
-        Raises
-        ------
-        Superseded
-            If a newer request came before the answer.
-        Late
-            If the work exceeds `seconds`.
+        Raise `Superseded` if a newer request came before the answer, and `Late` if the work exceeds some seconds.
         """
         request_number, workers = self._turn()
         try:
-            return self._submitted(workers, work, *args, **kwargs).result(seconds)
+            try:
+                future = workers.submit(work, *args, **kwargs)
+            except RuntimeError:
+                # ended by a newer request a moment ago
+                raise Superseded from None
+            return future.result(seconds)
         except TimeoutError:
             self._end(workers)
             raise Late(f"it took longer than {seconds:.0f} s and was ended") from None
@@ -71,13 +63,6 @@ class LatestWorker:
                 if self._workers is workers or self._workers is None:
                     self._busy = False
                 self._changed.notify_all()
-
-    def _submitted(self, workers: Processes, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        try:
-            return workers.submit(work, *args, **kwargs)
-        except RuntimeError:
-            # ended by a newer request a moment ago
-            raise Superseded from None
 
     def _turn(self) -> tuple[int, Processes]:
         """Wait until the process is free; end overdue work."""

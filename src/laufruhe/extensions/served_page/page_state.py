@@ -31,16 +31,12 @@ class Edit:
 
 @dataclass(frozen=True)
 class PageState:
-    """State of a page.
+    """State of a page: edits by the user, and the numbers of the design that is shown by name [SI].
 
     Attributes
     ----------
-    edits
-        Edits by the user.
     fixed
         Open numbers that stay where the last whole solution had them, while what is affine follows a slider.
-    design
-        Numbers of the design that is shown, by name [SI].
     has
         Key of the model that the page has; `LATER` where it wants none yet.
     position
@@ -85,15 +81,12 @@ class PageState:
 def _edits(body: object, where: str) -> tuple[Edit, ...]:
     if not isinstance(body, list) or len(body) > MAX_EDITS:
         raise _strange(where, f"is no list of at most {MAX_EDITS} changes")
-    return tuple(_edit(entry, where) for entry in body)
-
-
-def _edit(body: object, where: str) -> Edit:
-    if not isinstance(body, list) or len(body) != 3 or body[0] not in _WAYS or not isinstance(body[1], str):
-        raise _strange(where, "holds a change that is none of: " + ", ".join(_WAYS))
-    if not _is_plain(body[2]) or len(body[1]) > LONGEST:
-        raise _strange(where, f"holds a value of '{body[1][:LONGEST]}' that no number has")
-    return Edit(*body)
+    for entry in body:
+        if not isinstance(entry, list) or len(entry) != 3 or entry[0] not in _WAYS or not isinstance(entry[1], str):
+            raise _strange(where, "holds a change that is none of: " + ", ".join(_WAYS))
+        if not _is_plain(entry[2]) or len(entry[1]) > LONGEST:
+            raise _strange(where, f"holds a value of '{entry[1][:LONGEST]}' that no number has")
+    return tuple(Edit(*entry) for entry in body)
 
 
 def _is_number(value: object) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, plural
 from laufruhe.extensions.served_page.claims import Simplification, join_phrases
 from laufruhe.extensions.served_page.drawing import drawing_of
 from laufruhe.extensions.served_page.follower import Follower, SliderOptimum, can_follow
@@ -76,15 +76,15 @@ class PageScene:
         limit_values_of_design = limit_values(replace(self.problem, limits=tuple(limits)), design)
         if followed is None or followed.conflict:
             return limit_values_of_design
-        pairs = zip(limits, limit_values_of_design, followed.prices, strict=True)
-        return tuple(self._priced(limit, stand, price, followed.value) for limit, stand, price in pairs)
-
-    def _priced(self, limit: Limit, stand: LimitValue, price: float, value: float) -> LimitValue:
-        if limit.measure not in {load_limit.measure for load_limit in self.problem.load_limits}:
-            return replace(stand, shadow_price=math.nan) if stand.active else stand
-        # prices below the rounding of the objective count as zero
-        active = price * abs(limit.maximum) > ROUNDING * value
-        return replace(stand, active=active, shadow_price=price if active else 0.0)
+        priced, on_loads = [], {load_limit.measure for load_limit in self.problem.load_limits}
+        for limit, stand, price in zip(limits, limit_values_of_design, followed.prices, strict=True):
+            if limit.measure in on_loads:
+                # prices below the rounding of the objective count as zero
+                active = price * abs(limit.maximum) > ROUNDING * followed.value
+                priced.append(replace(stand, active=active, shadow_price=price if active else 0.0))
+            else:
+                priced.append(replace(stand, shadow_price=math.nan) if stand.active else stand)
+        return tuple(priced)
 
     def drawn(self, limits: tuple[Limit, ...], design: Evaluation, followed: SliderOptimum | None) -> dict[str, Any]:
         """Return the page's drawing data, or the reason for having no sliders."""
@@ -99,52 +99,36 @@ class PageScene:
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
     def simpler(self, fixed_kinds: Collection[Kind]) -> Simplification:
-        """Return what is fixed or neglected while sliders move.
-
-        Parameters
-        ----------
-        fixed_kinds
-            Kinds of open numbers that the page fixes at their last solution.
-        """
+        """Return what is neglected while sliders move, and what is fixed; the page fixes some kinds of open numbers."""
         problem = self.full_problem
         kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
         if problem.phasing is not None:
             kinds.add(Kind.STAR)
-        unread = [limit.name for limit in self.problem.limits if not self._is_followed(limit)]
+        moving, load_limits = open_kinds(self.problem), self.problem.load_limits
+        unread = [
+            limit.name
+            for limit in self.problem.limits
+            if limit not in load_limits and depends(limit.measure.channel, moving, self.problem)
+        ]
         left_out = [
             *(extra.words for extra in problem.extras),
             *(["later objectives"] if problem.ranks else []),
-            *([f"the limit{'s' if len(unread) > 1 else ''} on {join_phrases(unread)}"] if unread else []),
+            *([f"the {plural('limit', len(unread))} on {join_phrases(unread)}"] if unread else []),
         ]
         phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(kinds))
         return Simplification(tuple(phrases), tuple(left_out))
-
-    def _is_followed(self, limit: Limit) -> bool:
-        depends_on_sliders = depends(limit.measure.channel, open_kinds(self.problem), self.problem)
-        return limit in self.problem.load_limits or not depends_on_sliders
 
 
 _scenes: dict[str, PageScene] = {}
 
 
 def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageScene:
-    """Return the scene of a problem from a small cache."""
-    key = key_of(tables, content)
+    """Return the scene of a problem from a small cache; values of limits and files with equal content do not matter."""
+    limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
+    text = json.dumps([content, {**tables, "constraints": limits}], sort_keys=True, default=str)
+    key = hashlib.sha256(text.encode()).hexdigest()[:16]
     if key not in _scenes:
         while len(_scenes) >= _MAX_SCENES:
             _scenes.pop(next(iter(_scenes)))
         _scenes[key] = PageScene(problem, key)
     return _scenes[key]
-
-
-def key_of(tables: Mapping[str, Any], content: str) -> str:
-    """Return a hash of the problem without the values of its limits.
-
-    Parameters
-    ----------
-    content
-        Hash of the files that the problem names.
-    """
-    limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
-    text = json.dumps([content, {**tables, "constraints": limits}], sort_keys=True, default=str)
-    return hashlib.sha256(text.encode()).hexdigest()[:16]

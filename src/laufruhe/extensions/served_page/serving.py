@@ -36,21 +36,16 @@ _HASTE, _PATIENCE = 5.0, 1.0
 
 
 class Page:
-    """A server with its worker processes.
+    """A server of a problem file with its worker processes; without a port at the usual one, or a free one.
 
-    Parameters
-    ----------
-    path
-        Path of the problem file.
-    port
-        Port; None takes the usual one, or a free one.
-    seconds
-        Time limit of a search.
+    The time limit of a search is in seconds.
     """
 
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:
         self.watched = FileWatcher(path)
-        self.server = _start_server(port, _files())
+        folder = files("laufruhe.extensions.served_page") / "static"
+        texts = {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir() if file.is_file()}
+        self.server = _start_server(port, {**texts, **page_assets()})
         self._follow, self._measure = LatestWorker(_HASTE), LatestWorker(_HASTE)
         self._settle, self._front = LatestWorker(_PATIENCE), LatestWorker(_PATIENCE)
         self.server.handles = {
@@ -116,9 +111,16 @@ class Page:
         self, worker: LatestWorker, maximum: int, work: Callable[..., str], state: PageState, *arguments: Any
     ) -> HttpAnswer:
         source = self.watched.source
-        return HttpAnswer(
-            lines=_lines_of(lambda k: partial(worker.ask, FOLLOWED, work, source, state, *arguments, k), maximum)
-        )
+
+        def lines() -> Iterator[str]:
+            for k in range(maximum):
+                text = _to_answer(partial(worker.ask, FOLLOWED, work, source, state, *arguments, k)).text
+                yield text
+                if text.startswith(('{"error"', '{"done"', '{"dropped"')):
+                    return
+            yield '{"done": true}'
+
+        return HttpAnswer(lines=lines())
 
     def _front_lines(self, body: Any) -> HttpAnswer:
         across = body.pop("across", None) if isinstance(body, dict) else None
@@ -144,15 +146,6 @@ def _read(answer: Callable[[PageState], HttpAnswer]) -> Callable[[Any], HttpAnsw
     return answered
 
 
-def _lines_of(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[str]:
-    for k in range(maximum):
-        text = _to_answer(work(k)).text
-        yield text
-        if text.startswith(('{"error"', '{"done"', '{"dropped"')):
-            return
-    yield '{"done": true}'
-
-
 def _to_answer(work: Callable[[], str]) -> HttpAnswer:
     try:
         return HttpAnswer(work())
@@ -165,25 +158,15 @@ def _to_answer(work: Callable[[], str]) -> HttpAnswer:
         return HttpAnswer(json.dumps({"error": text}))
     except Exception as error:
         # a program fault must not end the page
-        return HttpAnswer(
-            json.dumps({"error": printed(f"this state cannot be worked out: {type(error).__name__}: {error}")})
-        )
+        text = printed(f"this state cannot be worked out: {type(error).__name__}: {error}")
+        return HttpAnswer(json.dumps({"error": text}))
 
 
 def _bad_request(complaint: Complaint) -> HttpAnswer:
     return HttpAnswer(json.dumps({"error": str(complaint)}), status=HTTPStatus.BAD_REQUEST)
 
 
-def _files() -> dict[str, str]:
-    folder = files("laufruhe.extensions.served_page") / "static"
-    texts = {
-        f.name: f.read_text(encoding="utf-8") for f in folder.iterdir() if f.name.endswith((".html", ".js", ".css"))
-    }
-    return {**texts, **page_assets()}
-
-
 def _start_server(port: int | None, texts: dict[str, str]) -> Server:
-    # without a port at the usual one, or at a free one
     try:
         return Server(USUAL_PORT if port is None else port, texts)
     except OSError as error:
