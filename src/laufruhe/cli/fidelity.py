@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -37,30 +38,28 @@ def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
     """Return the text on the fidelity that a problem needs, and a function that makes JSON of it."""
     problem = _with_objective(path)
     choice = choose(problem, tolerance) if problem.load_terms else needs(problem)
-    times = _load_times(problem, choice) if problem.load_terms else _mount_times(problem, choice)
-    return explain.as_text(problem, choice, tolerance, times), lambda: explain.as_json(
-        problem, choice, tolerance, times
-    )
+    answer = (problem, choice, tolerance, _times(problem, choice))
+    return explain.as_text(*answer), lambda: explain.as_json(*answer)
 
 
-def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    # milliseconds of one design at the chosen fidelity, and exactly over the whole cycle
-    exact = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
-    times = []
-    for fidelity, prune in ((choice.fidelity, True), (exact, False)):
-        # the time does not depend on the other decisions
-        fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
-        designs = prepare(fixed, prune)
-        start = np.zeros((1, 1 + designs.columns))
-        times.append(1e3 * seconds(lambda d=designs, x=start: d.objective_from_features(x)))  # type: ignore[misc]
-    return times[0], times[1]
-
-
-def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    # milliseconds of mount measures with the loads that they need, and with all loads
-    needed = problem if choice.numbers[0] else replace(problem, points=())
-    times = [1e3 * seconds(lambda p=p: objective_value(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
-    return times[0], times[1]
+def _times(problem: Problem, choice: Choice) -> tuple[float, float]:
+    """Return milliseconds of one design with the physics that the objective needs, and with all of it."""
+    works: list[Callable[[], object]] = []
+    if problem.load_terms:
+        exact = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
+        for fidelity, prune in ((choice.fidelity, True), (exact, False)):
+            # the time does not depend on the other decisions
+            fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
+            designs = prepare(fixed, prune)
+            works.append(partial(designs.objective_from_features, np.zeros((1, 1 + designs.columns))))
+    else:
+        needed_part = problem if choice.numbers[0] else replace(problem, points=())
+        works = [
+            lambda: objective_value(needed_part, evaluate(needed_part)),
+            lambda: objective_value(problem, evaluate(problem)),
+        ]
+    needed, whole = (1e3 * seconds(work) for work in works)
+    return needed, whole
 
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:

@@ -25,10 +25,7 @@ def write_results(
 ) -> None:  # fmt: skip
     """Write all files of a result into a folder, and a copy of its JSON.
 
-    Parameters
-    ----------
-    wait_for_pictures
-        Function that waits for the pictures: SVG by their names.
+    The pictures for which a function waits are SVG by their names.
     """
     if request.animated:
         from laufruhe.plots.motion import animate

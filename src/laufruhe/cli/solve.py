@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import typer
@@ -28,9 +27,31 @@ Answer = Callable[[Problem, Listener], Result]
 
 def run(request: Request, answer: Answer) -> None:
     """Read a problem, write and show its result, and exit with its status."""
-    with progress() as say:
-        result, show = _write(request, answer, say)
-    show()
+    seconds: dict[str, float] = {}
+    with progress() as say, ExitStack() as places:
+        say("reading the problem")
+        with timed(seconds, "load"):
+            problem = load(request.problem)
+            if request.tolerance is not None:
+                problem = replace(problem, tolerance=share_below_one("--tolerance", request.tolerance))
+        warn(problem, request.problem)
+        # a file called '...toml' would name the folder above
+        name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]
+        option, folder = ("results", Path("results") / name) if request.out is None else ("--out", request.out)
+        stage = places.enter_context(files.staged(files.FileSet(folder, option, request.verb)))
+        copy = json_file(request.json, [request.problem], places)
+        open_numbers = len(problem.decisions)
+        what = "stars and firing orders" if problem.phasing is not None else counted(open_numbers, "open number")
+        what = " and ".join(name for extra in problem.extras for name in extra.open_names) or what
+        say(f"deciding {what}" if problem.open_names else "evaluating")
+        result = answer(problem, Watched(say, problem.objective_unit or ""))
+        wait_for_pictures = drawing(request.ask, result, stage, request.kinds)
+        # imported while pictures are drawn
+        from laufruhe.cli.results import show, write_results
+
+        result = replace(result, timing={**result.timing, **seconds})
+        write_results(request, result, stage, copy, wait_for_pictures, say)
+    show(request, result, folder)
     raise typer.Exit(DONE if result.status.has_design else FAILED)
 
 
@@ -49,32 +70,3 @@ def solve(problem: Problem, listener: Listener) -> Result:
         return solvers.solve(replace(problem, sharply=True), listener, diagnose=True)
     except SolverError as error:
         return replace(solvers.evaluate_only(problem, allow_resonance=True), status=Status.FAILED, message=str(error))
-
-
-def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Callable[[], None]]:
-    """Return the result after writing its files, and a function that shows it."""
-    say("reading the problem")
-    seconds: dict[str, float] = {}
-    with timed(seconds, "load"):
-        problem = load(request.problem)
-        if request.tolerance is not None:
-            problem = replace(problem, tolerance=share_below_one("--tolerance", request.tolerance))
-    warn(problem, request.problem)
-    with ExitStack() as places:
-        # a file called '...toml' would name the folder above
-        name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]
-        option, folder = ("results", Path("results") / name) if request.out is None else ("--out", request.out)
-        stage = places.enter_context(files.staged(files.FileSet(folder, option, request.verb)))
-        copy = json_file(request.json, [request.problem], places)
-        open_numbers = len(problem.decisions)
-        what = "stars and firing orders" if problem.phasing is not None else counted(open_numbers, "open number")
-        what = " and ".join(name for extra in problem.extras for name in extra.open_names) or what
-        say(f"deciding {what}" if problem.open_names else "evaluating")
-        result = answer(problem, Watched(say, problem.objective_unit or ""))
-        wait_for_pictures = drawing(request.ask, result, stage, request.kinds)
-        # imported while pictures are drawn
-        from laufruhe.cli.results import show, write_results
-
-        result = replace(result, timing={**result.timing, **seconds})
-        write_results(request, result, stage, copy, wait_for_pictures, say)
-    return result, partial(show, request, result, folder)

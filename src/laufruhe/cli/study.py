@@ -71,7 +71,6 @@ class _Progress:
         began, before = self._first
         if before < done < total:
             seconds = (now - began) / (done - before) * (total - done)
-            remaining = (
-                f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
-            )
+            time_left = f"{seconds / 60.0:.0f} min" if seconds >= 100.0 else f"{seconds:.0f} s"
+            remaining = f", about {time_left} left"
         self._say(f"{done} of {total} points{remaining}")

@@ -33,16 +33,10 @@ def points_with_chambers(result: Result) -> list[tuple[OperatingPoint, Chambers]
 
 @dataclass(frozen=True)
 class Indicator:
-    """Indicator diagram of one cylinder.
+    """Indicator diagram of one cylinder: absolute pressure [Pa] of its chambers by name over the travel.
 
-    Attributes
-    ----------
-    travel
-        Part of the stroke from the head end.
-    pressures
-        Absolute, by the name of the chamber [Pa].
-    force, needed
-        Force of the chambers on the rod, towards the crank, and force that accelerates the reciprocating mass [N].
+    The travel is a part of the stroke from the head end. The chambers exert a force on the rod towards the crank [N];
+    another one is needed to accelerate the reciprocating mass.
     """
 
     travel: Array

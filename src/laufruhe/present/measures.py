@@ -31,15 +31,7 @@ from laufruhe.solvers.values import LimitValue
 
 @dataclass(frozen=True)
 class Places:
-    """A force, or its power, shown place by place.
-
-    Attributes
-    ----------
-    key
-        Key in `result.json`.
-    title, place
-        Title of the table, and head of its first column.
-    """
+    """A force, or its power, shown place by place: key in `result.json`, and title and first head of its table."""
 
     key: str
     channel: LoadChannel
@@ -167,7 +159,7 @@ def designs_with_loads(result: Result) -> dict[str, Evaluation]:
 
 
 def evaluations_with_loads(result: Result) -> list[Evaluation]:
-    """Return the designs of `loaded` as a list."""
+    """Return the designs with finite loads as a list."""
     return list(designs_with_loads(result).values())
 
 

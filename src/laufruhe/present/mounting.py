@@ -32,17 +32,15 @@ class MountingFacts:
     orders
         Orders that make most of the load, the strongest first.
     sag, mount_sag
-        Static sag of the centre of gravity, and at every mount, downwards [m].
+        Static sag of the centre of gravity, and at every mount, downwards.
     torque_travel
-        Largest displacement of any mount under the mean torque [m].
-    torque_roll_axis, torque_roll_coupling, torque_roll_frequency
-        Unit vector, what is zero where turning about it is a mode (E8), and the frequency of the mode that comes
-        nearest [Hz] (E46).
-    depends_on_frequency
-        True if stiffness does: modes then use the stiffness at rest (E50).
+        Largest displacement of any mount under the mean torque.
+    torque_roll_coupling, torque_roll_frequency
+        Zero if turning about the torque-roll axis is a mode (E8), and frequency of the mode that comes nearest (E46).
     with_fluid
-        Natural frequencies of the block and the fluid of its mounts together, undamped [Hz]; none without fluid
-        tracks (E50).
+        Undamped natural frequencies of the block and the fluid of its mounts together; none without fluid tracks (E50).
+    depends_on_frequency
+        True if stiffness depends on frequency: modes then use the stiffness at rest (E50).
     """
 
     modes: Modes
@@ -66,13 +64,12 @@ def is_elastic(result: Result) -> bool:
 def facts_of(evaluation: Evaluation) -> MountingFacts:
     """Return the facts of a design on elastic mounts."""
     mounting = mounting_in(evaluation.engine)
-    excited = sorted({j for loads in evaluation.loads for j in mounting.excited(loads.wrench)})
     weight = static_motion(mounting.modes, weight_wrench(mounting.block))
     travels = [np.abs(np.linalg.norm(loads.mount_travel.coefficients[0], axis=-1)).max()
                for loads in evaluation.loads if loads.mount_travel is not None]  # fmt: skip
     return MountingFacts(
         modes=mounting.modes,
-        excited=tuple(excited),
+        excited=tuple(sorted({j for loads in evaluation.loads for j in mounting.excited(loads.wrench)})),
         orders=main_orders(evaluation, mounting),
         sag=mount_numbers.sag(mounting),
         mount_sag=np.asarray(-(mounting.motions @ weight)[:, 2]),

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    from laufruhe.solvers.values import DecisionValue, LimitValue
 
 DASH = "-"
 RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
@@ -14,13 +17,7 @@ ROUNDS_TO_ZERO = 1e-9
 
 
 def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
-    """Return a number with `digits` figures, without an exponent where possible.
-
-    Parameters
-    ----------
-    scale
-        Reference size: numbers that are a rounding of it become 0.
-    """
+    """Return a number with `digits` figures, without an exponent where possible; roundings of the scale become 0."""
     if not math.isfinite(value):
         return DASH
     if value == 0.0 or abs(value) <= ROUNDS_TO_ZERO * scale:
@@ -96,23 +93,7 @@ def price_of(price: float, unit: str, limit_unit: str, with_zero: bool = False) 
     return f"{number(price * factor / limit_factor)} {units}".rstrip()
 
 
-class Priced(Protocol):
-    """Limit or bound with a price on either side."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the priced number."""
-
-    @property
-    def shadow_price(self) -> float:
-        """Price of relaxing the edge."""
-
-    @property
-    def tightening_price(self) -> float | None:
-        """Price of tightening the edge, if it differs."""
-
-
-def prices_of(priced: Priced, unit: str, with_zero: bool = False) -> str:
+def prices_of(priced: LimitValue | DecisionValue, unit: str, with_zero: bool = False) -> str:
     """Return the shadow price of a limit or bound, and the price of tightening it if that differs."""
     tightening = priced.tightening_price
     if tightening is None or math.isnan(tightening):

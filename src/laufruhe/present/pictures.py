@@ -10,16 +10,10 @@ from laufruhe.extension import extended
 
 @dataclass(frozen=True)
 class ResultPicture:
-    """Entry of a result's picture.
+    """Name and caption of a result's picture.
 
-    Attributes
-    ----------
-    name
-        Name of its files.
-    caption
-        Words under it.
-    home
-        Module with `applies` and `figure`, which take a result; a file of that name in `plots.results` by default.
+    The functions `applies` and `figure` of its home module take a result; by default it is the module of that name in
+    `plots.results`.
     """
 
     name: str
