@@ -12,15 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import (
-    Refused,
-    errors_at_key,
-    nearest,
-    refuse_keys,
-    require_distinct,
-    require_one_of,
-    si_value,
-)
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_distinct, si_value
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Block, Mount
@@ -193,7 +185,9 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
 
 
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
-    require_one_of(table, "mounts", "positions", "places", named="[[mounts.places]]")
+    if bool(table.positions) == bool(table.places):
+        state = "is missing" if not table.positions else "is given twice, as positions and as places"
+        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
     places = list(table.places) or [MountTable.model_construct(position=list(p)) for p in table.positions]
     names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
     if len(names) != len(places):
@@ -308,12 +302,16 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
     leader = place.like or place.mirror_of
     if leader is None:
         return None
-    if leader not in names[:k]:
-        key = "like" if place.like else "mirror_of"
-        remedy = nearest(leader, names[:k]) if k else "define the other mount first"
-        raise Refused(f"{where}.{key}", leader, "is no mount defined before this one", remedy)
+    number = _number_before(leader, names[:k], f"{where}.{'like' if place.like else 'mirror_of'}")
     refuse_keys(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
-    return names.index(leader)
+    return number
+
+
+def _number_before(name: str, earlier: Sequence[str], where: str) -> int:
+    if name not in earlier:
+        remedy = nearest(name, earlier) if earlier else "define the other mount first"
+        raise Refused(where, name, "is no mount defined before this one", remedy)
+    return earlier.index(name)
 
 
 def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: str) -> int:
@@ -321,10 +319,7 @@ def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: st
     k, leader = len(joins), place.joined_to
     if leader is None:
         return k
-    if leader not in names[:k]:
-        remedy = nearest(leader, names[:k]) if k else "define the other mount first"
-        raise Refused(f"{where}.joined_to", leader, "is no mount defined before this one", remedy)
-    first = joins[names.index(leader)]
+    first = joins[_number_before(leader, names[:k], f"{where}.joined_to")]
     if names[first] != leader:
         remedy = f"name that one, '{names[first]}'"
         raise Refused(f"{where}.joined_to", leader, "is joined to another mount itself", remedy)

@@ -174,11 +174,11 @@ def tables_of(path: Path) -> dict[str, Any]:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except IsADirectoryError:
-        raise _unreadable(path, "is a folder", "name a problem file in it") from None
+        raise refused("file", "", "is a folder", "name a problem file in it", path) from None
     except FileNotFoundError:
-        raise _unreadable(path, "does not exist", nearest_file(path, "check the path")) from None
+        raise refused("file", "", "does not exist", nearest_file(path, "check the path"), path) from None
     except OSError as error:
-        raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+        raise refused("file", "", f"cannot be read ({error.strerror})", "check its permissions", path) from None
     return _merged(_parsed(content, path), path)
 
 
@@ -210,11 +210,11 @@ def _standard_input() -> bytes:
 
 def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     if len(content) > MAX_BYTES:
-        raise _unreadable(path, f"is larger than {MAX_BYTES // 1_000_000} MB", "a problem takes a few kB")
+        raise refused("file", "", f"is larger than {MAX_BYTES // 1_000_000} MB", "a problem takes a few kB", path)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
+        raise refused("file", "", f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8", path) from None
     deep = line_deeper_than(DEEPEST, text)
     if deep is not None:
         raise refused(f"line {deep}", "", f"is nested more than {DEEPEST} deep", "flatten it", path)
@@ -224,16 +224,12 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
         raise InputError(str(path), (toml_complaint(content, error),)) from None
     except ValueError:
         # the parser raises a plain ValueError only for integers with thousands of digits
-        raise _unreadable(path, "contains a whole number of thousands of digits", "shorten it") from None
+        raise refused("file", "", "contains a whole number of thousands of digits", "shorten it", path) from None
 
 
 def is_study(path: Path) -> bool:
     """Return True for a study file."""
     return "study" in tables_of(path)
-
-
-def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
-    return refused("file", "", rule, remedy, path)
 
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:

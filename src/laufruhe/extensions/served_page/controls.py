@@ -21,9 +21,10 @@ _OF_ENGINE = {
     "split_pin_angle": ("Split pins", 0.0, 60.0),
 }
 _WHOLE_TURN = ("bank_angle", "split_pin_angle")
-_LOADS = {"imep": "indicated mean pressure", "bmep": "brake mean pressure", "brake_torque": "torque at the brake"}
-_SPEEDS = {"speed": "speed", "mean_piston_speed": "mean piston speed"}
-_AXES = "xyz"
+_OF_POINT = {
+    "speed": "Engine speed", "mean_piston_speed": "Engine mean piston speed", "imep": "Load, indicated mean pressure",
+    "bmep": "Load, brake mean pressure", "brake_torque": "Load, torque at the brake",
+}  # fmt: skip
 _NARROW, _WIDE, _STEPS = 0.25, 2.0, 200
 
 
@@ -96,10 +97,8 @@ def _of_points(tables: Mapping[str, Any]) -> Iterator[Control]:
     points, gas = tables.get("operating_points", []), tables.get("gas", {})
     for k, point in enumerate(points):
         at = f", {point.get('name') or f'point {k + 1}'}" if len(points) > 1 else ""
-        for key, words in _SPEEDS.items():
-            yield from _around(f"operating_points.{k + 1}.{key}", "Engine", f"Engine {words}{at}", point.get(key))
-        for key, words in _LOADS.items():
-            yield from _around(f"operating_points.{k + 1}.{key}", "Engine", f"Load, {words}{at}", point.get(key))
+        for key, label in _OF_POINT.items():
+            yield from _around(f"operating_points.{k + 1}.{key}", "Engine", f"{label}{at}", point.get(key))
     yield from _around("gas.imep", "Engine", "Load, indicated mean pressure", gas.get("imep"))
 
 
@@ -142,14 +141,10 @@ def as_typed(value: float, unit: str) -> str | float:
 
 def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
     mounts = tables.get("mounts", {})
-    tables_by_path = [("mounts", "All mounts", mounts)]
-    tables_by_path += [
-        (f"mounts.places.{k + 1}", m.get("name", str(k + 1)), m) for k, m in enumerate(mounts.get("places", []))
-    ]
-    for path, name, table in tables_by_path:
-        for axis, entry in zip(_AXES, table.get("stiffness") or [], strict=False):
-            place = _AXES.index(axis) + 1
-            yield from _around(f"{path}.stiffness.{place}", "Mounts", f"{name}, stiffness {axis}", entry)
+    places = [(f"mounts.places.{k}", m.get("name", str(k)), m) for k, m in enumerate(mounts.get("places", []), 1)]
+    for path, name, table in (("mounts", "All mounts", mounts), *places):
+        for k, (axis, entry) in enumerate(zip("xyz", table.get("stiffness") or [], strict=False), 1):
+            yield from _around(f"{path}.stiffness.{k}", "Mounts", f"{name}, stiffness {axis}", entry)
 
 
 def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
