@@ -27,15 +27,7 @@ _SEPARATORS = {"firing_order": r"[-,;\s]+", "throws": r"[,;\s]+"}
 
 @dataclass(frozen=True)
 class _Question:
-    """Question about a key of [engine].
-
-    Attributes
-    ----------
-    usual
-        Default answer.
-    choices
-        All possible answers; empty if there are many.
-    """
+    """Question about a key of [engine] with its default answer, and all possible answers if these are few."""
 
     key: str
     words: str

@@ -29,7 +29,7 @@ LONGEST = 10_000
 """Largest number of characters of a printed command."""
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
-ProofData: TypeAlias = str | Callable[[TextIO], None]
+Output: TypeAlias = str | Callable[[TextIO], None]
 """Output of a command: a text, or a function that writes one to a stream."""
 
 
@@ -67,14 +67,14 @@ def timed(seconds: dict[str, float], what: str) -> Iterator[None]:
 
 
 @contextmanager
-def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[ProofData, Callable[[], str]], None]]:
+def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Output, Callable[[], str]], None]]:
     """Yield a function that prints text and writes JSON; a file that cannot be written is refused on entry."""
     from laufruhe.report import files
 
     with ExitStack() as places:
         place = json_file(json, problems, places)
 
-        def hand_out(text: ProofData, data: Callable[[], str]) -> None:
+        def hand_out(text: Output, data: Callable[[], str]) -> None:
             if not is_quiet():
                 stream = sys.stderr if json == "-" else sys.stdout
                 if isinstance(text, str):

@@ -75,17 +75,7 @@ PHASES = ("throws", "firing_order", "bank_angle", "split_pin_angle")
 
 
 def with_star(tables: Mapping[str, Any], star: Mapping[str, Any], gone: Collection[str]) -> dict[str, Any]:
-    """Return tables with a fixed crank star, without open phasing.
-
-    Parameters
-    ----------
-    tables
-        Tables of a problem file.
-    star
-        Values of the keys in `PHASES`: throws, firing order, bank angles.
-    gone
-        Names of balancer shafts to remove.
-    """
+    """Return tables with a crank star that fixes the keys in `PHASES`, and without the balancer shafts in `gone`."""
     phases = {key: star[key] for key in PHASES if star.get(key) is not None}
     edited = {**tables, "engine": {**tables["engine"], **phases}}
     edited.pop("phasing", None)

@@ -50,13 +50,13 @@ class Guard:
     def refusal(self, method: str, headers: Mapping[str, str]) -> str:
         """Return the reason to refuse a request; empty for a good one."""
         if headers.get("Host", "") not in self.hosts:
-            return "Host is not this server"
+            return "the header Host does not name this server"
         origin = headers.get("Origin")
         allowed_origins = [f"http://{host}" for host in self.hosts]
         if (origin is not None or method == "POST") and origin not in allowed_origins:
-            return "Origin is not this page"
+            return "the header Origin does not name this page"
         if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
-            return "asked for by another site"
+            return "the request comes from another site"
         return ""
 
     def knows(self, token: str | None) -> bool:

@@ -37,15 +37,7 @@ Handle = Callable[[Any], HttpAnswer]
 
 
 class Server(ThreadingHTTPServer):
-    """Threaded server of one page, reachable from this machine only.
-
-    Parameters
-    ----------
-    port
-        Port; 0 takes a free one.
-    files
-        Texts that are handed out, by their names.
-    """
+    """Threaded server of one page and its files, reachable from this machine only; port 0 takes a free one."""
 
     daemon_threads = True
     block_on_close = False
@@ -157,7 +149,7 @@ class HttpRequest(BaseHTTPRequestHandler):
         if refusal:
             self._refused(HTTPStatus.FORBIDDEN, refusal)
         elif path not in self.server.files:
-            self._refused(HTTPStatus.NOT_FOUND, "no such page")
+            self._refused(HTTPStatus.NOT_FOUND, "this server has no such page")
         else:
             kind = _TYPES[path.rsplit(".", 1)[1]]
             self._send(HTTPStatus.OK, self.server.files[path], f"{kind}; charset=utf-8")
@@ -171,7 +163,7 @@ class HttpRequest(BaseHTTPRequestHandler):
         elif self.path != "/token" and not guard.knows(self.headers.get(TOKEN)):
             self._refused(HTTPStatus.UNAUTHORIZED, "open the page by the address that laufruhe printed")
         elif self.path != "/token" and self.path not in self.server.handles:
-            self._refused(HTTPStatus.NOT_FOUND, "no such request")
+            self._refused(HTTPStatus.NOT_FOUND, "this server knows no such request")
         else:
             body = self._body()
             self.server.has_read(self.connection)
@@ -187,16 +179,16 @@ class HttpRequest(BaseHTTPRequestHandler):
         """Return the request's JSON; None after refusing it."""
         length = self.headers.get("Content-Length", "")
         if self.headers.get("Transfer-Encoding") is not None or not length.isdecimal() or len(length) > 9:
-            return self._refused(HTTPStatus.LENGTH_REQUIRED, "tell the length of the request")
+            return self._refused(HTTPStatus.LENGTH_REQUIRED, "the length of the request is missing")
         if int(length) > MAX_BYTES:
-            return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MAX_BYTES} bytes are read")
+            return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"the request is larger than {MAX_BYTES} bytes")
         if self.headers.get_content_type() != _JSON:
-            return self._refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send JSON")
+            return self._refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "the request is not of type JSON")
         try:
             body = json.loads(self.rfile.read(int(length)), parse_constant=_no_number)
         except (ValueError, RecursionError):
-            return self._refused(HTTPStatus.BAD_REQUEST, "is no JSON")
-        return body if body is not None else self._refused(HTTPStatus.BAD_REQUEST, "is nothing")
+            return self._refused(HTTPStatus.BAD_REQUEST, "the request is no JSON")
+        return body if body is not None else self._refused(HTTPStatus.BAD_REQUEST, "the request is null")
 
     def _exchanged(self, body: Any) -> HttpAnswer:
         ticket = body.get("ticket") if isinstance(body, dict) else None
@@ -246,5 +238,5 @@ class HttpRequest(BaseHTTPRequestHandler):
         self._refused(HTTPStatus(code), message or HTTPStatus(code).phrase)
 
 
-def _no_number(_: str) -> float:
-    raise ValueError("is no number")
+def _no_number(name: str) -> float:
+    raise ValueError(f"{name} is no number of JSON")
