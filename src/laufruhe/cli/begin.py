@@ -42,7 +42,7 @@ def _someone_answers() -> bool:
 
 
 def _requested_source(file: Path) -> str | None:
-    # None for an engine that the user describes
+    # an engine that the user describes has no source
     if not _someone_answers():
         rule, remedy = "asks questions, and nobody is there to answer", "add --from with an engine or a ready problem"
         raise refused("init", "", rule, remedy)
@@ -70,7 +70,7 @@ def copy_ready(names: Sequence[str], folder: Path) -> str:
 
 
 def _write(texts: Mapping[Path, str]) -> None:
-    # writes no text if one would replace another file
+    # no text is written if one would replace another file
     for path, text in texts.items():
         above = next(above for above in (path, *path.parents) if above.exists())
         if path.is_dir():

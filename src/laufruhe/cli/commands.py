@@ -345,7 +345,7 @@ def _run() -> NoReturn:
 
 
 def _leave(status: int) -> NoReturn:
-    # ends at once: unloading imported solvers would cost a fifth of the whole run;
+    # the process ends at once: unloading imported solvers would cost a fifth of the whole run;
     # after an interrupted import Python would end by the signal, and lose the status
     try:
         sys.stdout.flush()

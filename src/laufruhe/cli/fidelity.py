@@ -107,7 +107,7 @@ def _measured(
         trade_result = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
         yield 0, trade_result, _pages(paths[0], trade_result)
         return
-    # longest first, so that all end at about the same time
+    # the longest comes first, so that all end at about the same time
     order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
     pieces = [(paths[k], tables_of(paths[k])) for k in order]
     with (
@@ -122,7 +122,7 @@ def _measured(
 
 
 def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
-    # leaves out functions, which have no pickle; None if time is over
+    # functions have no pickle; a worker without time has no answer
     path, tables = piece
     try:
         trade_result = trade(load_tables(tables, path))
@@ -134,7 +134,7 @@ def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Page
 
 
 def _pages(path: Path, trade_result: Trade) -> Pages:
-    # Markdown, HTML, and the picture if there is one
+    # the pages are Markdown, HTML, and the picture if there is one
     from laufruhe.plots.style import as_png, as_svg
     from laufruhe.plots.trade import figure, has_picture
 

@@ -103,7 +103,7 @@ def _applies(key: str, answers: Answers) -> bool:
 
 
 def _read(question: _Question, before: Answers, text: str) -> Any:
-    # the answer as a file has it
+    # the answer becomes what a file has
     if question.choices and text not in question.choices:
         raise refused(question.key, text, "is none of these", nearest(text, question.choices))
     separators = _SEPARATORS.get(question.key)
@@ -136,7 +136,7 @@ def _check(answers: Answers) -> None:
 
 
 def _usual_order(answers: Answers) -> str:
-    # firing order of the first possible engine of the catalogue
+    # the order is that of the first possible engine of the catalogue
     for engine in engines().values():
         order = engine.engine.get("firing_order", ())
         if engine.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:

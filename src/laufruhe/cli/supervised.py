@@ -72,7 +72,7 @@ def listen() -> None:
 
 
 def _interrupted(number: int, _: FrameType | None) -> None:
-    # only once, so that cleaning up is not interrupted
+    # a second signal does not interrupt cleaning up
     first = not is_interrupted()
     _heard.append(number)
     if first:

@@ -111,7 +111,7 @@ def value_text(value: Any) -> str:
 
 
 def _plain(word: str) -> str:
-    # small letters, words in alphabetical order
+    # words have small letters and stand in alphabetical order
     return " ".join(sorted(re.split(r"[\s_-]+", word.lower())))
 
 

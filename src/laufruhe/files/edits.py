@@ -86,7 +86,7 @@ def with_star(tables: Mapping[str, Any], star: Mapping[str, Any], gone: Collecti
 
 
 def _default_start(low: Any, high: Any) -> Any:
-    # zero, or the nearest bound
+    # the default is zero, or the bound nearest to it
     if not _is_negative(low):
         return low
     if _is_negative(high):
@@ -168,7 +168,7 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
 
 
 def _below(table: Mapping[str, Any], words: list[str]) -> Keys | None:
-    # address within the table of a part of the words after its name
+    # the words after the name of a part are an address within its table
     if len(words) == 2 and words[1] in _AXES and isinstance(table.get(words[0]), list):
         return words[0], _AXES[words[1]]
     if len(words) == 1 and words[0] in _ACROSS and "ratio" in table:

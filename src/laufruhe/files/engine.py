@@ -104,7 +104,7 @@ _KINDS: dict[str, Any] = {
 
 
 def _with_owned_keys(table: type[T]) -> type[T]:
-    # [engine] with the names of all layouts and drives, and with their own keys
+    # [engine] takes the names of all layouts and drives, and their own keys
     names: Any = tuple(LAYOUTS)
     drives: Any = tuple(DRIVES)
     fields: dict[str, Any] = {"layout": (Literal[names], ...), "drive": (Literal[drives], "slider-crank")}

@@ -188,7 +188,7 @@ class Number:
 
 
 def _without_note(text: str) -> str:
-    # complaint about a note of an extension that is not installed; empty for other texts
+    # the text may have a note of an extension that is not installed; other texts give no complaint
     home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
     return "" if not home or any(one.name == home for one in extensions()) else "; ".join(missing_extension(home))
 

@@ -263,7 +263,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
 
 
 def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
-    # frequency-dependent springs (E50, E51)
+    # these springs depend on frequency (E50, E51)
     laws: list[Dynamic] = []
     if (track := place.fluid_track) is not None:
         if track.bulge_stiffness == 0.0:

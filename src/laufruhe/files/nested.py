@@ -85,16 +85,16 @@ def _inside(annotation: Any, part: str | int) -> list[Any]:
     if get_origin(annotation) is list:
         return list(get_args(annotation))
     if isinstance(annotation, f.ListOrSingle):
-        # a list, or a single table without a list
+        # the value is a list, or a single table without a list
         return [annotation.inner, *_inside(annotation.inner, part)]
     if isinstance(annotation, f.OrOpen):
         return _inside(annotation.inner, part)
-    # annotated types and their notes, or the members of a union
+    # the members are those of a union, or an annotated type and its notes
     return [inner for member in get_args(annotation) for inner in _inside(member, part)]
 
 
 def _leaves(annotation: Any) -> Iterator[Any]:
-    # members of a union and notes of annotated types, without entries of lists
+    # leaves are members of a union and notes of annotated types, but no entries of lists
     if isinstance(annotation, f.ListOrSingle):
         yield from _leaves(annotation.inner)
     elif get_origin(annotation) is not list:

@@ -55,7 +55,7 @@ NOTE = Note(
 
 
 def _name(tables: Mapping[str, Any], place: Place) -> str:
-    # path of a number as in studies: entries of lists by name, or counted from 1
+    # the path of a number is that of studies: entries of lists have their names, or are counted from 1
     parts = list[str]()
     node: Any = tables
     for key in place:

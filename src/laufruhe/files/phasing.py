@@ -91,7 +91,7 @@ def open_phasing(
     cycle, count, bounds = cycle_of(engine), counts[0], None
     if isinstance(engine.throws, list) and engine.listed_throws is None:
         bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
-    # a layout that fixes its throws
+    # some layouts fix their throws
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
     throws = fixed.throws if fixed else engine.listed_throws
 
@@ -143,7 +143,7 @@ def open_phasing(
 
 
 def _has_open(value: object) -> bool:
-    # a key of [engine], or an entry of its list
+    # a key of [engine] may be open, or an entry of its list
     return any(part == "open" or isinstance(part, Open) for part in (value if isinstance(value, list) else [value]))
 
 
@@ -152,7 +152,7 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
 
 
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
-    # given order, or that of the first dead centres of given throws
+    # the order is that of the file, or that of the first dead centres of given throws
     if engine.listed_order is not None:
         return tuple(engine.listed_order)
     throws = engine.listed_throws
@@ -273,7 +273,7 @@ def _first(phasing: Phasing) -> Candidate:
 
 
 def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
-    # the given firing order, or the one with the most even intervals; None if these throws allow none
+    # the order is that of the file, or the one with the most even intervals; some throws allow none
     fixed_order = phasing.firing_order
     orders = lap_orders(phasing.cycle, layout, throws) if fixed_order is None else [fixed_order]
     allowed = []
@@ -287,7 +287,7 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
 def _closed(
     engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **keys: list[Any] | None
 ) -> EngineTable:
-    # [engine] with these throws, firing order and angles and no others
+    # the table keeps these throws, firing order and angles and no others
     update = {"cylinders": count, "throws": None, "firing_order": None, "bank_angle": bank, "split_pin_angle": split}
     return engine.model_copy(update=update | keys)
 

@@ -135,7 +135,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
 
 
 def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
-    # problem after one of the functions of `edits`
+    # the edit names one of the functions of `edits`
     with errors_in_file(origin.path):
         tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
     return load_tables(tables, origin.path)
@@ -284,7 +284,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:
-    # conversion of loads at the brake; None without [friction]
+    # a file without [friction] has no loads at the brake
     if file.friction is None:
         return None
     if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):

@@ -107,7 +107,7 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
 
 
 def _remedy(tables: dict[str, Any], node: Any, parts: Sequence[str], k: int) -> str:
-    # remedy for a path that fails at its part `k`
+    # the path fails at its part `k`
     for path in _paths(tables):
         remaining = iter(path)
         if path[-1] == parts[-1] and all(part in remaining for part in parts):
@@ -119,7 +119,7 @@ def _remedy(tables: dict[str, Any], node: Any, parts: Sequence[str], k: int) -> 
 
 
 def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    # entries of lists by their names
+    # entries of lists have their names
     for key, name in {key: name for name, key in _options(node).items()}.items():
         yield (*above, name)
         yield from _paths(node[key], (*above, name))
@@ -134,7 +134,7 @@ def parts_of(where: str) -> list[str]:
 
 
 def _options(node: Any) -> dict[str, Any]:
-    # keys or indices by their names; entries of lists also by numbers from one
+    # keys and indices have names; entries of lists also have numbers from one
     if isinstance(node, dict):
         return {key: key for key in node}
     if isinstance(node, list):

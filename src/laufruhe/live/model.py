@@ -85,7 +85,7 @@ def _filled(
 ) -> LiveModel:
     affine = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
-    # source of values that the page cannot compute
+    # the reason names the source of values that the page cannot compute
     source_text = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
     aside = f"cannot be followed live; {source_text.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)
@@ -206,7 +206,7 @@ def _design(
 
 
 def _reference(result: Result) -> Reference | None:
-    # design that the objective is compared with; None if another objective was bounded
+    # there is no design for comparison if another objective was bounded
     if result.problem.extras or not result.decisions:
         return None
     certificate, objective = result.certificate, result.objective

@@ -118,11 +118,11 @@ def signal_of(model: AffineModel, measure: Measure) -> Signal:
     problem, channel = model.problem, measure.load
     pairs = model.spectra(channel)
     every = [signal for constant_signal, by in pairs for signal in (constant_signal, *by)]
-    # the period of one evaluation, in whose steps its means and peaks are sought
+    # means and peaks are sought in steps of the period of one evaluation
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
     constants = with_common_base(base, [constant_signal for constant_signal, _ in pairs])
     columns = [with_common_base(base, by) for _, by in pairs]
-    # kinks of all signals, for every norm
+    # kinks are those of all signals, for every norm
     signals = [reduce(add, by, constant_signal) for constant_signal, by in zip(constants, columns, strict=True)]
     bends = kinks_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []

@@ -70,7 +70,7 @@ def offered_by(tables: Mapping[str, Any], problem: Problem) -> list[str]:
 
 
 def _number(entry: Any) -> tuple[float, str] | None:
-    # number and unit of a text or a plain number; None for anything else
+    # a text has a number and a unit, a plain number no unit; anything else is no number
     if isinstance(entry, int | float) and not isinstance(entry, bool):
         return float(entry), ""
     if not isinstance(entry, str):

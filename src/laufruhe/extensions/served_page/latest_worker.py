@@ -47,7 +47,7 @@ class LatestWorker:
             try:
                 future = workers.submit(work, *args, **kwargs)
             except RuntimeError:
-                # ended by a newer request a moment ago
+                # a newer request has just ended the process
                 raise Superseded from None
             return future.result(seconds)
         except TimeoutError:
