@@ -75,7 +75,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
             if bearing.shaft == placed.shaft and abs(bearing.x - placed.x) <= reach:
                 rule, remedy = (
                     f"lets its journal overlap that of bearing {placed.name}",
-                    "move one, or make it narrower",
+                    "move one of them, or make it narrower",
                 )
                 raise Refused(f"{where}.x", units.quantity_text(bearing.x, "m"), rule, remedy)
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
