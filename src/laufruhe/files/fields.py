@@ -18,7 +18,7 @@ from pydantic import (
     WithJsonSchema,
     create_model,
 )
-from pydantic_core import PydanticCustomError, core_schema
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from laufruhe import units
 from laufruhe.extension import HOMES, extensions, missing_extension
@@ -97,12 +97,10 @@ class Number:
     plain: float | None = None
     closed: str = ""
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         number = self._number_schema()
         if self.closed:
             return number
@@ -201,12 +199,10 @@ class OrOpen:
     example: str
     named: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.inner))
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         return {"anyOf": [handler(schema), {"enum": ["open", *dict(self.named)]} if self.named else {"const": "open"}]}
 
     def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
@@ -227,13 +223,11 @@ class ListOrSingle:
 
     inner: Any
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         list_type: Any = list[self.inner]  # type: ignore[name-defined]
         return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(list_type))
 
-    def __get_pydantic_json_schema__(
-        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         list_schema = handler(schema)
         return {"anyOf": [list_schema["items"], list_schema]}
 
@@ -358,9 +352,7 @@ class Table(BaseModel):
     """Reason why numbers in the table may not be open, as the end of a sentence "it ..."; empty if they may."""
 
     @classmethod
-    def __get_pydantic_json_schema__(
-        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the table.
 
         If `closed` gives a reason, no number may be open, and the schema does not offer bounds in place of a number.
