@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from laufruhe import units
 from laufruhe.errors import counted
@@ -22,7 +22,6 @@ from laufruhe.machine.layouts import LAYOUTS, Layout, LayoutInput, LayoutKind, M
 from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
-T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
@@ -103,7 +102,7 @@ _KINDS: dict[str, Any] = {
 }
 
 
-def _with_owned_keys(table: type[T]) -> type[T]:
+def _with_owned_keys(table: type[f.TableModel]) -> type[f.TableModel]:
     # [engine] takes the names of all layouts and drives, and their own keys
     names: Any = tuple(LAYOUTS)
     drives: Any = tuple(DRIVES)

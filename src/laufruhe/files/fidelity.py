@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE, automatic
 from laufruhe.fidelity.knobs import KNOBS
@@ -15,10 +15,8 @@ from laufruhe.files.fields import Table
 from laufruhe.physics.fidelity import EXACT, ChoiceError
 from laufruhe.problem.problem import Problem
 
-T = TypeVar("T", bound=BaseModel)
 
-
-def _with_knobs(table: type[T]) -> type[T]:
+def _with_knobs(table: type[f.TableModel]) -> type[f.TableModel]:
     keys: dict[str, Any] = {}
     for knob in KNOBS:
         if knob.key not in table.model_fields:

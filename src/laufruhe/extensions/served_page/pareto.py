@@ -41,14 +41,11 @@ class ParetoFront:
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
             raise ModelError("a live Pareto front needs affine decisions and loads as objective; fix the others")
-        others = tuple(limit for limit in problem.limits if limit.measure != across)
-        top = 1e300
-        self._limit = Limit(across.name, across, top)
-        self.others = others
-        bounded_problem = problem.changed(limits=(*others, self._limit), ranks=())
-        self.problem, self.across = bounded_problem, across
-        self._follower = Follower(bounded_problem)
-        self._minimum = Follower(bounded_problem.changed(objective=(Term(across),), limits=others))
+        self.across, self.others = across, tuple(limit for limit in problem.limits if limit.measure != across)
+        self._limit = Limit(across.name, across, 1e300)
+        self.problem = problem.changed(limits=(*self.others, self._limit), ranks=())
+        self._follower = Follower(self.problem)
+        self._minimum = Follower(self.problem.changed(objective=(Term(across),), limits=self.others))
 
     def ends(self) -> tuple[float, float]:
         """Return the minimum of the other measure, and its value at the least objective."""
