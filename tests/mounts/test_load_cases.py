@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import differential_evolution, minimize
 
 from laufruhe.errors import InputError
+from laufruhe.files.measures import limit_name
 from laufruhe.files.reader import load
 from laufruhe.load_models.mount_symbols import symbolic_mounts
 from laufruhe.machine import Mount
@@ -52,6 +53,12 @@ def test_weight_alone_is_the_sag() -> None:
     mounting = random_mounting(4)
     found = settled(mounting, LoadCase("weight", times_weight=(0.0, 0.0, -1.0)))
     assert -found.motion[2] == pytest.approx(mount_numbers.sag(mounting), rel=1e-10)
+
+
+def test_limits_of_load_cases_are_found_by_the_names_of_results() -> None:
+    path = PROBLEMS / "powertrain-load-cases.toml"
+    limits = tomllib.loads(path.read_text(encoding="utf-8"))["constraints"]
+    assert {limit_name(limit) for limit in limits} == {limit.name for limit in load(path).limits}
 
 
 @pytest.mark.parametrize("case", [TORQUE, BUMP])

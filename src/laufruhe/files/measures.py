@@ -80,6 +80,18 @@ class QuantityTable(Table):
         "Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out."
     )
 
+    def measure(self, quantity: str) -> Measure:
+        """Return the measure of a quantity of `MEASURES` with these keys, which no engine has checked."""
+        weights = self.direction_weights
+        return Measure(
+            *MEASURES[quantity], at=as_tuple(next((names for key in PLACES if (names := getattr(self, key))), None)),
+            points=as_tuple(self.operating_points), rotors=as_tuple(getattr(self, "of", None)),
+            cases=as_tuple(self.load_cases), orders=as_tuple(self.orders), motions=as_tuple(self.motions),
+            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
+            frequency=(0.0, math.inf) if self.frequency is None else Open.from_value(self.frequency).bounds,
+            wanted=1.0 if self.wanted is None else self.wanted, alternating=bool(self.alternating),
+        )  # fmt: skip
+
 
 class TermTable(QuantityTable):
     """Term of a weighted objective."""
@@ -127,8 +139,7 @@ class MeasureContext:
             if home:
                 raise Refused(where, name, *missing_extension(home))
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
-        channel, norm = MEASURES[name]
-        key, names, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
+        channel, key = MEASURES[name][0], where.rsplit(".", 1)[0]
         if not channel.needs.of(self.engine):
             raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)
         with errors_at_key(where):
@@ -138,18 +149,10 @@ class MeasureContext:
                 rule = f"needs a constant stiffness, and that of mount '{mount.name}' depends on frequency"
                 raise Refused(where, name, rule, "use transmissibility, mount force or mount travel")
         self._check_keys(channel, table, key)
-        places = next((place for place in PLACES if place in channel.keys), None)
-        place_names = getattr(table, places) if places else None
-        if places:
-            _check_known(place_names, channel.places(self.engine), f"{key}.{places}", PLACES[places])
-        measure = Measure(
-            channel, norm, at=as_tuple(place_names), points=as_tuple(table.operating_points), rotors=as_tuple(names),
-            cases=as_tuple(table.load_cases), orders=as_tuple(table.orders),
-            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
-            motions=as_tuple(table.motions),
-            frequency=(0.0, math.inf) if table.frequency is None else Open.from_value(table.frequency).bounds,
-            wanted=1.0 if table.wanted is None else table.wanted, alternating=bool(table.alternating),
-        )  # fmt: skip
+        for places in (places for places in PLACES if places in channel.keys):
+            _check_known(getattr(table, places), channel.places(self.engine), f"{key}.{places}", PLACES[places])
+        measure = table.measure(name)
+        names = getattr(table, "of", None)
         if measure.is_mass:
             self._check_masses(measure, names, key)
         if channel.is_placing:
@@ -354,10 +357,4 @@ def limit_name(entry: Mapping[str, Any]) -> str | None:
         table = ConstraintTable.model_validate(entry)
     except ValidationError:
         return None
-    if table.name or table.limit not in MEASURES:
-        return table.name
-    place_names = next((getattr(table, key) for key in PLACES if getattr(table, key)), None)
-    return Measure(
-        *MEASURES[table.limit], at=as_tuple(place_names), points=as_tuple(table.operating_points),
-        orders=as_tuple(table.orders), motions=as_tuple(table.motions), alternating=bool(table.alternating),
-    ).name  # fmt: skip
+    return table.name if table.name or table.limit not in MEASURES else table.measure(table.limit).name
