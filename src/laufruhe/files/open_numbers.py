@@ -15,6 +15,7 @@ from laufruhe.files.complaints import Refused, key_path, read_number
 from laufruhe.files.nested import Place, annotations_at, at, number_at, tables_on, walk, with_value_at
 from laufruhe.files.problem_file import EXTENSION_KEYS, Note, file_model
 from laufruhe.files.rotors import FACTORS
+from laufruhe.files.study_tables import path_text
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
 
@@ -43,7 +44,7 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
         assert isinstance(open_number, f.Open)
         drive = AddressDrive(place, number.unit)
         closed = with_value_at(closed, place, drive.written(open_number.start))
-        decisions += open_number.decisions(_name(tables, place), number.unit, drive)
+        decisions += open_number.decisions(path_text(tables, place), number.unit, drive)
     return closed, tuple(decisions)
 
 
@@ -52,19 +53,6 @@ NOTE = Note(
     without_open,
     lambda decisions, problem, _, __: replace(problem, decisions=(*problem.decisions, *decisions)),
 )
-
-
-def _name(tables: Mapping[str, Any], place: Place) -> str:
-    # the path of a number is that of studies: entries of lists have their names, or are counted from 1
-    parts = list[str]()
-    node: Any = tables
-    for key in place:
-        entry = node[key]
-        name = entry.get("name") if isinstance(key, int) and isinstance(entry, dict) else None
-        is_unique = isinstance(name, str) and "." not in name and [row.get("name") for row in node].count(name) == 1
-        parts.append(str(name) if is_unique else str(key + 1) if isinstance(key, int) else key)
-        node = entry
-    return ".".join(parts)
 
 
 def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:

@@ -106,6 +106,16 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     return tuple(keys)
 
 
+def path_text(tables: Any, place: Sequence[str | int]) -> str:
+    """Return the path to an address; entries of lists have their names, or are counted from one."""
+    parts, node = list[str](), tables
+    for key in place:
+        names = {k: name for name, k in _options(node).items() if isinstance(key, str) or "." not in name}
+        parts.append(names[key])
+        node = node[key]
+    return ".".join(parts)
+
+
 def _remedy(tables: dict[str, Any], node: Any, parts: Sequence[str], k: int) -> str:
     # the path fails at its part `k`
     for path in _paths(tables):
