@@ -23,6 +23,7 @@ from laufruhe.extensions.mount_relaxation.odd_multiples import (
 from laufruhe.extensions.mount_relaxation.orders import EpigraphVariable, MeasureOrders, Order
 from laufruhe.extensions.mount_relaxation.program import (
     LinearLimit,
+    ObjectiveLimit,
     QuadraticBound,
     RootTerm,
     SdpProgram,
@@ -220,7 +221,7 @@ class BoxRelaxation:
         mean = self._mean(variables, root_bounds)
         scale = float(mean.prices.sum())
         program, _ = self._program(variables, mean.prices / scale, mean)
-        return replace(program, limit=mean.limit(scale, self.upper_norm))
+        return replace(program, limit=ObjectiveLimit(mean.slopes / scale, (self.upper_norm - mean.constant) / scale))
 
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None

@@ -20,13 +20,7 @@ from uuid import uuid4
 import numpy as np
 from scipy.sparse import coo_array, vstack
 
-from laufruhe.extensions.mount_relaxation.cone_solver import (
-    Cone,
-    ConeSolver,
-    column,
-    matrix_of,
-    triangle,
-)
+from laufruhe.extensions.mount_relaxation.cone_solver import Cone, ConeSolver, column, matrix_of, triangle
 from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.program import (

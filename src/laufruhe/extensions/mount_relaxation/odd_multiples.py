@@ -17,7 +17,6 @@ import numpy as np
 
 from laufruhe.extensions.mount_relaxation.open_mounts import ZERO_LEVEL, OpenMounts
 from laufruhe.extensions.mount_relaxation.orders import COSINE, EpigraphVariable
-from laufruhe.extensions.mount_relaxation.program import ObjectiveLimit
 from laufruhe.numerics.arrays import Array, ComplexArray
 
 
@@ -230,10 +229,6 @@ class MeanBound:
     floor: float
     lower: Array
     upper: Array
-
-    def limit(self, size: float, norm: float) -> ObjectiveLimit:
-        """Return the limit of designs with a mean up to `norm`, in units of `size`."""
-        return ObjectiveLimit(self.slopes / size, (norm - self.constant) / size)
 
 
 def mean_bound(

@@ -15,12 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.extensions.mount_relaxation.parameter_maps import (
-    ParameterMaps,
-    PlaceTerm,
-    PlaneStiffness,
-    SpringTerm,
-)
+from laufruhe.extensions.mount_relaxation.parameter_maps import ParameterMaps, PlaceTerm, PlaneStiffness, SpringTerm
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS

@@ -239,11 +239,9 @@ class SdpRelaxation:
         relaxation._variables = [
             [replace(variable, orders=needed(variable)) for variable in variables] for variables in self._variables
         ]
-        uppers = dict(self.multiple_uppers)
-        roots = [bounds.copy() for bounds in self._roots]
-        relaxation._reset()
-        relaxation._roots, relaxation.multiple_uppers = roots, uppers
-        relaxation._last_box = self.lower, self.upper, roots[0]
+        relaxation._roots = [bounds.copy() for bounds in self._roots]
+        relaxation._last_box = self.lower, self.upper, relaxation._roots[0]
+        relaxation.multiple_uppers = dict(self.multiple_uppers)
         return relaxation
 
     def up_to(self, value: float) -> SdpRelaxation:

@@ -35,5 +35,5 @@ def figure(result: Result) -> Figure:
         entry("at random", color=SKY), entry("as they come", color=BEFORE), entry("chosen", color=AFTER),
         entry("parts of mean mass", color=INK, linestyle=MEAN),
     ]  # fmt: skip
-    lines = f"{details.random} of {details.assemblies:,.0f} ways to assemble the measured parts."
-    return finish_page(layout, result, "What choosing parts buys", lines, legend)
+    text = f"{details.random} of {details.assemblies:,.0f} ways to assemble the measured parts."
+    return finish_page(layout, result, "What choosing parts buys", text, legend)

@@ -5,13 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from laufruhe.extensions.robust.result import (
-    CONFIDENCE,
-    SHARES,
-    AssemblyResult,
-    PricedTolerance,
-    RobustResult,
-)
+from laufruhe.extensions.robust.result import CONFIDENCE, SHARES, AssemblyResult, PricedTolerance, RobustResult
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
 from laufruhe.present.pictures import ResultPicture

@@ -15,12 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.robust.built_engines import (
-    Adversary,
-    SampledEngines,
-    WorstCaseAdversary,
-    evaluate_built,
-)
+from laufruhe.extensions.robust.built_engines import Adversary, SampledEngines, WorstCaseAdversary, evaluate_built
 from laufruhe.extensions.robust.conclusion import ActiveErrors, RobustDesign, infeasible_robust_result, robust_result
 from laufruhe.extensions.robust.tolerance import robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
@@ -37,12 +32,7 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import (
-    FEASIBILITY_TOL,
-    FEASIBLE,
-    MAX_REFINEMENTS,
-    unbalance_values,
-)
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, FEASIBLE, MAX_REFINEMENTS, unbalance_values
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible, smallest_conflict, tighten_limits
 from laufruhe.solvers.general import solve_star_by_star

@@ -1,10 +1,11 @@
 """Lower bounds of RMS twist, torque and stress over boxes of discs, shafts and absorbers (V13).
 
-The inertia of all that turns, and how evenly it does, go one way with every disc (V14): a corner bounds them.
+The rotating inertia and the degree of irregularity are monotone in the inertia of every disc (V14), so that a corner
+of the box bounds them.
 
-The dynamic stiffness of an order is affine in inertia, stiffness and damping; of a diameter its stiffness is the
-coordinate. So the response over a box is that series of E37, in coordinates in which the inertia of the centre is one.
-Orders whose series need not end count as nothing: a root of squares is no larger without them.
+The dynamic stiffness of an order is affine in inertia, stiffness and damping; the coordinate of a diameter is its
+stiffness. So the response over a box is the series of E37, in coordinates in which the inertia of the centre is one.
+Orders whose series may diverge are left out: a root of squares is no larger without them.
 """
 
 from __future__ import annotations
@@ -41,22 +42,22 @@ _SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class _Lines:
+class _Excitation:
     """Orders of one operating point, with the torques that excite the discs.
 
     Attributes
     ----------
     highest
-        Multiple of the lowest order that excites them, left out or not.
+        Highest multiple of the lowest order, including orders that are left out.
     torques
         Shape (orders, discs and rings).
     mean
         Torque of order zero, shape (discs,).
     middle, sides
-        Dynamic stiffness in the middle of the bounds, and what one of each coordinate adds, shapes (orders, n, n) and
+        Dynamic stiffness in the middle of the bounds, and its slope by each coordinate, shapes (orders, n, n) and
         (coordinates, orders, n, n).
     along, inside
-        Directions of what each adds, and how much of it is along them (E37).
+        Directions of the slopes, and their components along them (E37).
     """
 
     loads: PointLoads
@@ -118,12 +119,12 @@ class TwistBoxes:
         ]
         self._uneven = [(x.maximum, _InertiaBound(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
         self._samples = evaluation.samples
-        self._lines = [self._lines_at(loads) for loads in evaluation.loads]
+        self._excitations = [self._excitation_at(loads) for loads in evaluation.loads]
 
     @property
     def is_sampled_fully(self) -> bool:
         """True if sums over orders equal sums over samples, as the bounds assume."""
-        highest = max((lines.highest for lines in self._lines), default=0)
+        highest = max((excitation.highest for excitation in self._excitations), default=0)
         return highest <= self._samples // 2
 
     @property
@@ -151,7 +152,7 @@ class TwistBoxes:
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
         if any(inertia_bound.minimum(chains) > maximum * (1.0 + SLACK) for maximum, inertia_bound in self._uneven):
             return math.inf, int(np.argmax(widths))
-        twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
+        twists = [self._expanded(excitation, chains[1], centre, half) for excitation in self._excitations]
         limited = ((maximum, _root_bound([(1.0, self._under(q, chains, twists))])) for maximum, q in self._limits)
         if any(bound > maximum * (1.0 + SLACK) for maximum, bound in limited):
             return math.inf, int(np.argmax(widths))
@@ -167,7 +168,7 @@ class TwistBoxes:
             pull = widths
         return self._constant + turning + _root_bound(terms), int(np.argmax(pull + _SAME * widths))
 
-    def _lines_at(self, loads: PointLoads) -> _Lines:
+    def _excitation_at(self, loads: PointLoads) -> _Excitation:
         """Return the orders that contribute anywhere in the bounds, judged at their middle and corners."""
         coordinates, speed = self.coordinates, loads.point.speed
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
@@ -186,7 +187,7 @@ class TwistBoxes:
             size = (np.abs(np.einsum("hsd,hd->hs", flexible, torques.coefficients)) ** 2).sum(axis=1)
             counted |= size > MIN_SHARE * size.sum()
         counted[0] = False
-        # an order with two samples a wave is read anywhere between nothing and its peak
+        # two samples a wave may miss all of an order
         counted[2 * np.arange(len(counted)) >= self._samples] = False
         orders = torques.orders[counted]
         chain = coordinates.chain(middle)
@@ -195,7 +196,7 @@ class TwistBoxes:
         middle_stiffness = dynamic_stiffness(chain, orders, speed)
         sides = []
         for k in range(len(middle)):
-            # affine, so that the whole width tells the slope without a rounding
+            # an affine function has the same slope over the whole width, with less rounding
             ends = [
                 np.where(np.arange(len(middle)) == k, end, middle) for end in (coordinates.lower, coordinates.upper)
             ]
@@ -209,30 +210,30 @@ class TwistBoxes:
         ])  # fmt: skip
         inside = along.inside(np.moveaxis(np.array(sides), 0, 1))
         mean = torques.coefficients[0].real
-        return _Lines(loads, highest, orders, drives, mean, middle_stiffness, np.array(sides), along, inside)
+        return _Excitation(loads, highest, orders, drives, mean, middle_stiffness, np.array(sides), along, inside)
 
-    def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
+    def _expanded(self, excitation: _Excitation, chain: Torsion, centre: Array, half: Array) -> Expansion:
         root = np.sqrt(inertias(chain))
         scale = np.outer(root, root)
         middle = 0.5 * (self.coordinates.lower + self.coordinates.upper)
-        dynamic = lines.middle + np.tensordot(centre - middle, lines.sides, axes=(0, 0))
+        dynamic = excitation.middle + np.tensordot(centre - middle, excitation.sides, axes=(0, 0))
         inverse = inverses(dynamic / scale)
-        angles = np.einsum("lab,lb->la", inverse, lines.torques / root)
-        along = replace(lines.along, columns=lines.along.columns / root[:, None])
-        return series(centre[None], half[None], inverse[None], along, lines.inside, angles[None])
+        angles = np.einsum("lab,lb->la", inverse, excitation.torques / root)
+        along = replace(excitation.along, columns=excitation.along.columns / root[:, None])
+        return series(centre[None], half[None], inverse[None], along, excitation.inside, angles[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> LinearBound:
         """Return a linear lower bound of an RMS over orders, sections and operating points."""
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
         chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)
-        shares = measure.shares([lines.loads.point for lines in self._lines]) / len(chosen)
+        shares = measure.shares([excitation.loads.point for excitation in self._excitations]) / len(chosen)
         answers, weights = list[LinearResponse](), list[Array]()
-        for share, lines, twist in zip(shares, self._lines, twists, strict=True):
-            answers.append(self._alternating(measure, chains, lines, twist, chosen))
-            weights.append(np.where(measure.counted(lines.orders), 0.5 * share, 0.0))
+        for share, excitation, twist in zip(shares, self._excitations, twists, strict=True):
+            answers.append(self._alternating(measure, chains, excitation, twist, chosen))
+            weights.append(np.where(measure.counted(excitation.orders), 0.5 * share, 0.0))
             if bool(measure.counted(np.zeros(1))[0]):
-                answers.append(self._mean(measure, chains, lines, chosen))
+                answers.append(self._mean(measure, chains, excitation, chosen))
                 weights.append(np.array([share]))
         parts = (
             np.concatenate([getattr(answer, part) for answer in answers], axis=1)
@@ -241,32 +242,36 @@ class TwistBoxes:
         return root_under(LinearResponse(*parts), np.concatenate(weights))
 
     def _alternating(
-        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
+        self, measure: Measure, chains: Sequence[Torsion], excitation: _Excitation, twist: Expansion, chosen: Indices
     ) -> LinearResponse:
         """Return the response of the chosen sections over a box, in every order but zero."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
         twisted = _twist_of(len(chains[1].sections), len(root))
         scaled = twisted / root
-        low, centre, high = (factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains)
-        # each factor is of its own stiffness, and bends one way: so much the secant may be off
+        low, centre, high = (
+            factors(chain, excitation.orders, excitation.loads.point.speed)[:, chosen, None] for chain in chains
+        )
+        # each factor follows its own stiffness, convex or concave: `bend` bounds the error of the secant
         turn, bend = 0.5 * (high - low), np.abs(centre - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
-        # in coordinates of the discs: a section turns along what its stiffness moves
+        # in coordinates of the discs, along the direction of its stiffness
         slopes = owners * turn[:, None] * twisted[chosen]
-        answer = mapped(twist, (centre * scaled[chosen])[None], lines.along.along(slopes)[None])
+        answer = mapped(twist, (centre * scaled[chosen])[None], excitation.along.along(slopes)[None])
         if not bend.any():
             return answer
-        moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
+        moved = np.broadcast_to(scaled[chosen], (1, len(excitation.orders), len(chosen), len(root)))
         twist_response = mapped(twist, moved)
         maximum = np.abs(twist_response.value) + np.abs(twist_response.slopes).sum(axis=2)
         maximum = maximum + twist_response.remainder[..., None]
         excess = np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1)
         return replace(answer, remainder=answer.remainder + excess)
 
-    def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
-        zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
+    def _mean(
+        self, measure: Measure, chains: Sequence[Torsion], excitation: _Excitation, chosen: Indices
+    ) -> LinearResponse:
+        zero, speed, factors = np.zeros(1), excitation.loads.point.speed, FACTORS[measure.channel]
         low, centre, high = (
-            ((receptances(chain, zero, speed)[0] @ lines.mean) * factors(chain, zero, speed)[0])[chosen]
+            ((receptances(chain, zero, speed)[0] @ excitation.mean) * factors(chain, zero, speed)[0])[chosen]
             for chain in chains
         )
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
@@ -279,9 +284,9 @@ class TwistBoxes:
         The loss per swing is smallest at the lower ends.
         """
         root = np.sqrt(inertias(chains[1]))
-        for lines, twist in zip(self._lines, twists, strict=True):
-            point = lines.loads.point
-            rate = lines.orders * point.speed
+        for excitation, twist in zip(self._excitations, twists, strict=True):
+            point = excitation.loads.point
+            rate = excitation.orders * point.speed
             for k, absorber in enumerate(chains[0].absorbers if limit.measure.includes_point(point) else ()):
                 row = np.zeros(len(root))
                 row[len(chains[0].discs) + k], row[chains[0].index(absorber.on)] = 1.0, -1.0

@@ -43,8 +43,8 @@ def figure(result: Result) -> Figure:
     legend += [entry("main order", color=INK, linewidth=1.4), entry("other order", color=FAINT, linewidth=0.6)]
     legend.append(entry_of_dots("vector sum of an order and mode", color=INK, markersize=6.0))
     which = "of the final design" if is_changed(result) else "of the initial design"
-    lines = f"Natural modes {which}, and critical speeds. The area of a dot grows with its vector sum."
-    return finish_page(drawn, result, "Torsional vibration of the crankshaft", lines, legend)
+    text = f"Natural modes {which}, and critical speeds. The area of a dot grows with its vector sum."
+    return finish_page(drawn, result, "Torsional vibration of the crankshaft", text, legend)
 
 
 def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:

@@ -50,5 +50,5 @@ def figure(result: Result) -> Figure:
     axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
              ylabel="alternating torque [N m]")  # fmt: skip
     mark_points(axes, result)
-    lines = "Half of the peak to peak torque in the most loaded section, in steady state at every speed."
-    return finish_page(drawn, result, "Torque in the crankshaft over speed", lines, legend)
+    text = "Half of the peak to peak torque in the most loaded section, in steady state at every speed."
+    return finish_page(drawn, result, "Torque in the crankshaft over speed", text, legend)
