@@ -271,8 +271,8 @@ class BoxRelaxation:
         program = SdpProgram(
             tuple(response.size for response in responses), tuple(response.reaches for response in responses),
             self.mounts.numbers, responses[0].columns,
-            np.append(0.0 * prices if roots else prices, np.zeros(len(uppers) - len(variables))),
-            quadratics, constraints, ratios, self.search.basis.sets, roots, self.modes, np.array(uppers),
+            np.append(0.0 * prices if roots else prices, np.zeros(len(uppers) - len(variables))), np.array(uppers),
+            quadratics, constraints, ratios, self.search.basis.sets, roots, self.modes,
         )  # fmt: skip
         return program, responses
 

@@ -157,9 +157,8 @@ class ConeProgram:
         for linear in program.linear:
             columns = np.concatenate([self._moment(order) for order, _ in linear])
             self._add(np.concatenate([column(matrix) for _, matrix in linear])[None], columns, SIDES, "linear")
-        if len(program.uppers):
-            bounded = np.flatnonzero(np.isfinite(program.uppers))
-            self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
+        bounded = np.flatnonzero(np.isfinite(program.uppers))
+        self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
         block_number = 0
         for quadratic in program.quadratics:
             if quadratic.blocks:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TypeAlias
 
@@ -129,8 +129,8 @@ class SdpProgram:
         For each order, upper bounds of the squares of the entries of v, shape (d - 1,).
     numbers, columns
         Counts of s and of unbalance columns.
-    prices
-        Coefficients of the epigraph variables in the objective.
+    prices, uppers
+        Coefficients of the epigraph variables in the objective, and their upper bounds, infinite for none.
     quadratics, constraints, linear
         Bounds of the epigraph variables, constraints on moments, and limits of transmissibility.
     sets
@@ -139,8 +139,6 @@ class SdpProgram:
         Roots of the epigraph variables, if these are minimised in place of the variables.
     modes
         Constraints of required natural modes.
-    uppers
-        Upper bounds of the epigraph variables, infinite for none; empty if no variable has one.
     objective
         Further objective: slopes by s, then by w of each mode, shape (numbers + 5 modes,).
     limit
@@ -152,13 +150,13 @@ class SdpProgram:
     numbers: int
     columns: int
     prices: Array
+    uppers: Array
     quadratics: Sequence[QuadraticBound]
     constraints: Sequence[MomentConstraint]
-    linear: Sequence[LinearLimit] = ()
-    sets: Sequence[Array] = ()
-    roots: Sequence[RootTerm] = ()
-    modes: Sequence[ModeConstraints] = ()
-    uppers: Array = field(default_factory=lambda: np.zeros(0))
+    linear: Sequence[LinearLimit]
+    sets: Sequence[Array]
+    roots: Sequence[RootTerm]
+    modes: Sequence[ModeConstraints]
     objective: Array | None = None
     limit: ObjectiveLimit | None = None
 
@@ -247,7 +245,7 @@ def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
     for quadratic, price in zip(
         program.quadratics, _scaled_to_prices(program, prices, multipliers.quadratics), strict=True
     ):
-        if len(program.uppers) and math.isfinite(program.uppers[quadratic.variable]):
+        if math.isfinite(program.uppers[quadratic.variable]):
             bound -= quadratic.price_of(price) * float(program.uppers[quadratic.variable])
         for order, rows in quadratic.rows:
             remainders[order] += np.einsum("pad,ab,pbe->de", rows, price, rows, optimize=True)
@@ -315,15 +313,13 @@ def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, m
 
 def _scaled_to_prices(program: SdpProgram, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
     # scale the multipliers of the quadratic bounds so that they add up to the price of each epigraph variable
-    uppers = program.uppers
     positive = [_psd_part(multiplier) for multiplier in multipliers]
     sums = np.zeros(len(prices))
     for quadratic, price in zip(program.quadratics, positive, strict=True):
         sums[quadratic.variable] += quadratic.price_of(price)
     factors = np.where(sums > 0.0, prices / np.where(sums > 0.0, sums, 1.0), 0.0)
-    if len(uppers):
-        # a variable with an upper bound needs no exact price
-        factors = np.where(np.isfinite(uppers), 1.0, factors)
+    # a variable with an upper bound needs no exact price
+    factors = np.where(np.isfinite(program.uppers), 1.0, factors)
     return [factors[q.variable] * price for q, price in zip(program.quadratics, positive, strict=True)]
 
 
