@@ -125,6 +125,11 @@ class Mark:
             one_unit, dimension
         )
 
+    @property
+    def gain(self) -> float:
+        """Largest error in the unit of the number."""
+        return self.error * (abs(self.number or 0.0) if self.is_share else 1.0)
+
     def _parsed(self, text: str, dimension: str) -> float:
         try:
             value = units.parse(text, dimension)
@@ -234,14 +239,14 @@ def _tolerance(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> Toler
 
 
 def _pistons(mark: Mark, engine: Engine) -> _Errors:
-    size = _mass(mark)
+    size = mark.gain * units.parse(f"1 {mark.unit}", "kg")
     if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
         raise mark.refused("is a tolerance of the whole mass or more", "give less")
     return [Error(part.name, (PistonDrive(k, size),)) for k, part in enumerate(engine.slider_cranks)], size, "kg"
 
 
 def _pins(mark: Mark, engine: Engine) -> _Errors:
-    size, errors, pin_places = _mass(mark), [], set()
+    size, errors, pin_places = mark.gain * units.parse(f"1 {mark.unit}", "kg"), [], set()
     for part in engine.slider_cranks:
         place = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
         if place in pin_places:
@@ -251,11 +256,6 @@ def _pins(mark: Mark, engine: Engine) -> _Errors:
         drive = AddedDrive(f"error of the pin of {part.name}", part.x, size * arm, part.shaft)
         errors.append(Error(f"throw of {part.name}", (drive,)))
     return errors, size, "kg"
-
-
-def _mass(mark: Mark) -> float:
-    number = mark.number or 0.0
-    return mark.error * (abs(number) if mark.is_share else 1.0) * units.parse(f"1 {mark.unit}", "kg")
 
 
 def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
@@ -290,7 +290,7 @@ def _file_tolerance(mark: Mark) -> Tolerance:
     is_of_a_piece = any(isinstance(part, int) for part in mark.path)
     if mark.scope is Scope.PIECE and not is_of_a_piece:
         raise mark.refused("is one number of the whole engine", "write batch, or leave the word out")
-    gain = mark.error * (abs(mark.number) if mark.is_share else 1.0)
+    gain = mark.gain
     dimension = (units.dimension_of(f"1 {mark.unit}") or "") if mark.unit else ""
     size = gain * (units.parse(f"1 {mark.unit}", dimension) if mark.unit else 1.0)
     drive = FileDrive(mark.path, mark.number, gain, mark.unit)
