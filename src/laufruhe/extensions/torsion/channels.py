@@ -24,18 +24,14 @@ HIGHEST = 12.0
 """Order up to which main orders count where none are named."""
 
 
-def _names_of_sections(engine: Engine) -> Sequence[str]:
-    return [section.name for section in physics.chain_of(engine).sections]
-
-
-def _names_of_stressed(engine: Engine) -> Sequence[str]:
-    return [section.name for section in physics.chain_of(engine).sections if section.diameter is not None]
-
-
 def _of_shafts(
-    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
-    title: str = "", places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = CHAIN,
+    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], title: str = "",
+    needs: Need = CHAIN,
 ) -> LoadChannel:  # fmt: skip
+    def places(engine: Engine) -> Sequence[str]:
+        sections = physics.chain_of(engine).sections
+        return [section.name for section in sections if needs is CHAIN or section.diameter is not None]
+
     of_sections = crankcase_signal(
         name, lambda moving, at: signal(moving, at.point, at.fidelity).mapped(lambda values: values[:, :, None])
     )
@@ -75,9 +71,7 @@ def _heat(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]
 
 SHAFT_TWIST = _of_shafts("shaft twist", "rad", physics.twist)
 SHAFT_TORQUE = _of_shafts("shaft torque", "N m", physics.shaft_torque, "Torque in the crankshaft")
-SHAFT_STRESS = _of_shafts(
-    "shaft stress", "Pa", physics.shaft_stress, "Shear stress of the crankshaft", _names_of_stressed, DIAMETERS
-)
+SHAFT_STRESS = _of_shafts("shaft stress", "Pa", physics.shaft_stress, "Shear stress of the crankshaft", DIAMETERS)
 TORSIONAL_FREQUENCIES = _of_modes("torsional frequencies", "Hz", ("operating_points",), _at_speeds)
 CRITICAL_SPEEDS = _of_modes("critical speeds", "rad/s", ("operating_points", "orders"), _in_orders)
 ABSORBER_HEAT = NumberChannel("absorber heat", "W", ("operating_points",), CHAIN, minimised=False, values=_heat)
