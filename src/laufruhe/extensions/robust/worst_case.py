@@ -277,7 +277,7 @@ class _TermAbout:
         Rows at the centre, shape (k, d), and their lengths, shape (k,).
     moves
         Change of the rows per local number, shape (k, d, n).
-    own
+    slices
         Slice of each block among the n local numbers.
     reaches
         Largest change of each row by each block, shape (blocks, k).
