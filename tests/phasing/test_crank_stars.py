@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Mechanism, build, inline
-from laufruhe.physics.crank_stars import StarSpace, canonical, images, star_sums
+from laufruhe.physics.crank_stars import StarSpace, star_sums
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
 
@@ -60,11 +60,12 @@ def test_stars_that_cancel_score_zero():
 @given(st.integers(3, 9).flatmap(lambda n: st.permutations(range(n))))
 def test_images_are_worth_the_same(star):
     n = len(star)
-    same = np.concatenate(images(np.array([star], dtype=np.uint8), n, True, True))
+    space = StarSpace(n, ((1,) * n,), (0.0,) * n, mirror=True, reflect=True)
+    same = np.concatenate(space.images(np.array([star], dtype=np.uint8)))
     forces, couples = score_stars(same, n, places(n), (1, 2, 3, 4))
     np.testing.assert_allclose(forces, np.broadcast_to(forces[0], forces.shape), atol=1e-11)
     np.testing.assert_allclose(couples, np.broadcast_to(couples[0], couples.shape), atol=1e-11)
-    assert len(np.unique(canonical(same, n, True, True), axis=0)) == 1
+    assert len(np.unique(space.canonical(same), axis=0)) == 1
 
 
 @pytest.mark.parametrize("throws", [1, 2, 3, 4, 5, 6, 7])

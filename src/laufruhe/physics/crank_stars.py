@@ -11,7 +11,7 @@ so millions of stars are compared without a load being computed.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -74,32 +74,6 @@ def _joined_tables(
     return tables, groups
 
 
-def images(stars: Stars, phases: int, mirror: bool, reflect: bool) -> list[Stars]:
-    """Return a star and its equals: front and back swapped, and turned the other way round (S2).
-
-    Every image is turned so that its first throw stands at step 0.
-    """
-    block = np.asarray(stars, dtype=np.int16)
-    out = [block]
-    if mirror:
-        out.append(block[:, ::-1])
-    if reflect:
-        out += [-image for image in out]
-    return [((image - image[:, :1]) % phases).astype(np.uint8) for image in out]
-
-
-def canonical(stars: Stars, phases: int, mirror: bool, reflect: bool) -> Stars:
-    """Return the first in dictionary order among a star's images, shape (n, throws) (S2)."""
-    best, *others = images(stars, phases, mirror, reflect)
-    for other in others:
-        differs = best != other
-        first = np.argmax(differs, axis=1)
-        rows = np.arange(len(best))
-        smaller = differs.any(axis=1) & (other[rows, first] < best[rows, first])
-        best = np.where(smaller[:, None], other, best)
-    return best
-
-
 BLOCK = 1 << 14
 
 
@@ -145,92 +119,78 @@ class StarSpace:
             total += math.factorial(sum(rest)) // math.prod(math.factorial(count) for count in rest)
         return total
 
+    def images(self, stars: Stars) -> list[Stars]:
+        """Return stars and their equals: front and back swapped, and turned the other way round (S2).
+
+        Every image is turned so that its first throw stands at step 0.
+        """
+        block = np.asarray(stars, dtype=np.int16)
+        out = [block]
+        if self.mirror:
+            out.append(block[:, ::-1])
+        if self.reflect:
+            out += [-image for image in out]
+        return [((image - image[:, :1]) % self.phases).astype(np.uint8) for image in out]
+
     def canonical(self, stars: Stars) -> Stars:
-        """Return the canonical image of each star."""
-        return canonical(stars, self.phases, self.mirror, self.reflect)
+        """Return the first in dictionary order among the images of each star, shape (n, throws) (S2)."""
+        best, *others = self.images(stars)
+        for other in others:
+            differs = best != other
+            first = np.argmax(differs, axis=1)
+            rows = np.arange(len(best))
+            smaller = differs.any(axis=1) & (other[rows, first] < best[rows, first])
+            best = np.where(smaller[:, None], other, best)
+        return best
 
     def blocks(self) -> Iterator[Stars]:
         """Yield all stars, one of each set of images, in blocks (n, throws)."""
-        for root in self.roots:
-            for block in _grown(self, root):
-                is_canonical = np.all(self.canonical(block) == block, axis=1)
-                if is_canonical.any():
-                    yield block[is_canonical]
-
-    @property
-    def roots(self) -> tuple[Partial, ...]:
-        """The first throw alone, for every pattern."""
-        order, partials = outside_in(self.throws), []
+        order = outside_in(self.throws)
         for pattern in self.patterns:
             left = np.array([pattern], dtype=np.uint8)
             left[0, 0] -= 1
-            partials.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
-        return tuple(partials)
+            # stars, the throws that each step still takes, and how many throws are placed; depth first, so that at
+            # most a block for every throw and step waits
+            waiting = [(np.zeros((1, self.throws), dtype=np.uint8), left, 1)]
+            while waiting:
+                stars, counts, placed = waiting.pop()
+                if placed == self.throws:
+                    is_canonical = np.all(self.canonical(stars) == stars, axis=1)
+                    if is_canonical.any():
+                        yield stars[is_canonical]
+                    continue
+                rows, steps = np.nonzero(counts)
+                stars, counts = stars[rows], counts[rows]
+                stars[:, order[placed]] = steps
+                counts[np.arange(len(rows)), steps] -= 1
+                first_images = self._first_of_images(stars, set(order[: placed + 1]))
+                stars, counts = stars[first_images], counts[first_images]
+                for start in range(0, len(stars), BLOCK):
+                    part = slice(start, start + BLOCK)
+                    waiting.append((stars[part], counts[part], placed + 1))
 
+    def _first_of_images(self, stars: Stars, placed: Set[int]) -> Mask:
+        """Return a mask of stars of which no image is already known to come earlier (S2).
 
-@dataclass(frozen=True, eq=False)
-class Partial:
-    """Stars whose outer throws are placed.
-
-    Attributes
-    ----------
-    stars
-        Shape (n, throws), steps; undefined where not yet placed.
-    counts
-        Shape (n, P): throws that each step still takes.
-    placed, open
-        Indices of the throws in the order in which they were placed, and of the others.
-    """
-
-    stars: Stars
-    counts: Stars
-    placed: tuple[int, ...]
-    open: tuple[int, ...]
+        Image and star compare throw by throw from the front, as far as the steps that both need are placed.
+        """
+        keep, last = np.ones(len(stars), dtype=bool), self.throws - 1
+        steps = stars.astype(np.int16)
+        for swap, turn in ((False, True), (True, False), (True, True)):
+            if (swap and not self.mirror) or (turn and not self.reflect):
+                continue
+            undecided = np.ones(len(steps), dtype=bool)
+            for k in range(1, self.throws):
+                source = last - k if swap else k
+                if not {k, source} <= placed or (swap and last not in placed):
+                    break
+                image = steps[:, source] - (steps[:, last] if swap else 0)
+                image = (-image if turn else image) % self.phases
+                keep &= ~(undecided & (image < steps[:, k]))
+                undecided &= image == steps[:, k]
+        return keep
 
 
 def outside_in(throws: int) -> tuple[int, ...]:
     """Return the order first, last, second, ... of throws: it distinguishes images early."""
     return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
-
-
-def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
-    # depth first, so that at most a block for every throw and step waits
-    waiting = [first]
-    while waiting:
-        partial = waiting.pop()
-        if not partial.open:
-            yield partial.stars
-            continue
-        rows, steps = np.nonzero(partial.counts)
-        stars, counts = partial.stars[rows], partial.counts[rows]
-        stars[:, partial.open[0]] = steps
-        counts[np.arange(len(rows)), steps] -= 1
-        placed, left = (*partial.placed, partial.open[0]), partial.open[1:]
-        first_images = _first_of_images(space, Partial(stars, counts, placed, left))
-        stars, counts = stars[first_images], counts[first_images]
-        for start in range(0, len(stars), BLOCK):
-            part = slice(start, start + BLOCK)
-            waiting.append(Partial(stars[part], counts[part], placed, left))
-
-
-def _first_of_images(space: StarSpace, partial: Partial) -> Mask:
-    """Return a mask of stars of which no image is already known to come earlier (S2).
-
-    Image and star compare throw by throw from the front, as far as the steps that both need are placed.
-    """
-    keep = np.ones(len(partial.stars), dtype=bool)
-    placed, last = set(partial.placed), space.throws - 1
-    steps = partial.stars.astype(np.int16)
-    for swap, turn in ((False, True), (True, False), (True, True)):
-        if (swap and not space.mirror) or (turn and not space.reflect):
-            continue
-        undecided = np.ones(len(steps), dtype=bool)
-        for k in range(1, space.throws):
-            source = last - k if swap else k
-            if not {k, source} <= placed or (swap and last not in placed):
-                break
-            image = steps[:, source] - (steps[:, last] if swap else 0)
-            image = (-image if turn else image) % space.phases
-            keep &= ~(undecided & (image < steps[:, k]))
-            undecided &= image == steps[:, k]
-    return keep
