@@ -146,7 +146,7 @@ def test_no_star_of_the_eighteen_has_less_couple() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("cylinders = 3", "cylinders = 4", "engine.cylinders = 4: is no multiple of the 3 of a row"),
+        ("cylinders = 3", "cylinders = 4", "engine.cylinders = 4: is no multiple of the 3 banks"),
         ('"two-stroke"', '"four-stroke"', "engine.cycle = four-stroke: has ports in a triangle of cranks"),
         ("reversed_crank = 1", "reversed_crank = 4", "is no crank of a triangle; give 1, 2 or 3"),
         ("reversed_crank = 1", "crank_leads = [20]", "engine.crank_leads: has 1 angles"),
