@@ -11,9 +11,15 @@ from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Rod, SliderCrank
-from laufruhe.machine.drives.base import radius_for_stroke
+from laufruhe.machine.drives import DRIVES, Sizes
 
 POSITIVE = st.floats(1e-3, 10.0)
+
+
+def radius_for_stroke(
+    stroke: float, offset: float, *, rod_length: float | None = None, rod_ratio: float | None = None
+) -> float:
+    return DRIVES["slider-crank"].radius(Sizes(stroke, offset, rod_length, rod_ratio, {}))
 
 
 class TestRod:

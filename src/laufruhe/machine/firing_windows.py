@@ -29,62 +29,6 @@ _ROUNDING = 1e-10
 _ROUNDS = 3
 
 
-@dataclass(frozen=True, eq=False)
-class CylinderAngles:
-    """Own angles of cylinders: throw angle plus shares of open bank and pin angles.
-
-    Attributes
-    ----------
-    throws
-        Throw of every own angle.
-    shares
-        What an open angle adds to every own angle, shape (own angles, open angles).
-    """
-
-    throws: Indices
-    shares: Array
-
-    @cached_property
-    def _differences(self) -> tuple[Indices, Indices]:
-        first, second = np.nonzero(self.throws[:, None] == self.throws[None, :])
-        return first[first != second], second[first != second]
-
-    def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
-        """Return shortest paths of own angles in a box of throws and open angles, or None if infeasible."""
-        count = len(lower) - self.shares.shape[1]
-        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
-        paths = paths.copy()
-        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper[self.throws] + maximum)
-        paths[:-1, -1] = np.minimum(paths[:-1, -1], -(lower[self.throws] + minimum))
-        first, second = self._differences
-        _, ahead = _range(self.shares[second] - self.shares[first], lower[count:], upper[count:])
-        paths[first, second] = np.minimum(paths[first, second], ahead)
-        for k in range(len(paths)):
-            paths = np.minimum(paths, paths[:, k : k + 1] + paths[k : k + 1, :])
-        return None if np.any(np.diag(paths) < -_ROUNDING) else paths
-
-    def box(self, paths: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Tighten a box of throws and open angles by shortest paths."""
-        count = len(lower) - self.shares.shape[1]
-        low, high = lower.copy(), upper.copy()
-        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
-        np.minimum.at(high, self.throws, paths[-1, :-1] - minimum)
-        np.maximum.at(low, self.throws, -paths[:-1, -1] - maximum)
-        first, second = self._differences
-        # shares @ angles is at most the room
-        rows = [self.shares[second] - self.shares[first], self.shares, -self.shares]
-        room = [paths[first, second], paths[-1, :-1] - low[self.throws], paths[:-1, -1] + high[self.throws]]
-        for row, most_of_it in zip(np.concatenate(rows), np.concatenate(room), strict=True):
-            for s in np.flatnonzero(row):
-                others = np.where(np.arange(len(row)) == s, 0.0, row)
-                end = (most_of_it - _range(others[None], low[count:], high[count:])[0][0]) / row[s]
-                if row[s] > 0.0:
-                    high[count + s] = min(high[count + s], end)
-                else:
-                    low[count + s] = max(low[count + s], end)
-        return low, high
-
-
 def _range(shares: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
     up, down = np.maximum(shares, 0.0), np.minimum(shares, 0.0)
     return up @ lower + down @ upper, up @ upper + down @ lower
@@ -103,30 +47,27 @@ class FiringWindow:
     paths
         Most by which own angle j stands ahead of own angle i [rad], shape (own angles + 1, own angles + 1); the last
         is none but the angle 0.
-    angles
-        Own angles; those of the throws where neither bank nor split pins are open.
-    root
-        Bounds of throws and open angles.
+    bounds
+        Conditions that it keeps.
     """
 
     order: tuple[int, ...]
     laps: tuple[int, ...]
     paths: Array
-    angles: CylinderAngles
-    root: tuple[Array, Array]
+    bounds: FiringBounds
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
         """Least and largest of every throw and open angle [rad]."""
-        return self.within(*self.root) or self.root
+        return self.within(*self.bounds.root) or self.bounds.root
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
         """Return the smallest box around the throws of a box that keep the window, or None if empty."""
-        for _ in range(_ROUNDS if self.angles.shares.size else 1):
-            paths = self.angles.shortened(self.paths, lower, upper)
+        for _ in range(_ROUNDS if self.bounds.open_angles else 1):
+            paths = self.bounds.shortened(self.paths, lower, upper)
             if paths is None:
                 return None
-            low, high = self.angles.box(paths, lower, upper)
+            low, high = self.bounds.tightened(paths, lower, upper)
             if np.any(low > high + _ROUNDING):
                 return None
             lower, upper = np.minimum(low, high), np.maximum(low, high)
@@ -180,15 +121,58 @@ class FiringBounds:
         return [self._named.index((pin, self.share(k))) for k, pin in enumerate(self.layout.pins)]
 
     @cached_property
-    def angles(self) -> CylinderAngles:
-        """Distinct own angles of the cylinders: throw angle plus shares of the open bank and pin angles."""
-        shares = np.array([share for _, share in self._named])
-        return CylinderAngles(
-            np.array([pin for pin, _ in self._named]), np.tile(shares[:, None], len(self.open_angles))
-        )
+    def angle_throws(self) -> Indices:
+        """Throw of every distinct own angle of the cylinders: throw angle plus shares of open bank and pin angles."""
+        return np.array([pin for pin, _ in self._named])
 
     @cached_property
-    def _root(self) -> tuple[Array, Array]:
+    def shares(self) -> Array:
+        """What an open angle adds to every own angle, shape (own angles, open angles)."""
+        return np.tile(np.array([share for _, share in self._named])[:, None], len(self.open_angles))
+
+    @cached_property
+    def _differences(self) -> tuple[Indices, Indices]:
+        first, second = np.nonzero(self.angle_throws[:, None] == self.angle_throws[None, :])
+        return first[first != second], second[first != second]
+
+    def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
+        """Return shortest paths of own angles in a box of throws and open angles, or None if infeasible."""
+        count = len(lower) - self.shares.shape[1]
+        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
+        paths = paths.copy()
+        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper[self.angle_throws] + maximum)
+        paths[:-1, -1] = np.minimum(paths[:-1, -1], -(lower[self.angle_throws] + minimum))
+        first, second = self._differences
+        _, ahead = _range(self.shares[second] - self.shares[first], lower[count:], upper[count:])
+        paths[first, second] = np.minimum(paths[first, second], ahead)
+        for k in range(len(paths)):
+            paths = np.minimum(paths, paths[:, k : k + 1] + paths[k : k + 1, :])
+        return None if np.any(np.diag(paths) < -_ROUNDING) else paths
+
+    def tightened(self, paths: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Return a box of throws and open angles, tightened by shortest paths."""
+        count = len(lower) - self.shares.shape[1]
+        low, high = lower.copy(), upper.copy()
+        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
+        np.minimum.at(high, self.angle_throws, paths[-1, :-1] - minimum)
+        np.maximum.at(low, self.angle_throws, -paths[:-1, -1] - maximum)
+        first, second = self._differences
+        # shares @ angles is at most the room
+        rows = [self.shares[second] - self.shares[first], self.shares, -self.shares]
+        room = [paths[first, second], paths[-1, :-1] - low[self.angle_throws], paths[:-1, -1] + high[self.angle_throws]]
+        for row, most_of_it in zip(np.concatenate(rows), np.concatenate(room), strict=True):
+            for s in np.flatnonzero(row):
+                others = np.where(np.arange(len(row)) == s, 0.0, row)
+                end = (most_of_it - _range(others[None], low[count:], high[count:])[0][0]) / row[s]
+                if row[s] > 0.0:
+                    high[count + s] = min(high[count + s], end)
+                else:
+                    low[count + s] = max(low[count + s], end)
+        return low, high
+
+    @cached_property
+    def root(self) -> tuple[Array, Array]:
+        """Bounds of throws and open angles [rad]."""
         free = ((-math.inf, math.inf),) * len(self.layout.throw_positions)
         every = np.array([*(self.throws or free), *self.open_angles])
         if self.throws is None:
@@ -199,10 +183,7 @@ class FiringBounds:
     @property
     def anywhere(self) -> FiringWindow:
         """Window of the bounds on throws alone, without a firing order."""
-        return self._window((), (0,) * len(self.layout.positions), self._start())
-
-    def _window(self, order: tuple[int, ...], laps: tuple[int, ...], paths: Array) -> FiringWindow:
-        return FiringWindow(order, laps, paths, self.angles, self._root)
+        return FiringWindow((), (0,) * len(self.layout.positions), self._start(), self)
 
     def windows(self) -> Iterator[FiringWindow]:
         """Yield the window of every order and choice of dead centres that some throws keep."""
@@ -226,10 +207,10 @@ class FiringBounds:
         return np.roll(moments, -1, axis=0) - moments, following - constants
 
     def _start(self) -> Array:
-        count = len(self.angles.throws)
+        count = len(self.angle_throws)
         paths = np.full((count + 1, count + 1), math.inf)
         np.fill_diagonal(paths, 0.0)
-        shortened = self.angles.shortened(paths, *self._root)
+        shortened = self.shortened(paths, *self.root)
         assert shortened is not None
         return shortened
 
@@ -238,9 +219,9 @@ class FiringBounds:
         if len(fired) == count:
             closed = self._with_interval(paths, fired[-1], laps[fired[-1]], fired[0], laps[fired[0]], wrapped=True)
             if closed is not None:
-                window = self._window(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed)
+                window = FiringWindow(tuple(k + 1 for k in fired), tuple(laps[k] for k in range(count)), closed, self)
                 # own angles of different throws may still want other angles of banks and pins
-                if not self.open_angles or window.within(*self._root) is not None:
+                if not self.open_angles or window.within(*self.root) is not None:
                     yield window
             return
         before, pins = fired[-1], self.layout.pins

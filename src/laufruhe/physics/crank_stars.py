@@ -18,7 +18,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array, ComplexArray, Mask
+from laufruhe.numerics.arrays import ComplexArray, Mask
 from laufruhe.numerics.exact_angles import phasors
 
 Stars = NDArray[np.uint8]
@@ -33,7 +33,19 @@ def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequen
 
     A star (throws,) has the step of every throw, 0 to phases - 1.
     """
-    tables, groups = _joined_tables(phases, places, orders)
+    waves = phase_waves(phases, orders).T
+    single = [np.stack([waves, x * waves], axis=-1).reshape(phases, -1).view(float) for x in places]
+    width = 1
+    while width < len(places) and phases ** (width + 1) <= _TABLE_ROWS:
+        width += 1
+    # sums of F_h and C_h over groups of throws, a row for each combination of steps
+    groups = [tuple(range(k, min(k + width, len(places)))) for k in range(0, len(places), width)]
+    tables = []
+    for group in groups:
+        joined = single[group[0]]
+        for k in group[1:]:
+            joined = (joined[:, None, :] + single[k][None, :, :]).reshape(len(joined) * phases, -1)
+        tables.append(np.ascontiguousarray(joined))
     out = np.empty((len(stars), 4 * len(orders)))
     for start in range(0, len(stars), _CHUNK):
         block = stars[start : start + _CHUNK]
@@ -53,25 +65,6 @@ def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequen
 def phase_waves(phases: int, orders: Sequence[int]) -> ComplexArray:
     """Return e^{i h theta} of every step, shape (orders, phases), with the symmetries of the circle."""
     return phasors([Fraction(p, phases) for p in range(phases)], np.array(orders, dtype=np.int64))
-
-
-def _joined_tables(
-    phases: int, places: Sequence[float], orders: Sequence[int]
-) -> tuple[list[Array], list[tuple[int, ...]]]:
-    """Return tables of sums of F_h and C_h (S1) over groups of throws; one row for each combination of steps."""
-    waves = phase_waves(phases, orders).T
-    single = [np.stack([waves, x * waves], axis=-1).reshape(phases, -1).view(float) for x in places]
-    width = 1
-    while width < len(places) and phases ** (width + 1) <= _TABLE_ROWS:
-        width += 1
-    groups = [tuple(range(k, min(k + width, len(places)))) for k in range(0, len(places), width)]
-    tables = []
-    for group in groups:
-        table = single[group[0]]
-        for k in group[1:]:
-            table = (table[:, None, :] + single[k][None, :, :]).reshape(len(table) * phases, -1)
-        tables.append(np.ascontiguousarray(table))
-    return tables, groups
 
 
 BLOCK = 1 << 14

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import fields
 from functools import lru_cache
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Cycle, Seiliger, SliderCrank, Wiebe
+from laufruhe.machine import Charge, Cycle, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import rising_root
 from laufruhe.physics.cylinder_volume import ChargedCylinder, dead_centres, gas_exchange_pressure, in_bar
@@ -87,16 +88,9 @@ def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
     Its indicated mean pressure is that of the gas exchange alone.
     """
     exponent = gas.compression_exponent if isinstance(gas, Seiliger) else gas.heat_ratio
-    return Seiliger(
-        peak_pressure=gas.intake_pressure * gas.compression_ratio**exponent,
-        imep=gas_exchange_pressure(gas, cycle),
-        compression_ratio=gas.compression_ratio,
-        compression_exponent=exponent,
-        expansion_exponent=exponent,
-        intake_pressure=gas.intake_pressure,
-        exhaust_pressure=gas.exhaust_pressure,
-        crankcase_pressure=gas.crankcase_pressure,
-    )
+    peak, imep = gas.intake_pressure * gas.compression_ratio**exponent, gas_exchange_pressure(gas, cycle)
+    charge = {number.name: getattr(gas, number.name) for number in fields(Charge)}
+    return Seiliger(peak, imep, compression_exponent=exponent, expansion_exponent=exponent, **charge)
 
 
 def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:

@@ -48,36 +48,27 @@ class DriveKind:
 
     def radius(self, sizes: Sizes) -> float:
         """Return the crank radius that makes the stroke [m]."""
-        return radius_for_stroke(
-            sizes.stroke, sizes.offset, rod_length=sizes.rod_length, rod_ratio=sizes.rod_ratio or 0.0
-        )
+        stroke, offset, length = sizes.stroke, sizes.offset, sizes.rod_length
+        s2, e2 = stroke * stroke, offset * offset
+        if offset == 0.0:
+            return 0.5 * stroke
+        # stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2), squared twice, is linear in r^2 for a given l, and
+        # quadratic for a given r / l
+        if length is not None and math.isfinite(length):
+            l2 = length * length
+            square = s2 * (4.0 * (l2 - e2) - s2) / (4.0 * (4.0 * l2 - s2)) if 4.0 * l2 > s2 else -1.0
+        else:
+            ratio = sizes.rod_ratio or 0.0
+            k2 = ratio * ratio
+            root = (s2 * (1.0 + k2)) ** 2 - 4.0 * k2 * s2 * (4.0 * e2 + s2)
+            square = (s2 * (1.0 + k2) + math.sqrt(root)) / 8.0 if root >= 0.0 else -1.0
+        if square <= 0.0:
+            raise ModelError(
+                f"no crank makes a stroke of {stroke * 1e3:.6g} mm with an offset of {offset * 1e3:.6g} mm on this "
+                "rod; lengthen the rod or lessen the offset"
+            )
+        return math.sqrt(square)
 
     def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:  # noqa: ARG002
         """Return the mechanism of every cylinder from the numbers that all drives share; these alone by default."""
         return plain
-
-
-def radius_for_stroke(
-    stroke: float, offset: float, *, rod_length: float | None = None, rod_ratio: float = 0.0
-) -> float:
-    """Return the crank radius of a stroke [m], at a given rod length or rod ratio.
-
-    Squaring stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2) twice leaves an
-    equation linear in r^2 for a given l, and quadratic for a given r / l.
-    """
-    s2, e2 = stroke * stroke, offset * offset
-    if offset == 0.0:
-        return 0.5 * stroke
-    if rod_length is not None and math.isfinite(rod_length):
-        l2 = rod_length * rod_length
-        square = s2 * (4.0 * (l2 - e2) - s2) / (4.0 * (4.0 * l2 - s2)) if 4.0 * l2 > s2 else -1.0
-    else:
-        k2 = rod_ratio * rod_ratio
-        root = (s2 * (1.0 + k2)) ** 2 - 4.0 * k2 * s2 * (4.0 * e2 + s2)
-        square = (s2 * (1.0 + k2) + math.sqrt(root)) / 8.0 if root >= 0.0 else -1.0
-    if square <= 0.0:
-        raise ModelError(
-            f"no crank makes a stroke of {stroke * 1e3:.6g} mm with an offset of {offset * 1e3:.6g} mm on this rod; "
-            "lengthen the rod or lessen the offset"
-        )
-    return math.sqrt(square)
