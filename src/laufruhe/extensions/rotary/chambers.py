@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,38 +31,20 @@ def rotors_of(engine: Engine) -> Sequence[SliderCrank]:
     return [part for part in engine.slider_cranks if len(part.swept.lags) > 1]
 
 
-@dataclass(frozen=True)
-class RotorChambers:
-    """Chambers of one rotor, a row each, over the shaft angles in which each completes its cycle.
+def rotor_chambers(problem: Problem, part: SliderCrank, point: OperatingPoint, count: int) -> tuple[Array, Array]:
+    """Return shaft angles (n,) in which every chamber completes its cycle, and values (k, chambers, n) (Y3, Y4).
 
-    Attributes
-    ----------
-    volume
-        Over the least [m3].
-    pressure, torque
-        Over the crankcase [Pa], and on the shaft [N m]; None without gas.
+    The values are volume above the least [m3] and, with gas, pressure over the crankcase [Pa] and torque [N m].
     """
-
-    angles: Array
-    volume: Array
-    pressure: Array | None
-    torque: Array | None
-
-
-def rotor_chambers(problem: Problem, part: SliderCrank, point: OperatingPoint, count: int) -> RotorChambers:
-    """Return volume, pressure and torque of every chamber of a rotor (Y3, Y4)."""
-    gas, lags = problem.fidelity.gas_of(point), part.swept.lags
+    gas, lags, cycle = problem.fidelity.gas_of(point), part.swept.lags, problem.engine.cycle
     turns = math.tau * len(lags)
     angles = np.linspace(0.0, turns, count)
     since = [np.mod(angles - lag, turns) for lag in lags]
-    volume = np.array([chamber_volume(part, angle) for angle in since])
-    if gas is None:
-        return RotorChambers(angles, volume, None, None)
-    cycle = problem.engine.cycle
-    pressure = np.array([-thrust_at(gas, part, cycle, angle) / part.piston_area for angle in since])
-    return RotorChambers(
-        angles, volume, pressure, np.array([chamber_torque(gas, part, cycle, angle) for angle in since])
-    )
+    values = [[chamber_volume(part, angle) for angle in since]]
+    if gas is not None:
+        values.append([-thrust_at(gas, part, cycle, angle) / part.piston_area for angle in since])
+        values.append([chamber_torque(gas, part, cycle, angle) for angle in since])
+    return angles, np.array(values)
 
 
 def _chambers(result: Result) -> Table:
@@ -71,14 +52,12 @@ def _chambers(result: Result) -> Table:
     rows = []
     for point in result.problem.points:
         for part in rotors_of(result.final.engine):
-            chambers = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
-            undefined = np.full_like(chambers.volume, math.nan)
-            pressure, torque = (
-                undefined if quantity is None else quantity for quantity in (chambers.pressure, chambers.torque)
-            )
-            for k, columns in enumerate(zip(chambers.volume, pressure, torque, strict=True)):
-                values = np.column_stack([np.degrees(chambers.angles), *columns]).tolist()
-                rows += [[point.name, part.name, k + 1, *row] for row in values]
+            angles, values = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
+            columns = np.full((3, *values.shape[1:]), math.nan)
+            columns[: len(values)] = values
+            for k, chamber in enumerate(columns.swapaxes(0, 1)):
+                numbers = np.column_stack([np.degrees(angles), *chamber]).tolist()
+                rows += [[point.name, part.name, k + 1, *row] for row in numbers]
     head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
             "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
     return Table(head, rows)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
@@ -26,14 +25,15 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """Draw volume, pressure and torque of each chamber of rotor 1, and their total torque."""
     part, point = rotors_of(result.final.engine)[0], result.problem.points[hardest_point(result)]
-    chambers = rotor_chambers(result.problem, part, point, STEPS)
-    degrees = np.degrees(chambers.angles)
-    drawn = page(1 if chambers.torque is None else 3, 1, (WIDE, HIGH), gap=0.35)
-    _lines(drawn.panels[0], degrees, 1e6 * chambers.volume)
-    if chambers.pressure is not None and chambers.torque is not None:
-        _lines(drawn.panels[1], degrees, 1e-5 * chambers.pressure)
-        _lines(drawn.panels[2], degrees, chambers.torque)
-        drawn.panels[2].plot(degrees, chambers.torque.sum(axis=0), color=INK, linewidth=1.6)
+    angles, values = rotor_chambers(result.problem, part, point, STEPS)
+    degrees = np.degrees(angles)
+    drawn = page(len(values), 1, (WIDE, HIGH), gap=0.35)
+    for axes, factor, of_chambers in zip(drawn.panels, (1e6, 1e-5, 1.0), values, strict=False):
+        for row, colour in zip(of_chambers, COLOURS, strict=False):
+            axes.plot(degrees, factor * row, color=colour, linewidth=1.2)
+    has_gas = len(values) > 1
+    if has_gas:
+        drawn.panels[2].plot(degrees, values[2].sum(axis=0), color=INK, linewidth=1.6)
     words = ("volume above\nminimum [cm³]", "gauge\npressure [bar]", "torque [N m]")
     for axes, label in zip(drawn.panels, words, strict=False):
         axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
@@ -43,11 +43,6 @@ def figure(result: Result) -> Figure:
     align_labels(drawn.panels)
     drawn.panels[-1].set_xlabel("angle of the eccentric shaft [°]")
     legend = [entry(f"chamber {k + 1}", color=colour, linewidth=2.0) for k, colour in enumerate(COLOURS)]
-    legend += [] if chambers.torque is None else [entry("all", color=INK, linewidth=2.0)]
+    legend += [entry("all", color=INK, linewidth=2.0)] if has_gas else []
     lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; the chambers fire one turn after another."
     return finish_page(drawn, result, "Chambers of a rotor", lines, legend)
-
-
-def _lines(axes: Axes, degrees: np.ndarray, values: np.ndarray) -> None:
-    for row, colour in zip(values, COLOURS, strict=False):
-        axes.plot(degrees, row, color=colour, linewidth=1.2)
