@@ -127,7 +127,7 @@ class FiringBounds:
 
     @cached_property
     def shares(self) -> Array:
-        """What an open angle adds to every own angle, shape (own angles, open angles)."""
+        """Parts of open angles in every own angle, shape (own angles, open angles)."""
         return np.tile(np.array([share for _, share in self._named])[:, None], len(self.open_angles))
 
     @cached_property
