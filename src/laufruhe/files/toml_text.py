@@ -14,7 +14,6 @@ from laufruhe.errors import Complaint, printed
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _AT = re.compile(r"^(.*) \(at (?:line (\d+), column (\d+)|end of document)\)$", re.DOTALL)
 _TEXT = r'"""(?:[^\\]|\\.)*?"""|' r"'''.*?'''|" r'"(?:[^"\\\n]|\\.)*"|' r"'[^'\n]*'"
-_MARK = re.compile(rf"{_TEXT}|#[^\n]*|[\[\]{{}}]", re.DOTALL)
 _ENTRY = re.compile(r"""\s*((?:[\w-]|\.|"[^"]*"|'[^']*')+)\s*=""")
 _HEAD = re.compile(r"\s*\[+ *([A-Za-z_][\w.-]*) *\]+\s*(?:#|$)")
 _CLOSING = {"[": "]", "{": "}"}
@@ -133,10 +132,10 @@ def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
         remedy = f'a number with its unit stands in quotes, as in "{printed(value.strip(chr(34)), 40)}"'
         return offset, "a unit stands without quotes", remedy
     brackets: list[int] = []
-    for mark in _MARK.finditer(text, 0, offset):
-        if mark.group() in _CLOSING:
-            brackets.append(mark.start())
-        elif mark.group() in _CLOSING.values() and brackets:
+    for token in _TOKEN.finditer(text, 0, offset):
+        if token["open"]:
+            brackets.append(token.start())
+        elif token["close"] and brackets:
             brackets.pop()
     if brackets:
         bracket_offset = brackets[-1]
