@@ -234,14 +234,14 @@ def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
 
 
 def objectives_of(
-    tables: Sequence[ObjectiveTable] | None, scene: MeasureContext, single: Sequence[str]
+    tables: Sequence[ObjectiveTable] | None, context: MeasureContext, single: Sequence[str]
 ) -> tuple[PriorityLevel, ...]:
     """Return the objectives in order of priority; without [objective] the mean mount force of an engine on mounts.
 
     The keys of the file in `single` require a single objective.
     """
     if tables is None:
-        return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
+        return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if context.engine.mounts else ()
     if not tables:
         raise Refused("objective", [], "is empty", "leave it out, or add minimise")
     if len(tables) > 1 and single:
@@ -250,7 +250,7 @@ def objectives_of(
     ranks = []
     for k, table in enumerate(tables, 1):
         where, is_last = f"objective[{k}]" if len(tables) > 1 else "objective", k == len(tables)
-        terms = _terms(table, scene, where)
+        terms = _terms(table, context, where)
         if is_last and table.within is not None:
             raise Refused(f"{where}.within", table.within, "is for all objectives but the last", "leave it out")
         if not is_last and len(terms) > 1:
@@ -263,29 +263,29 @@ def objectives_of(
     return tuple(ranks)
 
 
-def _terms(table: ObjectiveTable, scene: MeasureContext, where: str) -> tuple[Term, ...]:
+def _terms(table: ObjectiveTable, context: MeasureContext, where: str) -> tuple[Term, ...]:
     # norms of loads come before numbers of the mounts
     require_one_of(table, where, "minimise", "terms", value=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
-        return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
+        return (Term(_minimised(table.minimise, table, f"{where}.minimise", context)),)
     terms = [
-        Term(_minimised(term.quantity, term, f"{where}.terms[{k}].quantity", scene), term.weight)
+        Term(_minimised(term.quantity, term, f"{where}.terms[{k}].quantity", context), term.weight)
         for k, term in enumerate(table.terms, 1)
     ]
     return tuple(sorted(terms, key=lambda term: term.measure.channel.is_number))
 
 
-def _minimised(name: str, table: QuantityTable, where: str, scene: MeasureContext) -> Measure:
-    measure = scene.measure(name, table, where)
+def _minimised(name: str, table: QuantityTable, where: str, context: MeasureContext) -> Measure:
+    measure = context.measure(name, table, where)
     if not measure.channel.minimised:
         remedy = f"limit it ([[constraints]], limit = '{name}'), and minimise a force, a moment or a mass"
         raise Refused(where, name, "can be limited but not minimised", remedy)
     return measure
 
 
-def limits_of(tables: Sequence[ConstraintTable], scene: MeasureContext) -> tuple[Limit, ...]:
+def limits_of(tables: Sequence[ConstraintTable], context: MeasureContext) -> tuple[Limit, ...]:
     """Return the limits, those of loads and masses before those of numbers."""
-    limits = [_limit(table, f"constraints[{k}]", scene) for k, table in enumerate(tables, 1)]
+    limits = [_limit(table, f"constraints[{k}]", context) for k, table in enumerate(tables, 1)]
     _check_unique(limits)
     limits.sort(key=lambda limit: limit.measure.channel.is_number)
     numbers = [limit for limit in limits if limit.measure.channel.is_number]
@@ -300,8 +300,8 @@ def limits_of(tables: Sequence[ConstraintTable], scene: MeasureContext) -> tuple
     return tuple(limits)
 
 
-def _limit(table: ConstraintTable, where: str, scene: MeasureContext) -> Limit:
-    measure = scene.measure(table.limit, table, f"{where}.limit")
+def _limit(table: ConstraintTable, where: str, context: MeasureContext) -> Limit:
+    measure = context.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
     norm, remedy = not channel.is_number, "give " + " or ".join(sides)
     for key in EDGES:

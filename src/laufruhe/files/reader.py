@@ -271,13 +271,13 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     for key in keys:
         if key.always or getattr(file, key.name) is not None:
             problem = key.read(getattr(file, key.name), problem, context)
-    scene = MeasureContext(problem.engine, points)
-    ranks = objectives_of(file.objective, scene, file.single)
+    measure_context = MeasureContext(problem.engine, points)
+    ranks = objectives_of(file.objective, measure_context, file.single)
     problem = replace(
         problem,
         objective=ranks[0].terms if ranks else (),
         ranks=ranks if len(ranks) > 1 else (),
-        limits=limits_of(file.constraints, scene),
+        limits=limits_of(file.constraints, measure_context),
         friction=tuple(brake.tests if brake else ()),
     )
     return with_fidelity(problem, file.fidelity)

@@ -28,10 +28,10 @@ def partners(problem: Problem) -> dict[str, Measure]:
     minimised = {term.measure for term in problem.objective}
     measures = {limit.name: limit.measure for limit in problem.limits if limit.maximum < math.inf}
     measures |= {m.name: m for rank in problem.ranks for m in (term.measure for term in rank.terms)}
-    scene = MeasureContext(problem.engine, problem.points)
+    context = MeasureContext(problem.engine, problem.points)
     for name in _USUAL:
         with suppress(Refused):
-            measures.setdefault(name, scene.measure(name, QuantityTable(), f"front.{name}"))
+            measures.setdefault(name, context.measure(name, QuantityTable(), f"front.{name}"))
     return {name: m for name, m in measures.items() if m not in minimised and not m.channel.is_number}
 
 
