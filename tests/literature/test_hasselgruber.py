@@ -19,11 +19,11 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, Role, Rotor, Shaft
 from laufruhe.machine.layouts import Layout, Mechanism, boxer, build, inline, stations, vee
-from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import inertia_roll_orders, piston_acceleration_orders
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
+from laufruhe.studies.equal_power import equal_power_scale
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 # Figs. 2, 5 and 12: s = 120 mm, m_osc = 1.25 kg, n = 2500 rpm, a = 125 mm; lambda is not printed

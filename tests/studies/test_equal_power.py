@@ -8,10 +8,9 @@ import pytest
 
 from laufruhe import load
 from laufruhe.errors import ModelError
-from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
-from laufruhe.studies.equal_power import at_equal_power
+from laufruhe.studies.equal_power import at_equal_power, equal_power_scale
 from laufruhe.studies.scenes import with_shafts
 from problem_files import PROBLEMS
 

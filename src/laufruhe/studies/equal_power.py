@@ -2,17 +2,41 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
 from laufruhe.machine.layouts import Layout
-from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
 from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Problem
 
 # factors on a decision when the engine is resized, by unit
 _FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
+
+
+@dataclass(frozen=True)
+class EqualPowerScale:
+    """Factors from the reference engine to one of z cylinders and the same power.
+
+    Volumes and masses of parts grow as the cube of length (eq. 21), forces of gas and inertia as its square (eq. 23).
+
+    Attributes
+    ----------
+    length
+        Factor of bore, stroke and every other length (eqs. 18, 19).
+    speed
+        Factor of crank speed (eq. 20).
+    """
+
+    length: float
+    speed: float
+    mass: float
+
+
+def equal_power_scale(cylinders: int, reference_cylinders: int) -> EqualPowerScale:
+    """Return the factors from an engine with `reference_cylinders` to one with `cylinders` (eqs. 14-23)."""
+    ratio = cylinders / reference_cylinders
+    return EqualPowerScale(length=ratio**-0.5, speed=ratio**0.5, mass=ratio**-1.5)
 
 
 def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:

@@ -3,8 +3,7 @@
 from collections.abc import Mapping
 
 from laufruhe.extension import extended
-from laufruhe.machine.drives.base import DriveKind, Sizes
-from laufruhe.machine.drives.slider_crank import Klein, RodDrive, ScotchYoke
+from laufruhe.machine.drives.base import DriveKind, Klein, RodDrive, ScotchYoke, Sizes
 
 DRIVES: Mapping[str, DriveKind] = extended("drives", DriveKind, (RodDrive(), ScotchYoke(), Klein()))
 

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
-from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.studies.equal_power import EqualPowerScale, equal_power_scale
 
 COUNTS = st.integers(1, 48)
 
