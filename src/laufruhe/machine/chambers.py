@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -68,11 +68,6 @@ class Steam:
             if begin + self.clearance == 0.0 and begin < end:
                 raise ModelError(f"the chamber vanishes at the dead centre; give a clearance, or {name} more than 0")
 
-    @property
-    def turning_points(self) -> tuple[tuple[float, bool], ...]:
-        """Kinks of the diagram: part of the stroke, and True on the way out."""
-        return (self.cut_off, True), (self.release, True), (self.compression, False), (self.lead, False)
-
 
 class Pump(Steam):
     """A piston pump: one pressure while its chamber grows, another while it shrinks (G17; Roetscher, Fig. 1053)."""
@@ -115,11 +110,6 @@ class Chamber:
     def area(self) -> float:
         """Area under pressure [m2], F' or F'' of eq. 296."""
         return math.pi / 4.0 * (self.bore - self.rod) * (self.bore + self.rod)
-
-    @property
-    def drive(self) -> Hashable:
-        """Numbers that determine the force on the piston."""
-        return self.end, self.bore, self.rod, self.diagram
 
     @property
     def side(self) -> int:

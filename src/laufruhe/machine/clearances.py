@@ -41,13 +41,8 @@ def shafts_of(engine: Engine) -> tuple[str, ...]:
 def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: bool) -> list[Span]:
     """Return (least, largest) distance of every two axes, with shafts between their places in two engines [m].
 
-    Parameters
-    ----------
-    names
-        Shafts that count: one alone from the crankshaft, all where None. One of two is a balancer shaft.
-        An engine may lack one that is optional.
-    swept
-        Whether what the weights and throws of both sweep is taken off.
+    Named shafts count, one alone from the crankshaft, and all where None. One of two is a balancer shaft; an engine may
+    lack one that is optional. The room that the weights and throws of both sweep is taken off on request.
     """
     low, high = _shafts(lower), _shafts(upper)
     counted = low if names is None else (*names, CRANKSHAFT.name) if len(names) == 1 else names

@@ -56,8 +56,6 @@ class Rotor:
         Place along the crank axis [m].
     unbalance
         Mass times eccentricity, at its angle when phi = 0 [kg m], zeta = z + i y.
-    role
-        Part of a throw, counterweight, or balancer.
     radius
         Eccentricity of its mass [m], where the mass itself matters.
     """

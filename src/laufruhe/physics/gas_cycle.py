@@ -72,7 +72,7 @@ def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
     return (
         part.path,
         part.facing,
-        tuple(chamber.drive for chamber in gas.of(part)) if isinstance(gas, Chambers) else part.bore,
+        tuple((c.end, c.bore, c.rod, c.diagram) for c in gas.of(part)) if isinstance(gas, Chambers) else part.bore,
     )
 
 

@@ -34,10 +34,13 @@ def chambers_breaks(gas: Chambers, part: SliderCrank) -> Array:
     breaks = set[float]()
     for chamber in gas.of(part):
         smallest, largest = _ends(chamber, part)
-        if isinstance(chamber.diagram, PressureTrace):
-            breaks.update(smallest + angle for angle in chamber.diagram.angles)
+        diagram = chamber.diagram
+        if isinstance(diagram, PressureTrace):
+            breaks.update(smallest + angle for angle in diagram.angles)
             continue
-        inner = [(place, is_out) for place, is_out in chamber.diagram.turning_points if 0.0 < place < 1.0]
+        kinks = [(place, True) for place in (diagram.cut_off, diagram.release)]
+        kinks += [(place, False) for place in (diagram.compression, diagram.lead)]
+        inner = [(place, is_out) for place, is_out in kinks if 0.0 < place < 1.0]
         places, way = np.array([place for place, _ in inner]), np.array([is_out for _, is_out in inner], dtype=bool)
         # on either way from where the chamber is smallest, forwards or backwards, so that travel rises
         begin = np.where(way, smallest, smallest + math.tau)

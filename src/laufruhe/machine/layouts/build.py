@@ -123,14 +123,10 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
 
 @dataclass(frozen=True)
 class Throw:
-    """Throw of a crankshaft.
+    """Throw of a crankshaft at a place along its axis [m] and an angle at phi = 0 [rad] (C3).
 
     Attributes
     ----------
-    x
-        Place along the crank axis [m].
-    angle
-        At phi = 0 [rad] (C3).
     cylinders
         Indices of the slider-cranks that work on it.
     unbalance
