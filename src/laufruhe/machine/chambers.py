@@ -119,13 +119,7 @@ class Chamber:
 
 @dataclass(frozen=True)
 class Chambers:
-    """Working chambers of a machine.
-
-    Attributes
-    ----------
-    crankcase_pressure
-        Of the air around, on the ends of the piston rods [Pa].
-    """
+    """Working chambers of a machine, and the pressure of the air around, on the ends of the piston rods [Pa]."""
 
     chambers: tuple[Chamber, ...]
     crankcase_pressure: float = AMBIENT_PRESSURE

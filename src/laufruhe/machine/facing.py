@@ -24,13 +24,7 @@ STEPS = 720
 
 @dataclass(frozen=True)
 class Facing:
-    """The other piston of a cylinder, with its crank radius and rod length [m].
-
-    Attributes
-    ----------
-    ahead
-        Crank angle by which it comes to its dead centre first [rad].
-    """
+    """The other piston of a cylinder, and the crank angle by which it comes to its dead centre first [rad]."""
 
     crank_radius: float
     rod_length: float

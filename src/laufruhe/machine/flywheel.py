@@ -93,10 +93,7 @@ class Rim:
 class Flywheel:
     """Parts that turn with the crank at its speed, pistons and rods excluded.
 
-    Attributes
-    ----------
-    rest
-        Inertia of all but the rim, or of all where there is none [kg m2].
+    `rest` is the inertia of all but the rim, or of all where there is none [kg m2].
     """
 
     rest: float

@@ -15,13 +15,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class BalanceFactor:
-    """Balance factor of the counterweights on one throw.
-
-    Attributes
-    ----------
-    factor
-        Share of their reciprocating mass that the counterweights balance, beyond the rotating mass of the throw.
-    """
+    """Share of the reciprocating mass of cylinders on one throw that counterweights balance beyond its rotating mass."""
 
     cylinders: tuple[str, ...]
     factor: float

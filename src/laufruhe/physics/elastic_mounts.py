@@ -43,10 +43,7 @@ class ResonanceError(ModelError):
 class ElasticMounting:
     """Linear map from the wrench on the block to motion and forces, at any speed.
 
-    Attributes
-    ----------
-    answering
-        Modes that answer, 1 the lowest; all that are excited when None.
+    The modes `answering` answer alone, 1 the lowest; all that are excited when None.
     """
 
     block: Block

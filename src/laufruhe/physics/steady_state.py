@@ -135,10 +135,7 @@ INTEGRATION = 1e-9
 class TimeMounting:
     """Steady state by integration, with bump stops, and the viscous loss of E26.
 
-    Attributes
-    ----------
-    samples
-        Steps over the period at which the motion is read; orders above half of them are lost.
+    The motion is read at equal steps over the period, `samples` of them; orders above half of them are lost.
     """
 
     mounting: ElasticMounting
