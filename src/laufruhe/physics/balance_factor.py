@@ -15,7 +15,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class BalanceFactor:
-    """Share of the reciprocating mass of cylinders on one throw that counterweights balance beyond its rotating mass."""
+    """Share of the reciprocating mass on a throw that its counterweights balance beyond its rotating mass."""
 
     cylinders: tuple[str, ...]
     factor: float

@@ -65,12 +65,6 @@ def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     return {"gas": gas, "pistons": points, "rods": rods, "all": total}
 
 
-def work_stored(torque: Spectrum, samples: int) -> float:
-    """Return the range of the work of the alternating torque [J], of a torque of shape (n,) (T2)."""
-    work = torque.integral.sample(samples)
-    return float(work.max() - work.min()) if len(work) else 0.0
-
-
 def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
     """Return mean, extremes and stored work of the torque, and the irregularity of the crank speed."""
     torque = crank_torque(engine, point, fidelity)
@@ -81,7 +75,7 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     uneven = None if inertia is None else swing_of(engine, point, fidelity).irregularity(inertia)
     return TorqueFacts(
         mean, mean * point.speed, float(values.min()), float(values.max()),
-        work_stored(torque, FINE_WORK * fidelity.samples), uneven,
+        float(np.ptp(torque.integral.sample(FINE_WORK * fidelity.samples))), uneven,
     )  # fmt: skip
 
 
