@@ -257,7 +257,7 @@ def rankings() -> str:
         parts.append(f"## {result.problem.title}")
         found = f"{objective.name} {objective.value:.6g} {objective.unit}"
         parts.append(f"`problems/{name}.toml`: {found} in {took:.1f} s of a processor; {proof}.")
-        parts += [grid_text(grid) for grid in stars.tables(result)]
+        parts += [grid_text(grid) for grid in stars.crank_stars(result)]
     return "\n\n".join(parts) + "\n"
 
 

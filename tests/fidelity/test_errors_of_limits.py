@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import laufruhe
-from laufruhe.report.sections.limits import tables
+from laufruhe.report.sections.values import limits
 
 SIX = """
 title = "Six in line: of a force along one line only order 6 is left"
@@ -40,5 +40,5 @@ def test_error_of_a_mean_with_corners_is_told_and_not_exceeded() -> None:
     truth = result.objective.value * math.sqrt(2.0) * 2.0 / math.pi
     error = abs(limit.value / truth - 1.0)
     assert 1e-4 < error <= limit.error_estimate < 10.0 * error
-    (grid,) = tables(result)
+    (grid,) = limits(result)
     assert "from sampling the cycle" in grid.note

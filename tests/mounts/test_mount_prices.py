@@ -12,7 +12,7 @@ from lanes import first_fast
 from laufruhe.present.numbers import DASH
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.report.sections.limits import tables
+from laufruhe.report.sections.values import limits
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
@@ -85,6 +85,6 @@ def test_an_active_limit_never_shows_a_dash(tmp_path: Path) -> None:
     result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked, SEARCH))
     for price, said in ((math.nan, "not known"), (0.0, "0 "), (2.0, "0.002000 ")):
         shown = replace(result, limits=(replace(result.limits[0], shadow_price=price),))
-        assert tables(shown)[0].rows[0][-1].startswith(said)
+        assert limits(shown)[0].rows[0][-1].startswith(said)
     slack = replace(result, limits=(replace(result.limits[0], shadow_price=0.0, active=False),))
-    assert tables(slack)[0].rows[0][-1] == DASH
+    assert limits(slack)[0].rows[0][-1] == DASH

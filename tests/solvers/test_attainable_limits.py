@@ -23,8 +23,8 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.report.json_result import as_dict
-from laufruhe.report.sections.reach import sentences, tables
-from laufruhe.report.wording import explained
+from laufruhe.report.sections.values import attainable as attainable_tables
+from laufruhe.report.wording import attainable, explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.attainable_limits import LONG, with_attainable_limits
@@ -226,8 +226,8 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     written = as_dict(result)
     assert written["objective"]["value"] is None
     assert written["nearest"]["decisions"].keys() == {decision.name for decision in near.decisions}
-    assert "proven;" not in " ".join(sentences(result))
-    (grid,) = tables(result)
+    assert "proven;" not in " ".join(attainable(result))
+    (grid,) = attainable_tables(result)
     assert grid.head[-1] == "nearest to all limits"
     assert [row[0] for row in grid.rows] == ["value reached", *written["nearest"]["decisions"]]
 
@@ -267,7 +267,7 @@ def test_nothing_is_looked_at_when_time_is_over() -> None:
     found = told_of(SCENES["vee"], Status.INFEASIBLE, 1e-9)
     assert [each.why for each in found.reached] == [LONG]
     assert all(math.isnan(each.value) for each in found.reached)
-    assert "no time left" in sentences(found)[0]
+    assert "no time left" in attainable(found)[0]
 
 
 class Clock:
@@ -296,7 +296,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
     with limit_time(0.4), progress_listener(steps.append):
         found = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
-    assert all("at the time limit" in text for text in sentences(found)[:2])
+    assert all("at the time limit" in text for text in attainable(found)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
     told = [(step.done, step.whole) for step in steps if step.what == "attainable limits"]
     assert told == [(0, 2), (1, 2)]
@@ -313,7 +313,7 @@ def test_what_nothing_open_changes_stays() -> None:
     assert result.status is Status.INFEASIBLE
     (told,) = result.reached
     assert told.value == pytest.approx(evaluate(problem).value(problem.limits[-1].measure))
-    assert "stays at" in sentences(result)[0]
+    assert "stays at" in attainable(result)[0]
     assert "needed" not in explained(result)
 
 

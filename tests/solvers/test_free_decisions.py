@@ -18,7 +18,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.report.json_result import as_dict
-from laufruhe.report.sections.decisions import tables
+from laufruhe.report.sections.values import decisions
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design
@@ -93,7 +93,7 @@ def test_what_the_objective_does_not_feel_is_free_from_bound_to_bound() -> None:
     """A weight on the crank makes no force of second order."""
     result = laufruhe.solve(problem_of("rms mount force", [web("web")], {"orders": [2]}))
     assert ends_of(result)["web.mass"] == pytest.approx((0.0, 2.0), abs=1e-6)
-    assert "not unique" in tables(result)[0].note
+    assert "not unique" in decisions(result)[0].note
     (told,) = as_dict(result)["free_decisions"]
     assert told == {"name": "web.mass", "unit": "kg", "low": pytest.approx(0.0), "high": pytest.approx(2.0)}
 
@@ -158,7 +158,7 @@ def test_nothing_is_told_where_it_is_not_looked_at() -> None:
     found = solve(replace(problem_of("mean mount force", TWINS)))
     assert free_decisions(replace(found, problem=moving)) is None
     assert as_dict(found)["free_decisions"] is None
-    assert not tables(found)[0].note
+    assert not decisions(found)[0].note
 
 
 def test_prices_within_the_accuracy_are_none() -> None:
@@ -179,7 +179,7 @@ def test_an_angle_of_nothing_is_not_shown() -> None:
     result = solve(problem_of("rms mount force", [web("web") | {"angle": {"between": [0, 360]}}], {"orders": [2]}))
     assert [decision.name for decision in relevant_decisions(result.decisions)] == ["web.mass"]
     assert "web.angle" not in repr(result)
-    assert tables(result)[0].rows[1][2] == "-"
+    assert decisions(result)[0].rows[1][2] == "-"
 
 
 def test_conditions_that_hardly_hold_are_not_said_to() -> None:

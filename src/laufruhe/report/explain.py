@@ -24,6 +24,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     pruned, exact = choice.numbers
     ratio = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""
     remark = "" if choice.error_estimate <= tolerance else "; the reference is no better: use a smoother gas trace"
+    static = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
     lines = [
         f"{problem.title}",
         f"Error of the objective: at most {choice.error_estimate:.1e} (tolerance {tolerance:g}{remark})",
@@ -31,8 +32,16 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "Computed:",
         *(f"  {text}" for text in choice.description),
         "Neglected:",
-        *(_line(part.what, part.why, part.share) for part in choice.left_out),
-        *_static(problem),
+    ]
+    for part in choice.left_out:
+        size = (
+            f"changes the objective by at most {part.share:.1e}"
+            if part.share > 0.0
+            else "does not change the objective"
+        )
+        lines.append(f"  {part.what}: {part.why}; {size}")
+    lines += ["Static:", f"  {static}"] if static else []
+    lines += [
         "Cost:",
         f"  {pruned} of {exact} samples of force components{ratio}",
         f"  one more design: {trimmed(milliseconds[0], 3)} ms; with exact physics: {trimmed(milliseconds[1], 3)} ms",
@@ -54,13 +63,3 @@ def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
     })  # fmt: skip
-
-
-def _static(problem: Problem) -> list[str]:
-    sentence = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
-    return ["Static:", f"  {sentence}"] if sentence else []
-
-
-def _line(what: str, why: str, share: float) -> str:
-    size = f"changes the objective by at most {share:.1e}" if share > 0.0 else "does not change the objective"
-    return f"  {what}: {why}; {size}"

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import asdict
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -18,7 +20,7 @@ from laufruhe.physics.torque import torque_facts
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel, mounting_in
-from laufruhe.problem.evaluation import Evaluation, channel_samples, place_measures, with_common_base
+from laufruhe.problem.evaluation import channel_samples, place_measures, with_common_base
 from laufruhe.problem.static_load import static_part
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.section import EXTENSION_SECTIONS
@@ -26,7 +28,6 @@ from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.stars.ranking import RankedStar
 from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue
 
 Record = dict[str, Any]
@@ -39,7 +40,7 @@ def as_json(result: Result, series: bool = False) -> str:
 
 def as_dict(result: Result, series: bool = False) -> Record:
     """Return the result as plain Python values; `series` adds loads over the cycle."""
-    problem = result.problem
+    problem, engine, proof = result.problem, result.final.engine, result.certificate
     points = [_point(result, k) for k in range(len(problem.points))]
     # a single operating point is at the top level
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
@@ -47,13 +48,15 @@ def as_dict(result: Result, series: bool = False) -> Record:
     if series:
         keys += ("series",)
         points = [{**point, "series": _series(result, k)} for k, point in enumerate(points)]
+    no_proof = {"kind": str(Proof.NONE), "lower_bound": None, "gap": None, "kkt_residual": None, "method": ""}
     return {
         "problem": problem.name,
         **_attributes(problem, "title source assumptions"),
         "status": str(result.status),
         **_attributes(result, "message conflict"),
         "objective": _objective(result),
-        "certificate": _certificate(result),
+        "certificate": {"kind": str(proof.kind), **_attributes(proof, "lower_bound gap kkt_residual method")}
+        if proof else no_proof,
         "decisions": {
             d.name: {
                 **_attributes(d, "value unit lower upper at_bound initial shadow_price"),
@@ -61,9 +64,20 @@ def as_dict(result: Result, series: bool = False) -> Record:
             }
             for d in result.decisions
         },
-        "constraints": _constraints(result),
+        "constraints": [
+            {
+                **_attributes(limit, "name value error_estimate limit side unit active"),
+                "met": is_met(limit),
+                "shadow_price": limit.shadow_price if proof else None,
+                "tightening_price": limit.price.tightened if proof else None,
+            }
+            for limit in limits_of(result)
+        ],
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
-        "shaking": max((point["shaking"] for point in points), key=_hardness),
+        "shaking": max(
+            (point["shaking"] for point in points),
+            key=lambda shaking: [max(shaking[load], default=0.0) for load in ("force", "moment")],
+        ),
         "points": [{key: point[key] for key in keys} for point in points],
         **(_on_mounts(result) if is_elastic(result) else {}),
         **{
@@ -71,7 +85,9 @@ def as_dict(result: Result, series: bool = False) -> Record:
             for name, section in EXTENSION_SECTIONS.items()
             if section.record and section.applies(result)
         },
-        **_running(result),
+        "balance_factors": [_attributes(balance, "cylinders factor") for balance in balance_factors(engine)],
+        "firing_intervals": list(engine.firing_intervals),
+        "warnings": [str(doubt) for doubt in problem.plausibility_warnings],
         **_phasing(result),
         **_ranks(result),
         **_reached(result),
@@ -97,58 +113,26 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-def _running(result: Result) -> Record:
-    engine = result.final.engine
-    return {
-        "balance_factors": [_attributes(balance, "cylinders factor") for balance in balance_factors(engine)],
-        "firing_intervals": list(engine.firing_intervals),
-        "warnings": [str(doubt) for doubt in result.problem.plausibility_warnings],
-    }
-
-
 def _objective(result: Result) -> Record | None:
     if result.objective is not None:
         part = static_part(result.problem, result.final)
         means = {} if part is None else asdict(part)
         return {**_attributes(result.objective, "name value unit initial reduction"), **means}
     initial = ObjectiveValue.of_initial(result.problem, result.initial)
-    return (
-        None
-        if initial is None
-        else {**_attributes(initial, "name value unit initial"), "value": None, "reduction": None}
-    )
-
-
-def _certificate(result: Result) -> Record:
-    c = result.certificate
-    if c is None:
-        return {"kind": str(Proof.NONE), "lower_bound": None, "gap": None, "kkt_residual": None, "method": ""}
-    return {"kind": str(c.kind), **_attributes(c, "lower_bound gap kkt_residual method")}
-
-
-def _constraints(result: Result) -> list[Record]:
-    return [
-        {
-            **_attributes(limit, "name value error_estimate limit side unit active"),
-            "met": is_met(limit),
-            "shadow_price": None if result.certificate is None else limit.shadow_price,
-            "tightening_price": None if result.certificate is None else limit.price.tightened,
-        }
-        for limit in limits_of(result)
-    ]
+    if initial is None:
+        return None
+    return {**_attributes(initial, "name value unit initial"), "value": None, "reduction": None}
 
 
 def _point(result: Result, k: int) -> Record:
     point, final = result.problem.points[k], result.final
+    facts = torque_facts(final.engine, point, result.problem.fidelity)
     return {
         **_attributes(point, "name speed weight"),
         "mounts": [],
         **{places.key: _places(result, k, places.channel) for places in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
-        "torque": _attributes(
-            torque_facts(final.engine, point, result.problem.fidelity),
-            "mean power least=minimum largest excursion irregularity",
-        ),
+        "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity"),
     }
 
 
@@ -202,7 +186,7 @@ def _all_points(result: Result, mounts: list[list[Record]]) -> list[Record]:
         {
             "name": entries[0]["name"],
             **_over_points(entries, share),
-            "orders": _largest_orders([entry["orders"] for entry in entries]),
+            "orders": _largest_orders(chain(*(entry["orders"] for entry in entries))),
             "initial": _over_points([entry["initial"] for entry in entries], share),
         }
         for entries in zip(*mounts, strict=True)
@@ -217,20 +201,16 @@ def _over_points(entries: Any, share: Array) -> dict[str, float]:
     }
 
 
-def _largest_orders(lists: list[list[dict[str, float]]]) -> list[dict[str, float]]:
+def _largest_orders(entries: Iterable[dict[str, float]]) -> list[dict[str, float]]:
     largest: dict[float, float] = {}
-    for entry in (entry for orders in lists for entry in orders):
+    for entry in entries:
         largest[entry["order"]] = max(largest.get(entry["order"], 0.0), entry["amplitude"])
     return [{"order": order, "amplitude": largest[order]} for order in sorted(largest)]
 
 
-def _hardness(shaking: Record) -> tuple[float, float]:
-    return max(shaking["force"], default=0.0), max(shaking["moment"], default=0.0)
-
-
-def _modes(design: Evaluation) -> Record:
-    facts = facts_of(design)
-    return {
+def _on_mounts(result: Result) -> Record:
+    facts, mounting = facts_of(result.final), mounting_in(result.final.engine)
+    modes = {
         **_attributes(facts.modes, "frequencies names loss_factors=loss"),
         "excited": [j in facts.excited for j in range(6)],
         "motions": list(MOTIONS),
@@ -239,54 +219,50 @@ def _modes(design: Evaluation) -> Record:
         **_attributes(facts, "main_orders=orders static_sag=sag mount_sag mean_torque_travel=torque_travel"),
         **_attributes(facts, "torque_roll_axis torque_roll_coupling torque_roll_frequency with_fluid"),
     }
-
-
-def _on_mounts(result: Result) -> Record:
-    mounting, names = mounting_in(result.final.engine), "motion travel force on_stops"
+    names = "motion travel force on_stops"
     cases = {case.name: _attributes(settled(mounting, case), names) for case in result.final.engine.load_cases}
-    return {"modes": _modes(result.final), **({"load_cases": cases} if cases else {})}
+    return {"modes": modes, **({"load_cases": cases} if cases else {})}
 
 
 def _phasing(result: Result) -> Record:
     if result.phasing is None:
         return {}
-    points = [_attributes(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
-    entry = {
-        **_attributes(result.phasing, "designs looked_at method even_value"),
-        "trade": points,
-        "why": why_star(result),
-    }
-    return {"ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
-            "phasing": entry}  # fmt: skip
-
-
-def _star(star: RankedStar) -> Record:
+    trade = [_attributes(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
     names = "throws bank_angle split_pin_angle=split_pin shafts objective=value lower_bound proven orders "
     names += "free_force=forces free_couple=couples even firing_order_count=order_count"
-    orders = [_attributes(order, "order neighbours longest_gap roll_content intervals") for order in star.firing_orders]
-    return {**_attributes(star, names), "firing_orders": orders}
+    of_order = "order neighbours longest_gap roll_content intervals"
+    ranking = [
+        {
+            "rank": rank,
+            **_attributes(star, names),
+            "firing_orders": [_attributes(order, of_order) for order in star.firing_orders],
+        }
+        for rank, star in enumerate(result.phasing.ranking, 1)
+    ]
+    summary = _attributes(result.phasing, "designs looked_at method even_value")
+    return {"ranking": ranking, "phasing": {**summary, "trade": trade, "why": why_star(result)}}
 
 
 def _ranks(result: Result) -> Record:
-    names = "name unit initial least=minimum lower_bound gap final limit price"
+    ranges = "name unit low high"
     entries = [
         {
-            **_attributes(rank, names),
+            **_attributes(rank, "name unit initial least=minimum lower_bound gap final limit price"),
             "proof": str(rank.proof),
-            "equal": [_attributes(d, "name unit low high") for d in rank.equal],
+            "equal": [_attributes(decision, ranges) for decision in rank.equal],
         }
         for rank in result.ranks
     ]
-    free = None if result.free is None else [_attributes(decision, "name unit low high") for decision in result.free]
+    free = None if result.free is None else [_attributes(decision, ranges) for decision in result.free]
     return {"free_decisions": free, **({"objectives": entries} if entries else {})}
 
 
 def _reached(result: Result) -> Record:
     if result.status.has_design:
         return {}
-    names, nearest, keys = "name side limit unit value", result.nearest, "bound why ended"
+    names, nearest = "name side limit unit value", result.nearest
     reached = [
-        {**_attributes(limit, f"{names} {keys}"), "proof": str(limit.proof), **_values(limit)}
+        {**_attributes(limit, f"{names} bound why ended"), "proof": str(limit.proof), **_values(limit)}
         for limit in result.reached
     ]
     return {

@@ -27,8 +27,7 @@ _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE
 
 def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     """Print a result and the place of its files."""
-    console = _console(stream)
-    console.print(Text(result.problem.title, style="bold"))
+    console = _console(stream, result.problem.title)
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
@@ -44,8 +43,7 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
 
 def show_document(document: Document, stream: TextIO, folder: Path, page: str) -> None:
     """Print words and tables of a page, and the place of its files."""
-    console = _console(stream)
-    console.print(Text(document.title, style="bold"))
+    console = _console(stream, document.title)
     for block in document.blocks:
         match block:
             case Heading(text):
@@ -55,30 +53,27 @@ def show_document(document: Document, stream: TextIO, folder: Path, page: str) -
                 console.print(Text(strip_markdown(text) if marked else text))
             case Bullets(lead, items, marked):
                 console.print(Text(lead))
-                for item in items:
-                    _print_item(console, strip_markdown(item) if marked else item)
+                for text in items:
+                    item = RichTable.grid(padding=(0, 1))
+                    item.add_row("-", Text(strip_markdown(text) if marked else text))
+                    console.print(item)
             case Table():
                 _print_grid(console, block)
                 console.print()
     _print_place(console, folder, page)
 
 
-def _console(stream: TextIO) -> Console:
+def _console(stream: TextIO, title: str) -> Console:
     console = Console(file=stream, markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
         console.width = PIPE_WIDTH
+    console.print(Text(title, style="bold"))
     return console
 
 
 def _print_place(console: Console, folder: Path, page: str) -> None:
     # a path is copied in one piece, however long it is
     console.print(Text(results_line(folder, page)), soft_wrap=True)
-
-
-def _print_item(console: Console, text: str) -> None:
-    item = RichTable.grid(padding=(0, 1))
-    item.add_row("-", Text(text))
-    console.print(item)
 
 
 def _print_grid(console: Console, grid: Table) -> None:

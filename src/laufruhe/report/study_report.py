@@ -15,7 +15,6 @@ from laufruhe.report.document import Block, Bullets, Document, Heading, Illustra
 from laufruhe.report.strict_json import strict
 from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.report.web_page import as_html
-from laufruhe.studies.part import Part
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.text import Text
 
@@ -80,23 +79,17 @@ def study_document(
     summaries = [kind.summary(datasets.values()) for kind in dict.fromkeys(type(part) for part in study.study.parts)]
     blocks += [Paragraph(text, marked=True) for text in summaries if text]
     for part in study.study.parts:
-        blocks += _part(part, datasets[part.name])
+        data = datasets[part.name]
+        source = f" Source: {data.attrs['source']}" if data.attrs["source"] else ""
+        blocks += [Heading(data.attrs["title"]), Paragraph(f"{data.attrs['kind'].capitalize()}.{source}", marked=True)]
+        blocks += [block for text in part.table(data) for block in blocks_of(text)]
+        if "png" in part.ends:
+            blocks.append(Illustration(part.name, data.attrs["title"], is_captioned=False))
     if datasets:
         spent = [(name, f"{duration:.1f}") for name, duration in seconds.items()]
         rows = [*spent, ("all", f"{sum(seconds.values()):.1f}")]
         blocks += [Heading("Where the time went"), Paragraph("Seconds on one core."), Table(("part", "s"), rows)]
     return Document(study.title, tuple(blocks))
-
-
-def _part(part: Part, data: xr.Dataset) -> Iterator[Block]:
-    title, source = data.attrs["title"], data.attrs["source"]
-    yield Heading(title)
-    kind = data.attrs["kind"].capitalize()
-    yield Paragraph(f"{kind}." + (f" Source: {source}" if source else ""), marked=True)
-    for text in part.table(data):
-        yield from blocks_of(text)
-    if "png" in part.ends:
-        yield Illustration(part.name, title, is_captioned=False)
 
 
 def blocks_of(text: Text) -> Iterator[Block]:

@@ -80,7 +80,7 @@ def _as_number(cell: str) -> str | float:
 
 def _values(entries: Sequence[DecisionValue | LimitValue]) -> Table:
     return Table(
-        [field.name for entry in entries[:1] for field in fields(entry)], [list(astuple(entry)) for entry in entries]
+        [field.name for entry in entries[:1] for field in fields(entry)], [[*astuple(entry)] for entry in entries]
     )
 
 
@@ -97,21 +97,16 @@ def _measures(result: Result) -> Table:
     return Table(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
 
 
-def _forces(result: Result) -> Table:
-    steps = max(min(STEPS, MAX_ROWS // len(result.problem.points)), 36)
-    return Table.from_fields(forces_of(designs_with_loads(result), steps))
-
-
 def _transmissibility(result: Result) -> Table:
     speeds, orders = transmissibility_speeds(result), facts_of(result.final).orders
-    columns = [
-        (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
+    columns = {
+        f"{design}, {point.name}: order {orders[k]:g}": curve
         for design, evaluation in designs_with_loads(result).items()
         for point in result.problem.points
         for k, curve in transmissibility_of(evaluation, point, speeds, orders)
-    ]
-    rows = zip((RPM * speeds).tolist(), *(values for _, values in columns), strict=True)
-    return Table(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
+    }
+    rows = np.column_stack([RPM * speeds, *columns.values()]).tolist() if columns else []
+    return Table(["speed [rpm]", *columns], rows)
 
 
 def _rankings(result: Result) -> Table:
@@ -175,8 +170,7 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: 
 def _uneven_firing(result: Result) -> Table:
     unit = objective_unit(result) or "-"
     rows = [
-        [math.degrees(point.allowed), math.degrees(point.deviation), point.value, point.lower_bound]
-        for point in ranking_of(result).trade
+        [math.degrees(p.allowed), math.degrees(p.deviation), p.value, p.lower_bound] for p in ranking_of(result).trade
     ]
     return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"lower bound [{unit}]"], rows)
 
@@ -281,7 +275,12 @@ _TABLES: NumberTables = {
     "decisions": (lambda result: result.decisions, lambda result: _values(result.decisions)),
     "limits": (limits_of, lambda result: _values(limits_of(result))),
     "measures": (places_of, _measures),
-    "forces": (has_loads, _forces),
+    "forces": (
+        has_loads,
+        lambda result: Table.from_fields(
+            forces_of(designs_with_loads(result), max(min(STEPS, MAX_ROWS // len(result.problem.points)), 36))
+        ),
+    ),
     "orders": (has_loads, lambda result: Table.from_fields(orders_of(designs_with_loads(result)))),
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from typing import Any
 
 from laufruhe.errors import counted
 from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
@@ -72,7 +71,13 @@ def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
         blocks.append(Illustration(picture, "Time and error of every fidelity; the colour shows the regret", False))
     elif not problem.load_terms:
         blocks.append(Paragraph("The objective depends on no load, so every fidelity gives the same number."))
-    blocks.append(Table(HEAD, [_cells(row) for row in trade.rows]))
+    rows = [
+        [row.name, _share(row.error), _share(row.estimate),
+         *map(_time, (row.evaluation, row.gradient, row.solve, row.fresh)), f"{number(1e-6 * row.memory, 3)} MB",
+         _regret(row)]
+        for row in trade.rows
+    ]  # fmt: skip
+    blocks.append(Table(HEAD, rows))
     if not trade.is_complete:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
@@ -105,8 +110,8 @@ def _beyond(trade: Trade) -> list[str]:
 
 def advice(trade: Trade) -> str:
     """Return the choices in words."""
-    number, decided = choices(trade)
-    text = f"`{number.name}` for values within 0.1 % ({_time(number.evaluation)} per design)"
+    evaluating, decided = choices(trade)
+    text = f"`{evaluating.name}` for values within 0.1 % ({_time(evaluating.evaluation)} per design)"
     if decided is not None:
         text += f"; `{decided.name}` for decisions within 0.1 % of the best ({_time(decided.solve)})"
     return text + "."
@@ -132,12 +137,11 @@ def as_json(trade: Trade) -> str:
         "reference": {"objective": trade.value, "optimum": trade.optimum},
         "uneven_speed": trade.flywheel and dict(zip(("crank_inertia", "change"), trade.flywheel, strict=True)),
         "time_domain": trade.time_domain and asdict(trade.time_domain),
-        "rows": [_row_record(row) for row in trade.rows],
+        "rows": [
+            {"excess" if key == "violation" else key: value for key, value in asdict(row).items()}
+            for row in trade.rows
+        ],
     })  # fmt: skip
-
-
-def _row_record(row: TradeRow) -> dict[str, Any]:
-    return {"excess" if key == "violation" else key: value for key, value in asdict(row).items()}
 
 
 def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
@@ -164,12 +168,10 @@ def _index_row(trade: Trade) -> list[str]:
     two, auto, gas = (_named(trade, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
     number, decided = choices(trade)
     deciding = (f"`{decided.name}`", _time(decided.solve)) if decided else (DASH, DASH)
-    name, uneven = (
-        trade.problem.name,
-        DASH if trade.flywheel is None else f"{fixed(100.0 * trade.flywheel[1], 2, '+')} %",
-    )
-    return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, _error(two), _error(gas),
-            _error(auto), _regret(two), _regret(auto), uneven, _why_dashes(trade)]  # fmt: skip
+    uneven = DASH if trade.flywheel is None else f"{fixed(100.0 * trade.flywheel[1], 2, '+')} %"
+    name, errors = trade.problem.name, [DASH if row is None else _share(row.error) for row in (two, gas, auto)]
+    return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, *errors, _regret(two),
+            _regret(auto), uneven, _why_dashes(trade)]  # fmt: skip
 
 
 def _why_dashes(trade: Trade) -> str:
@@ -222,28 +224,12 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def _cells(row: TradeRow) -> list[str]:
-    times = map(_time, (row.evaluation, row.gradient, row.solve, row.fresh))
-    return [
-        row.name,
-        _share(row.error),
-        _share(row.estimate),
-        *times,
-        f"{number(1e-6 * row.memory, 3)} MB",
-        _regret(row),
-    ]
-
-
 def _time(seconds: float) -> str:
     if math.isnan(seconds):
         return DASH
     if seconds < 1e-3:
         return f"{1e6 * seconds:.0f} us"
     return f"{1e3 * seconds:.3g} ms" if seconds < 1.0 else f"{seconds:.3g} s"
-
-
-def _error(row: TradeRow | None) -> str:
-    return DASH if row is None else _share(row.error)
 
 
 def _share(error: float) -> str:

@@ -6,13 +6,13 @@ import math
 
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.present.measures import breaks_a_limit, has_firing, is_changed
-from laufruhe.present.numbers import figure, number, percent, share, trimmed
+from laufruhe.present.numbers import figure, number, percent, share, trimmed, with_unit
 from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.plausibility import simultaneous_firings
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.report.sections.reach import sentences
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import RankedStar
+from laufruhe.solvers.values import AttainableLimit
 
 # relative change that is printed as zero
 NO_CHANGE = 5e-4
@@ -51,7 +51,38 @@ def headline(result: Result) -> str:
 def details(result: Result) -> list[str]:
     """Return the sentences below the headline: attainable limits, firing order, comparison of stars."""
     static = "" if result.objective is None else static_sentence(result.problem, result.final)
-    return [sentence for sentence in (*sentences(result), static, fired(result), why_star(result)) if sentence]
+    return [sentence for sentence in (*attainable(result), static, fired(result), why_star(result)) if sentence]
+
+
+def attainable(result: Result) -> list[str]:
+    """Return a sentence on the attainable value of each conflicting limit, and one about the nearest design."""
+    lead = "With the other limits met, " if len(result.problem.limits) > 1 else ""
+    texts, design = [_attainable(limit, lead) for limit in result.reached], result.nearest
+    if design is None:
+        return texts
+    value, required = figure(design.value, design.unit), f"{design.side} {with_unit(design.limit, design.unit)}"
+    beyond = f", {share(design.violation, 3)} beyond" if design.limit else ""
+    return [*texts, f"The nearest design found breaks '{design.name}' most: {value}; required: {required}{beyond}."]
+
+
+def _attainable(limit: AttainableLimit, lead: str) -> str:
+    value, bound = figure(limit.value, limit.unit), figure(limit.bound, limit.unit)
+    required = f"{limit.side} {with_unit(limit.limit, limit.unit)} is required."
+    if limit.why:
+        is_known = math.isfinite(limit.value)
+        known, unknown = f"stays at {value}: {limit.why}; {required}", f"is not known: {limit.why}."
+        return f"'{limit.name}' {known}" if is_known else f"The range of '{limit.name}' {unknown}"
+    minimum, beyond = ("smallest", "lower") if limit.side == "at most" else ("largest", "higher")
+    found, none = f"the {minimum} value found of '{limit.name}' is {value}", f"; no design is {beyond} than {bound}"
+    if value == bound or limit.proof == Proof.GLOBAL:
+        text = f"the {minimum} value of '{limit.name}' is {value}, which is proven"
+    elif limit.proof == Proof.WITHIN_GAP:
+        text = f"{found}; none is {beyond} than {bound}"
+    else:
+        text = f"{found}, a local optimum{none if limit.bound > 0.0 else ' without a proof'}"
+    ended = " Its search ended at the time limit; raise it." if limit.ended else ""
+    text = f"{lead}{text}; {required}{ended}"
+    return text[:1].upper() + text[1:]
 
 
 def fidelity_of(result: Result) -> str:

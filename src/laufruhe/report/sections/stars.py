@@ -17,7 +17,7 @@ from laufruhe.units import readable
 ORDERS_SHOWN = 6
 
 
-def tables(result: Result) -> list[Table]:
+def crank_stars(result: Result) -> list[Table]:
     """Return stars, firing orders, and the trade against even firing if there is one."""
     if result.phasing is None:
         return []
@@ -38,10 +38,9 @@ def _stars(result: Result, phasing: PhasingResult) -> Table:
         pairs = [f"{number(f, 3, 1.0)} / {number(c, 3, 1.0)}" for f, c in zip(star.forces, star.couples, strict=True)]
         name = f"{k + 1}" + (" proven" if star.proven else "")
         shafts = (", ".join(star.shafts) or DASH,) if built else ()
-        intervals = _span(star.firing_orders[0].intervals) if star.firing_orders else DASH
-        rows.append(
-            (name, _angles(star, decided), *shafts, number(factor * star.value, scale=scale), *pairs, intervals)
-        )
+        intervals = star.firing_orders[0].intervals if star.firing_orders else (math.nan,)
+        span = " to ".join(dict.fromkeys(_degrees(end(intervals)) for end in (min, max)))
+        rows.append((name, _angles(star, decided), *shafts, number(factor * star.value, scale=scale), *pairs, span))
     objective = f"objective [{unit}]" if unit else "objective"
     orders = (f"order {h}" for h in phasing.ranking[0].orders)
     head = ("rank", "throws [deg]", *(("shafts",) if built else ()), objective, *orders, "intervals [deg]")
@@ -49,7 +48,7 @@ def _stars(result: Result, phasing: PhasingResult) -> Table:
         "Free force / couple of the star alone by order, in forces of one throw and that times the throw spacing. "
         f"{counted(phasing.designs, 'star')} to choose from; {phasing.method}."
     )
-    return Table(head, tuple(rows), title="Crank stars", left=3 if built else 2, note=note)
+    return Table(head, rows, title="Crank stars", left=3 if built else 2, note=note)
 
 
 def _angles(star: RankedStar, decided: Container[str]) -> str:
@@ -58,11 +57,6 @@ def _angles(star: RankedStar, decided: Container[str]) -> str:
     angles = [f"{word} {_degrees(value)}" for word, name, value in named if value is not None and name in decided]
     extra = ", ".join(filter(None, [name_of_crank(star.throws), *angles]))
     return text + (f" ({extra})" if extra else "")
-
-
-def _span(intervals: tuple[float, ...]) -> str:
-    low, high = min(intervals), max(intervals)
-    return _degrees(low) if math.degrees(high - low) < 1e-6 else f"{_degrees(low)} to {_degrees(high)}"
 
 
 def _orders(phasing: PhasingResult) -> Table:

@@ -22,18 +22,12 @@ _FACTOR = (
 )
 
 
-def tables(result: Result) -> list[Table]:
-    """Return a row per weight, and a row per throw with counterweights."""
-    return [_weights(result), _factors(result)]
-
-
-def _weights(result: Result) -> Table:
+def weights(result: Result) -> list[Table]:
+    """Return a row per weight of the final design."""
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
-    weights = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
-    scale = max((abs(rotor.unbalance) for rotor in weights), default=0.0)
-    two = is_changed(result)
-    rows = []
-    for rotor in weights:
+    rotors = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
+    scale, two, rows = max((abs(rotor.unbalance) for rotor in rotors), default=0.0), is_changed(result), []
+    for rotor in rotors:
         initial = before.get(rotor.name, rotor)
         if max(abs(rotor.unbalance), abs(initial.unbalance)) <= NEXT_TO_NOTHING * scale:
             continue
@@ -46,9 +40,8 @@ def _weights(result: Result) -> Table:
     sides = ("initial ", "final ") if two else ("",)
     sizes = [f"{side}{what} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
     head = ("weight", "x [mm]", *sizes, f"{sides[-1]}unbalance [kg m]", "mass [g]", "at radius [mm]")
-    return Table(
-        head, tuple(rows), title="Weights" + (" of the final design" if two else ""), note=_ANGLES, file="weights"
-    )
+    title = "Weights" + (" of the final design" if two else "")
+    return [Table(head, rows, title=title, note=_ANGLES, file="weights")]
 
 
 def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
@@ -59,17 +52,15 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
     return number(GRAM_MILLIMETRES * size), trimmed(angle, 5)
 
 
-def _percent(factor: float | None) -> str:
-    return DASH if factor is None else f"{fixed(100.0 * factor, 1)} %"
-
-
-def _factors(result: Result) -> Table:
+def factors(result: Result) -> list[Table]:
+    """Return a row per throw with counterweights."""
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
     names = dict.fromkeys(balance.cylinders for design in designs for balance in balance_factors(design.engine))
     # a weight that a design lacks counts as zero there
-    factors = [
-        {balance.cylinders: balance.factor for balance in balance_factors(design.engine, True)} for design in designs
+    columns = [
+        {balance.cylinders: f"{fixed(100.0 * balance.factor, 1)} %" for balance in balance_factors(design.engine, True)}
+        for design in designs
     ]
-    rows = [(", ".join(cylinders), *(_percent(column.get(cylinders)) for column in factors)) for cylinders in names]
-    head = ("throw of", *(("initial", "final") if len(factors) > 1 else ("balance factor",)))
-    return Table(head, tuple(rows), title="Balance factors", note=_FACTOR, file="balance-factors")
+    rows = [(", ".join(cylinders), *(column.get(cylinders, DASH) for column in columns)) for cylinders in names]
+    head = ("throw of", *(("initial", "final") if len(designs) > 1 else ("balance factor",)))
+    return [Table(head, rows, title="Balance factors", note=_FACTOR, file="balance-factors")]

@@ -1,0 +1,119 @@
+"""Tables of loads: forces by place, amplitudes by order, and crankshaft torque."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.mount_forces import CycleMeasures
+from laufruhe.physics.torque import TorqueFacts, torque_facts
+from laufruhe.present.measures import (
+    Places,
+    evaluations_with_loads,
+    hardest_point,
+    has_loads,
+    has_mounts,
+    moment_orders,
+    mount_orders,
+    pad_orders,
+    places_of,
+    shaking_orders,
+    uses_torque,
+)
+from laufruhe.present.numbers import DASH, aligned, number, percent
+from laufruhe.present.tables import Table
+from laufruhe.problem.evaluation import place_measures
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Measure
+from laufruhe.solvers.result import Result
+from laufruhe.units import readable
+
+MAX_ORDERS, SHARE = 8, 0.005
+TORQUE = (
+    "Torque of gas, pistons and rods, without friction. Stored: energy that the flywheel must store. "
+    "Irregularity: largest less smallest speed over the mean."
+)
+
+
+def places(result: Result) -> list[Table]:
+    """Return a row per mount, bearing or pin at every operating point, initial and final; a table of each kind."""
+    return [_at_places(result, places) for places in places_of(result)]
+
+
+def _at_places(result: Result, places: Places) -> Table:
+    points, designs = result.problem.points, evaluations_with_loads(result)
+    names = places.channel.places(result.problem.engine)
+    measures = [
+        ((point.name, name) if len(points) > 1 else (name,), by_design)
+        for k, point in enumerate(points)
+        for name, *by_design in zip(
+            names, *(place_measures(design, k, places.channel) for design in designs), strict=True
+        )
+    ]
+    unit, factor = readable(places.channel.unit)
+    scale = factor * max((by_design[0].max for _, by_design in measures), default=0.0)
+    rows = [(*lead, *_cells([values.times(factor) for values in by_design], scale)) for lead, by_design in measures]
+    at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
+    note = f"The initial design has no finite loads: {result.initial.resonance}." if result.initial.resonance else ""
+    if places.channel.sums_places:
+        sums = [number(design.value(Measure(places.channel))) for design in designs]
+        note = f"Sum, mean over the cycle: {' initial, '.join(sums)}{' final' if len(sums) > 1 else ''}."
+    two = ("initial mean", "final mean", "change", "initial max", "final max")
+    head = (*first, *(two if len(designs) > 1 else ("mean", "max", "rms")))
+    return Table(head, rows, title=f"{places.title}{at} [{unit}]", note=note, left=len(first))
+
+
+def _cells(measures: list[CycleMeasures], scale: float) -> list[str]:
+    a, b = measures[0], measures[-1]
+    if len(measures) == 1:
+        return [number(value, scale=scale) for value in (b.mean, b.max, b.rms)]
+    change = percent(b.mean / a.mean - 1.0) if a.mean > 1e-9 * scale else DASH
+    means, maximum = ([number(value, scale=scale) for value in pair] for pair in ((a.mean, b.mean), (a.max, b.max)))
+    return [*means, change, *maximum]
+
+
+def orders(result: Result) -> list[Table]:
+    """Return the orders above a small share of the largest, at the hardest operating point."""
+    if not has_loads(result):
+        return []
+    k, designs = hardest_point(result), evaluations_with_loads(result)
+    pairs = zip(*(_amplitudes(design.loads[k]) for design in designs), strict=True)
+    series = [column for pair in pairs for column in pair]
+    length = max(len(column) for column in series)
+    table = np.stack([pad_orders(column, length) for column in series], axis=1)
+    # a quantity has one scale, before and after
+    scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
+    weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
+    present = np.flatnonzero(weight > SHARE)
+    largest = sorted(sorted(present, key=lambda j: -weight[j])[:MAX_ORDERS])
+    base = float(result.initial.loads[k].wrench.base)
+    cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
+    rows = [(f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True)]
+    names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
+    sides = ("",) if len(designs) == 1 else (", initial", ", final")
+    head = ("order", *(f"{name}{side}" for name in names for side in sides))
+    selection = f"the largest {MAX_ORDERS} of {len(present)} orders" if len(present) > len(largest) else "all orders"
+    note = f"Amplitudes: {selection} with at least {100.0 * SHARE:g} % of the maximum. result.json has every order."
+    return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
+
+
+def _amplitudes(loads: PointLoads) -> list[Array]:
+    shaking = [shaking_orders(loads.wrench)[0], *moment_orders(loads.wrench)]
+    return shaking if loads.mount_forces is None else [mount_orders(loads.mount_forces).mean(axis=1), *shaking]
+
+
+def torque(result: Result) -> list[Table]:
+    """Return a row per operating point, if the problem asks for torque or has a flywheel."""
+    engine, problem = result.final.engine, result.problem
+    if not uses_torque(result):
+        return []
+    rows = [(point.name, *_torque_cells(torque_facts(engine, point, problem.fidelity))) for point in problem.points]
+    head = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
+    return [Table(head, rows, title="Torque of the crankshaft", note=TORQUE, file="crankshaft-torque")]
+
+
+def _torque_cells(facts: TorqueFacts) -> list[str]:
+    size, uneven = max(abs(facts.minimum), abs(facts.largest)), facts.irregularity
+    numbers = [number(value, scale=size) for value in (facts.mean, 1e-3 * facts.power, facts.minimum, facts.largest)]
+    even = DASH if uneven is None else "0" if not uneven else f"{number(uneven, 3)} (1/{1.0 / uneven:.4g})"
+    return [*numbers, number(facts.excursion), even]
