@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import SolverError
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.studies import program, runner
 from laufruhe.studies import reader as study_files
+from laufruhe.studies import runner, scenes
 from laufruhe.studies.scenes import Point, Scenes
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
@@ -114,8 +114,8 @@ def test_a_file_that_changes_under_way_is_told_and_nothing_of_it_kept(
 
 @pytest.mark.slow
 def test_another_library_is_another_program(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = program.program()
-    monkeypatch.setattr(program, "library_versions", lambda: {"clarabel": "0.0.1"})
-    program.program.cache_clear()
-    assert program.program() != own
-    program.program.cache_clear()
+    own = scenes.program()
+    monkeypatch.setattr(scenes, "library_versions", lambda: {"clarabel": "0.0.1"})
+    scenes.program.cache_clear()
+    assert scenes.program() != own
+    scenes.program.cache_clear()

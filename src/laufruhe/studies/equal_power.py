@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine
 from laufruhe.machine.layouts import Layout
 from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Problem
-
-# factors on a decision when the engine is resized, by unit
-_FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
 
 
 @dataclass(frozen=True)
@@ -51,63 +47,59 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
         raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
     scale, phasing = equal_power_scale(len(cylinders), reference_cylinders), problem.phasing
+    k, m = scale.length, scale.mass
+
+    def scaled_layout(layout: Layout) -> Layout:
+        places, throws = (tuple(k * x for x in xs) for xs in (layout.positions, layout.throw_positions))
+        return replace(layout, positions=places, throw_positions=throws)
+
     if phasing is not None:
         # stars are realised in the new size
         realise, layout = phasing.realise, phasing.layout
         phasing = replace(
             phasing,
             realise=lambda candidate: at_equal_power(realise(candidate), reference_cylinders),
-            layout=lambda bank, split: _layout(layout(bank, split), scale),
+            layout=lambda bank, split: scaled_layout(layout(bank, split)),
         )
-    return replace(
-        problem,
-        origin=None,
-        phasing=phasing,
-        engine=_engine(problem.engine, scale),
-        points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
-        decisions=tuple(_decision(decision, scale) for decision in problem.decisions),
-    )
-
-
-def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
-    k, m = scale.length, scale.mass
-    return replace(
-        engine,
-        slider_cranks=tuple(part.scaled(k, m) for part in engine.slider_cranks),
+    engine = replace(
+        problem.engine,
+        slider_cranks=tuple(part.scaled(k, m) for part in cylinders),
         rotors=tuple(
             replace(
                 rotor,
                 unbalance=rotor.unbalance * m * k,
                 radius=None if rotor.radius is None else rotor.radius * k,
             ).placed(*(k * along for along in rotor.place))
-            for rotor in engine.rotors
+            for rotor in problem.engine.rotors
         ),
-        bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
-        extras=tuple(extra.scaled(k, m) for extra in engine.extras),
+        bearings=tuple(bearing.scaled(k) for bearing in problem.engine.bearings),
+        extras=tuple(extra.scaled(k, m) for extra in problem.engine.extras),
         mounts=tuple(
-            mount.mapped(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))
-            for mount in engine.mounts
+            mount.mapped(
+                lambda part: replace(part, position=(k * part.position[0], k * part.position[1], k * part.position[2]))
+            )
+            for mount in problem.engine.mounts
         ),
     )
-
-
-def _layout(layout: Layout, scale: EqualPowerScale) -> Layout:
-    places, throws = (
-        tuple(scale.length * x for x in positions) for positions in (layout.positions, layout.throw_positions)
+    return replace(
+        problem,
+        origin=None,
+        phasing=phasing,
+        engine=engine,
+        points=tuple(replace(point, speed=point.speed * scale.speed) for point in problem.points),
+        decisions=tuple(_decision(decision, k, m) for decision in problem.decisions),
     )
-    return replace(layout, positions=places, throw_positions=throws)
 
 
-def _decision(decision: Decision, scale: EqualPowerScale) -> Decision:
-    sizes = {_FRACTION: 1.0, _LENGTH: scale.length, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}
-    size = sizes[decision.unit]
-    gain = scale.mass * scale.length / size
+def _decision(decision: Decision, length: float, mass: float) -> Decision:
+    """Return a decision with its bounds and drives resized by factors on lengths and masses."""
+    size = {"": 1.0, "m": length, "kg": mass, "kg m": mass * length}[decision.unit]
     return replace(
         decision,
         set=decision.set.scaled(size),
         start=decision.start * size,
         drives=tuple(
-            replace(drive, gain=drive.gain * gain) if isinstance(drive, RotorDrive) else drive
+            replace(drive, gain=drive.gain * (mass * length / size)) if isinstance(drive, RotorDrive) else drive
             for drive in decision.drives
         ),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from contextlib import AbstractContextManager
 from io import FileIO
 from pathlib import Path
@@ -30,9 +30,12 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         self._records: Record = {}
         self.seconds: dict[str, float] = {}
         self._stream: FileIO | None = None
-        for mark, seconds, record in _intact_lines(path):
-            if mark in marks:
-                self._records[mark], self.seconds[mark] = record, seconds
+        for line in path.read_bytes().split(b"\n") if path.is_file() else []:
+            checksum, _, content = line.partition(b" ")
+            if checksum == _checksum(content):
+                mark, seconds, record = json.loads(content)
+                if mark in marks:
+                    self._records[mark], self.seconds[mark] = record, seconds
 
     def read(self, mark: str) -> Record:
         """Return the record of a point."""
@@ -54,15 +57,6 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         if self._stream is not None:
             os.fsync(self._stream.fileno())
             self._stream.close()
-
-
-def _intact_lines(path: Path) -> Iterator[tuple[str, float, Record]]:
-    if path.is_file():
-        with path.open("rb") as lines:
-            for line in lines:
-                checksum, _, content = line.rstrip(b"\n").partition(b" ")
-                if checksum == _checksum(content):
-                    yield json.loads(content)
 
 
 def _checksum(line: bytes) -> bytes:

@@ -30,15 +30,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Template:
-    """Layout of the numbers of many draws.
-
-    Attributes
-    ----------
-    draws, chunk
-        Number of draws of each case, and of one piece of work.
-    columns
-        Columns by name.
-    """
+    """Layout of the numbers of many draws: the number of draws of each case and of one piece of work, and columns."""
 
     cases: tuple[str, ...]
     draws: int
@@ -65,17 +57,18 @@ class Part(Table):
 
     def by_reading(self) -> list[Part]:
         """Return the part once per reading of a doubtful number; itself without readings."""
-        return [self._in_reading(*reading) for reading in self.readings.items()] or [self]
 
-    def _in_reading(self, name: str, values: dict[str, Value]) -> Part:
-        def read(value: Any) -> Any:
+        def read(value: Any, changes: dict[str, Value]) -> Any:
             if isinstance(value, list):
-                return [read(entry) for entry in value]
-            return value.model_copy(update={"set": {**values, **value.set}}) if isinstance(value, CaseTable) else value
+                return [read(entry, changes) for entry in value]
+            return value.model_copy(update={"set": {**changes, **value.set}}) if isinstance(value, CaseTable) else value
 
-        slug = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
-        changes = {"name": f"{self.name}-{slug}", "title": f"{self.title}; {name}", "readings": {}}
-        return self.model_copy(update={**{key: read(value) for key, value in self}, **changes})
+        parts: list[Part] = []
+        for name, changes in self.readings.items():
+            slug = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
+            names = {"name": f"{self.name}-{slug}", "title": f"{self.title}; {name}", "readings": {}}
+            parts.append(self.model_copy(update={key: read(value, changes) for key, value in self} | names))
+        return parts or [self]
 
     def settings(self) -> dict[str, Any]:
         """Return the settings shared by all points."""

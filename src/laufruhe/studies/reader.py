@@ -86,7 +86,12 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
             raise refused(f"{where}.cases", "", "has two cases of one name", "give each its own", path)
-        _check_quantities(part, path, where)
+        for key, read in part.swept_or_drawn():
+            try:
+                read()
+            except Refused as error:
+                complaint = replace(error.complaint, where=f"{where}.{key}.{error.complaint.where}")
+                raise InputError(str(path), (complaint,)) from None
         if part.size() > MAX_POINTS:
             rule = f"makes {part.size()} points; a study takes {MAX_POINTS}"
             raise refused(where, "", rule, "ask for fewer", path)
@@ -95,12 +100,3 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
         rule = f"make {count} points; a study takes {MAX_POINTS}"
         raise refused("study.parts", "", rule, "make two studies of them", path)
     return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
-
-
-def _check_quantities(part: Part, path: Path, where: str) -> None:
-    for key, read in part.swept_or_drawn():
-        try:
-            read()
-        except Refused as error:
-            complaint = error.complaint
-            raise InputError(str(path), (replace(complaint, where=f"{where}.{key}.{complaint.where}"),)) from None

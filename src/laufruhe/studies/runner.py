@@ -5,7 +5,7 @@ from __future__ import annotations
 import socket
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -75,9 +75,16 @@ def run(
             for count, answer in enumerate(results, 1):
                 mark = names[answer.task]
                 if answer.mark != mark:
-                    raise _other_files(answer, todo[mark])
-                with _disk_errors():
+                    where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
+                    rule = f"'{todo[mark][1]}' had other files, another Laufruhe or other libraries {where}"
+                    remedy = "have the same everywhere, and the same command goes on"
+                    raise SolverError(f"{rule}, so its answer is not kept; {remedy}")
+                try:
                     store[mark].keep(mark, answer.seconds, answer.record)
+                except OSError as error:
+                    why = f"a point cannot be kept ({error.strerror or error})"
+                    remedy = "finished points are, make room and the same command goes on"
+                    raise SolverError(f"{why}; {remedy}") from None
                 say(total - len(todo) + count, total)
         datasets, seconds = {}, {}
         for part in study.study.parts:
@@ -88,26 +95,9 @@ def run(
     return datasets, seconds
 
 
-@contextmanager
-def _disk_errors() -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        why = f"a point cannot be kept ({error.strerror or error})"
-        raise SolverError(f"{why}; finished points are, make room and the same command goes on") from None
-
-
 @dataclass(frozen=True)
 class PointResult:
-    """Outcome of a task.
-
-    Attributes
-    ----------
-    mark
-        Fingerprint of the task where it was answered, once it was answered.
-    host
-        Machine that answered.
-    """
+    """Answer of a task, with the task's fingerprint as the machine `host` found it."""
 
     task: int
     mark: str
@@ -150,12 +140,6 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Point
 
 def _time_limit_error() -> SolverError:
     return TimeIsOver("the time limit is over; finished points are kept, the same command goes on")
-
-
-def _other_files(answer: PointResult, task: Task) -> SolverError:
-    where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
-    rule = f"'{task[1]}' had other files, another Laufruhe or other libraries {where}, so its answer is not kept"
-    return SolverError(f"{rule}; have the same everywhere, and the same command goes on")
 
 
 def _answer(k: int, task: Task, scenes: Scenes) -> PointResult:

@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +18,15 @@ from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
+from laufruhe.numerics.libraries import library_versions
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
-from laufruhe.studies.program import program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+
+DISPLAY = {"report", "plots", "live", "cli"}
+"""Rooms that only show answers."""
 
 
 @dataclass(frozen=True)
@@ -125,17 +129,25 @@ class Scenes:
         digest = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         folder = (self.folder / point.case.problem).parent
         for text in sorted({text for _, text in texts_in(tables)}):
-            if content := _content_of(folder / text):
-                digest.update(text.encode() + content)
+            with suppress(OSError, ValueError):
+                if (folder / text).is_file():
+                    digest.update(text.encode() + hashlib.sha256((folder / text).read_bytes()).digest())
         return digest.hexdigest()[:32]
 
 
-def _content_of(path: Path) -> bytes:
-    with suppress(OSError, ValueError):
-        if path.is_file():
-            with path.open("rb") as stream:
-                return hashlib.file_digest(stream, "sha256").digest()
-    return b""
+@cache
+def program() -> str:
+    """Return a hash of the code and the libraries that an answer depends on.
+
+    The version alone would retain the points of a changed working copy.
+    """
+    package = Path(__file__).parents[1]
+    digest = hashlib.sha256(json.dumps(library_versions()).encode())
+    for path in sorted(package.rglob("*.py")):
+        place = path.relative_to(package)
+        if place.parts[0] not in DISPLAY:
+            digest.update(place.as_posix().encode() + b"\n" + path.read_bytes())
+    return digest.hexdigest()
 
 
 def shafts_of(problem: Problem) -> tuple[str, ...]:

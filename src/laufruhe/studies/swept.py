@@ -67,10 +67,12 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
     objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
     limits = limits_of(result)
     designed = status not in (FAILED, "infeasible")
-    quantities = {
-        name: _value_or_reason(result.final, quantity) if designed else (math.nan, "")
-        for name, quantity in (further or {}).items()
-    }
+    values, reasons = dict.fromkeys(further or {}, math.nan), dict.fromkeys(further or {}, "")
+    for name, quantity in (further or {}).items() if designed else ():
+        try:
+            values[name] = _finite(quantity(result.final))
+        except ModelError as error:
+            reasons[name] = str(error).partition("; ")[0]
     no_forces = dict.fromkeys(result.initial.mount_names, (math.nan, math.nan))
     initial, final = _on_mounts(problem, result.initial), _on_mounts(problem, result.final) if designed else no_forces
     return {
@@ -92,16 +94,9 @@ def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) 
         "limit_value": {limit.name: _finite(limit.value) for limit in limits},
         "shadow_price": {limit.name: limit.shadow_price for limit in limits if result.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
-        "further": {name: value for name, (value, _) in quantities.items()},
-        "why_none": {name: why for name, (_, why) in quantities.items()},
+        "further": values,
+        "why_none": reasons,
     }
-
-
-def _value_or_reason(design: Evaluation, quantity: Further) -> tuple[float, str]:
-    try:
-        return _finite(quantity(design)), ""
-    except ModelError as error:
-        return math.nan, str(error).partition("; ")[0]
 
 
 def _by_order(design: Evaluation) -> dict[str, float]:
@@ -122,36 +117,36 @@ def _finite(value: float) -> float:
 def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[float, float]]:
     if not evaluation.engine.mounts:
         return {}
-    measures = [place_measures(evaluation, k) for k in range(len(problem.points))]
     weights = [point.weight for point in problem.points]
+    by_mount = zip(*(place_measures(evaluation, k) for k in range(len(weights))), strict=True)
     return {
         name: (
-            sum(w * m.mean for w, m in zip(weights, mount_measures, strict=True)) / sum(weights),
-            max(m.max for m in mount_measures),
+            sum(weight * m.mean for weight, m in zip(weights, measures, strict=True)) / sum(weights),
+            max(m.max for m in measures),
         )
-        for name, mount_measures in zip(evaluation.mount_names, zip(*measures, strict=True), strict=True)
+        for name, measures in zip(evaluation.mount_names, by_mount, strict=True)
     }
 
 
 def dataset(
     points: Sequence[Point], records: Sequence[Mapping[str, Any]], extra: Mapping[str, Any], about: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return one labelled dataset of solved scenes along their points.
+    """Return solved scenes as one labelled dataset, with `extra` coordinates along the points.
 
-    Engines of one part may have different mounts and decisions; those that one lacks are NaN.
-
-    Parameters
-    ----------
-    extra
-        Coordinates along the points.
-    about
-        Attributes.
+    Engines of one part may have different mounts, decisions and limits; those that one lacks are NaN.
     """
     mounts = list(dict.fromkeys(name for record in records for name in record["mean"]))
-    units = {name: unit for record in records for name, unit in record["units"].items()}
+    units, limit_units = (
+        {name: unit for record in records for name, unit in record[key].items()} for key in ("units", "limit_units")
+    )
     metrics = {record["metric"]: record["unit"] for record in records if record["metric"]}
     # several metrics share a unit, or were refused
     metric, unit = next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
+    by_order = {"order_force_given": "initial", "order_force": "final"}
+    names = {order for record in records for name in by_order for order, size in record[name].items() if size}
+    orders = sorted(names, key=float)
+    along_points = {"case": [point.case.name for point in points]}
+    along_points |= {name: [record[name] for record in records] for name in ("status", "proof")}
     variables = {
         name: variable("point", [record[name] for record in records], words.format(metric), unit)
         for name, words in _WORDS.items()
@@ -159,41 +154,28 @@ def dataset(
     for name in _ON_MOUNTS:
         words = f"{name.replace('_', ' ')} of the mount's force"
         variables[name] = variable(("point", "mount"), _table(name, records, mounts), words, "N")
-    in_unit = {"long_name": "final value, in decision_unit"}
-    coords = {
+    decided = {"long_name": "final value, in decision_unit"}
+    variables["decided"] = (("point", "decision"), _table("decided", records, list(units)), decided)
+    for name, design in by_order.items():
+        words = f"amplitude by order, {design} design"
+        variables[name] = variable(("point", "order"), _table(name, records, orders), words, "N")
+    coords: dict[str, Any] = {
         "mount": mounts,
         "decision": list(units),
         "decision_unit": ("decision", list(units.values())),
-        "case": ("point", [point.case.name for point in points]),
-        "status": ("point", [record["status"] for record in records]),
-        "proof": ("point", [record["proof"] for record in records]),
+        **{name: ("point", values) for name, values in along_points.items()},
+        "order": [float(order) for order in orders],
     }
-    values = {**variables, "decided": (("point", "decision"), _table("decided", records, list(units)), in_unit)}
-    further_variables, limit_coords = _orders_and_limits(records, unit)
-    return xr.Dataset({**values, **further_variables}, {**coords, **limit_coords, **extra}, {**about, "metric": metric})
-
-
-def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return variables and coordinates of forces by order, and of limits with their prices."""
-    names = {order for record in records for order, size in record["order_force_given"].items() if size}
-    names |= {order for record in records for order, size in record["order_force"].items() if size}
-    orders = sorted(names, key=float)
-    units = {name: unit_of_limit for record in records for name, unit_of_limit in record["limit_units"].items()}
-    initial, final = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
-    variables = {
-        "order_force_given": variable(("point", "order"), initial, "amplitude by order, initial design", "N"),
-        "order_force": variable(("point", "order"), final, "amplitude by order, final design", "N"),
-    }
-    coords: dict[str, Any] = {"order": [float(order) for order in orders]}
-    if not units:
-        return variables, coords
-    value, price = (_table(name, records, list(units)) for name in ("limit_value", "shadow_price"))
-    words = "decrease of the metric per unit by which the limit is relaxed, in price_unit"
-    variables["limit_value"] = (("point", "limit"), value, {"long_name": "value of the limited measure, in limit_unit"})
-    variables["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
-    prices = [f"{unit or '1'} per {unit_of_limit}" if unit_of_limit else unit for unit_of_limit in units.values()]
-    return variables, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
+    if limit_units:
+        value, price = (_table(name, records, list(limit_units)) for name in ("limit_value", "shadow_price"))
+        value_words = {"long_name": "value of the limited measure, in limit_unit"}
+        price_words = "decrease of the metric per unit by which the limit is relaxed, in price_unit"
+        prices = [f"{unit or '1'} per {limit_unit}" if limit_unit else unit for limit_unit in limit_units.values()]
+        variables["limit_value"] = (("point", "limit"), value, value_words)
+        variables["shadow_price"] = (("point", "limit"), price, {"long_name": price_words, "unit_of": "price_unit"})
+        coords |= {"limit": list(limit_units), "limit_unit": ("limit", list(limit_units.values())),
                    "price_unit": ("limit", prices)}  # fmt: skip
+    return xr.Dataset(variables, {**coords, **extra}, {**about, "metric": metric})
 
 
 def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> NDArray[np.float64]:

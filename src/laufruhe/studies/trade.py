@@ -15,7 +15,7 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference
 from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
-from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
@@ -128,7 +128,10 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     """Measure every fidelity, by the first of several objectives; `ModelError` where the problem has none."""
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
-    left_out, problem = _left_out(problem), traded_part(problem)
+    left_out = [f"The trade takes the drawing, without {extra.words}." for extra in problem.extras]
+    if len(problem.ranks) > 1:
+        left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
+    problem = traded_part(problem)
     scale = Scale.of(problem)
     say("solving the reference")
     decided = _Decided(scale)
@@ -152,21 +155,13 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
     return Trade(
         problem, tuple(decided.regretted(row) for row in rows), decided.initial_value, decided.minimum, flywheel,
-        _price_of_time(problem), left_out, is_complete,
+        _price_of_time(problem), tuple(left_out), is_complete,
     )  # fmt: skip
 
 
 def traded_part(problem: Problem) -> Problem:
     """Return the problem that a trade measures: the drawing with the first objective only."""
     return problem.changed(ranks=(), extras=())
-
-
-def _left_out(problem: Problem) -> tuple[str, ...]:
-    reasons = {
-        f"The trade takes the first of {len(problem.ranks)} objectives.": len(problem.ranks) > 1,
-        **{f"The trade takes the drawing, without {extra.words}.": True for extra in problem.extras},
-    }
-    return tuple(line for line, holds in reasons.items() if holds)
 
 
 def is_open(problem: Problem) -> bool:
@@ -247,7 +242,18 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeR
         if engine is not None:
             solve_time = time.process_time() - started
             optimum, violation = decided.of(engine)
-    fresh = seconds(lambda: _from_scratch(variant))
+
+    def from_scratch() -> None:
+        forget()
+        objective_value(variant, evaluate(variant))
+
+    fresh = seconds(from_scratch)
+    tracemalloc.start()
+    try:
+        from_scratch()
+        memory = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
     return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
@@ -257,15 +263,10 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeR
         gradient=gradient,
         solve=solve_time,
         fresh=fresh,
-        memory=_memory(lambda: _from_scratch(variant)),
+        memory=memory,
         optimum=optimum,
         violation=violation,
     )
-
-
-def _from_scratch(variant: Problem) -> float:
-    forget()
-    return objective_value(variant, evaluate(variant))
 
 
 def _prepared_times(variant: Problem) -> tuple[float, float]:
@@ -274,18 +275,18 @@ def _prepared_times(variant: Problem) -> tuple[float, float]:
     model = AffineModel(variant)
     affine = model.at(model.full_samples)
     x = affine.start
-    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if variant.unbalances else math.nan
+
+    def value_and_gradient() -> tuple[float, Array]:
+        value, gradient = 0.0, np.zeros(len(x))
+        for weight, norm in affine.terms:
+            rows = norm.rows(x)
+            z = norm.norm.subgradient(norm.grid, rows)
+            value += weight * float(np.vdot(z, rows))
+            gradient += weight * (z.reshape(-1) @ norm.slope.reshape(-1, len(x)))
+        return value, gradient
+
+    gradient = seconds(value_and_gradient) if variant.unbalances else math.nan
     return seconds(lambda: affine.objective(x)), gradient
-
-
-def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -> tuple[float, Array]:
-    value, gradient = 0.0, np.zeros(len(x))
-    for weight, norm in terms:
-        rows = norm.rows(x)
-        z = norm.norm.subgradient(norm.grid, rows)
-        value += weight * float(np.vdot(z, rows))
-        gradient += weight * (z.reshape(-1) @ norm.slope.reshape(-1, len(x)))
-    return value, gradient
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
@@ -337,12 +338,3 @@ def seconds(work: Callable[[], object]) -> float:
         work()
         times.append(time.perf_counter() - started)
     return min(times)
-
-
-def _memory(work: Callable[[], object]) -> int:
-    tracemalloc.start()
-    try:
-        work()
-        return tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()

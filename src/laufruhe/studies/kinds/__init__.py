@@ -10,12 +10,11 @@ from typing import get_args
 from laufruhe.extension import extended
 from laufruhe.studies.part import Part
 
-
-def _find_kinds() -> Mapping[str, type[Part]]:
-    modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
-    classes = [kind for module in modules for kind in vars(module).values() if isinstance(kind, type)]
-    kinds = [kind for kind in classes if issubclass(kind, Part) and "kind" in kind.model_fields]
-    return extended("study_kinds", Part, kinds, lambda kind: str(get_args(kind.model_fields["kind"].annotation)[0]))
-
-
-KINDS: Mapping[str, type[Part]] = _find_kinds()
+_MODULES = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
+_CLASSES = [kind for module in _MODULES for kind in vars(module).values() if isinstance(kind, type)]
+KINDS: Mapping[str, type[Part]] = extended(
+    "study_kinds",
+    Part,
+    [kind for kind in _CLASSES if issubclass(kind, Part) and "kind" in kind.model_fields],
+    lambda kind: str(get_args(kind.model_fields["kind"].annotation)[0]),
+)

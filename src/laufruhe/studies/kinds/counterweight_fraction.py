@@ -45,7 +45,8 @@ class CounterweightFraction(SweptPart):
             return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
         points = []
         for case in self.cases:
-            left_open = _left_open(Point(case), fraction, scenes)
+            entry, numbers = at(scenes.tables(Point(case)), fraction.quantity), fraction.numbers or ()
+            left_open = entry if isinstance(entry, dict) else {"between": [min(numbers), max(numbers)]}
             for speed in self.combinations(without=fraction.quantity):
                 tried = ({**speed, fraction.quantity: value} for value in (*fraction.values, left_open))
                 points += [Point(case, changes, self.metric) for changes in tried]
@@ -94,12 +95,6 @@ class CounterweightFraction(SweptPart):
         panel = p.Panel(marks, p.Axis("balance factor"), metric_axis(data))
         words = f"Dot: {claim_of(data)} with open balance factor."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
-
-
-def _left_open(point: Point, fraction: SweepAxis, scenes: Scenes) -> dict[str, Any]:
-    entry = at(scenes.tables(point), fraction.quantity)
-    numbers = fraction.numbers or ()
-    return entry if isinstance(entry, dict) else {"between": [min(numbers), max(numbers)]}
 
 
 def _decided_fraction(record: Mapping[str, Any], quantity: str) -> float:

@@ -153,9 +153,11 @@ class FreeForces(Part):
             minimum, maximum = float(row["least_interval"]), float(row["largest_interval"])
             even = maximum - minimum < 1e-6
             cells = [str(name), f"{maximum:.4g}" if even else f"{minimum:.4g} to {maximum:.4g}"]
-            cells += [_with_printed(row.sel(order=order), what) for what, order in columns]
+            for what, order in columns:
+                computed, printed = (float(row.sel(order=order)[name]) for name in (what, f"{what}_printed"))
+                cells.append(fixed(computed, 4) + ("" if math.isnan(printed) else f" ({printed:g})"))
             first = row.sel(order=1)
-            rows.append([*cells, *(_plain(float(first[f"{what}_against"])) for what in WHAT)])
+            rows.append([*cells, *(fixed(float(first[f"{what}_against"]), 4) for what in WHAT)])
         agreed, printed_count = count_agreeing(data)
         words = (
             f"{agreed} of {printed_count} printed values agree to half of the last of {data.attrs['digits']} digits."
@@ -177,15 +179,6 @@ class FreeForces(Part):
         words = "Free loads of the pistons. Unit: force of one cylinder, for couples times the spacing."
         size = (1.75, 0.2 * count + 0.2)
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
-
-
-def _with_printed(row: xr.Dataset, what: str) -> str:
-    computed, printed = float(row[what]), float(row[f"{what}_printed"])
-    return _plain(computed) if printed != printed else f"{_plain(computed)} ({printed:g})"
-
-
-def _plain(value: float) -> str:
-    return fixed(value, 4)
 
 
 def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:

@@ -16,14 +16,14 @@ from laufruhe.files import fields as f
 from laufruhe.files.measures import MeasureContext, QuantityName, QuantityTable
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.physics.torque import swing_of
-from laufruhe.present.picture import Picture
+from laufruhe.present import picture as p
+from laufruhe.present.numbers import number as figures
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
-from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import SweptPart, solve_scene
+from laufruhe.studies.swept import Further, SweptPart, solve_scene
 from laufruhe.studies.swept_report import MAX_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
@@ -31,6 +31,10 @@ from laufruhe.units import readable
 EQUAL = "equal cylinders"
 _SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5
 _MIN_FLYWHEEL = "least flywheel"
+# height of a row, and of the margins above and below [inch]
+ROW, AROUND = 0.19, 0.9
+# panels side by side, and spread of values from which an axis is logarithmic
+MAX_PANELS_OF_RANKS, SPREAD = 4, 200.0
 
 
 class LayoutComparison(SweptPart):
@@ -71,10 +75,8 @@ class LayoutComparison(SweptPart):
             is_mass = name in MEASURES and MEASURES[name][0].is_mass
             try:
                 with scenes.named(case):
-                    measure = (
-                        Measure(*MEASURES[name]) if is_mass else context.measure(name, QuantityTable(), "study.further")
-                    )
-                    measures[name] = measure
+                    plain, table = Measure(*MEASURES[name]) if is_mass else None, QuantityTable()
+                    measures[name] = plain or context.measure(name, table, "study.further")
             except InputError as error:
                 measures[name] = error
         return measures
@@ -82,9 +84,14 @@ class LayoutComparison(SweptPart):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the record of the proven optimum, with every further quantity of that design."""
         problem = scenes.problem(point)
-        further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
+        further: dict[str, Further] = {
+            n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()
+        }
         if self.flywheel_for is not None:
-            further[_MIN_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
+            degree = self.flywheel_for
+            further[_MIN_FLYWHEEL] = lambda design: max(
+                swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads
+            )
         return solve_scene(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
@@ -131,7 +138,7 @@ class LayoutComparison(SweptPart):
         return [*tables, *_ranking(data)] if "further" in data else tables
 
     @staticmethod
-    def picture(data: xr.Dataset) -> Picture:
+    def picture(data: xr.Dataset) -> p.Picture:
         """Draw initial and final bars of every engine; lines where something is swept."""
         size, is_equal = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
@@ -139,17 +146,13 @@ class LayoutComparison(SweptPart):
             words = f"Every point: {claim_of(data)}." if decided else "Initial designs."
             return over_sweep(data, [], words if is_equal else f"At {size}. {words}")
         words = f"Engines of {size}." if is_equal else f"At {size}."
-        return side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
+        return _side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
 
 
 def _value(measure: Measure | InputError, design: Evaluation) -> float:
     if isinstance(measure, InputError):
         raise ModelError(measure.complaints[0].rule)
     return design.value(measure)
-
-
-def _least_flywheel(degree: float, design: Evaluation) -> float:
-    return max(swing_of(design.engine, loads.point, design.fidelity).minimum_inertia(degree) for loads in design.loads)
 
 
 def _ranking(data: xr.Dataset) -> list[Text]:
@@ -182,3 +185,52 @@ def _places(values: np.ndarray) -> list[int]:
         1 + int((finite < value - max(tolerance, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
         for value in values
     ]
+
+
+def _side_by_side(data: xr.Dataset, words: str) -> p.Picture:
+    """Rank engines, best first: a panel for the metric, unless it is a further quantity, and for each of those."""
+    order = np.argsort(np.nan_to_num(data["objective"].values, nan=np.inf), kind="stable")
+    names = [str(name) for name in data["case"].values[order]]
+    units = data["quantity_unit"].values.tolist()
+    quantities = [
+        (str(name), *readable(str(unit)), data["further"].values[order, k])
+        for k, (name, unit) in enumerate(zip(data["quantity"].values.tolist(), units, strict=True))
+    ]
+    unit, metric = data["objective"].attrs["units"], data.attrs["metric"]
+    if unit and metric not in [name for name, *_ in quantities]:
+        quantities.insert(0, (metric, *readable(unit), data["objective"].values[order]))
+    # rows of similar length
+    columns = -(-len(quantities) // -(-len(quantities) // MAX_PANELS_OF_RANKS))
+    panels = [
+        _panel(f"{name}\n[{unit}]" if unit else f"{name}\n", factor * values, names if k % columns == 0 else [])
+        for k, (name, unit, factor, values) in enumerate(quantities)
+    ]
+    proven, count = int((data["proof"].values == "global").sum()), data.sizes["point"]
+    claim = "All designs are proven optima" if proven == count else f"{proven} of {count} designs are proven optima"
+    size = (p.WIDEST / columns, AROUND + ROW * len(names))
+    text = f"{words} {claim}; the best is first."
+    gap = 0.12 if len(quantities) == columns else 0.5
+    return p.Picture(data.attrs["title"], text, panels, p.credit(data), size=size, columns=columns, gap=gap)
+
+
+def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
+    maximum = float(np.nanmax(values, initial=0.0)) or 1.0
+    minimum = float(np.nanmin(values, initial=maximum))
+    # values over decades need a logarithmic axis
+    low = 10.0 ** math.floor(math.log10(minimum)) if 0.0 < minimum < maximum / SPREAD else 0.0
+    span = math.log(maximum / low) if low else maximum
+    finite, places = np.isfinite(values), np.arange(len(values), dtype=float)
+    marks: list[p.Mark] = [p.Bars(places[finite], values[finite], 0.62, upright=False)]
+    for place, value in zip(places.tolist(), values.tolist(), strict=True):
+        is_known = math.isfinite(value)
+        text = figures(value, scale=maximum) if is_known else "no value"
+        start = value if is_known else low
+        marks.append(p.Words(start * math.exp(0.03 * span) if low else start + 0.03 * span, place, text))
+    ticks = [(float(row), name) for row, name in enumerate(names)]
+    side = p.Axis(ends=(len(values) - 0.4, -0.6), ticks=ticks, grid=False)
+    if not low:
+        return p.Panel(marks, p.Axis(ends=(low, 1.7 * span)), side, title)
+    end = low * math.exp(1.7 * span)
+    first, last = round(math.log10(low)), math.floor(math.log10(end))
+    decades = [(10.0**k, f"{10.0**k:g}") for k in range(first, last + 1, max((last - first) // 2, 1))]
+    return p.Panel(marks, p.Axis(ends=(low, end), log=(1.0,), ticks=decades), side, title)

@@ -48,10 +48,8 @@ class PercentilePart(Part):
     def table(data: xr.Dataset) -> list[Text]:
         """Return a row for each case."""
         about = data["percentile"].attrs
-        rows = [
-            [str(case), number(float(value))]
-            for case, value in zip(data["case"].values, data["percentile"].values, strict=True)
-        ]
+        values = zip(data["case"].values, data["percentile"].values, strict=True)
+        rows = [[str(case), number(float(value))] for case, value in values]
         return [marked_table(["case", f"{about['long_name']} [{about['units']}]"], rows)]
 
     @staticmethod

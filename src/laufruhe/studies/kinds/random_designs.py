@@ -110,12 +110,9 @@ class RandomDesigns(Sampled):
             feasible = _feasible(data, objective, k)
             _, middle, maximum = percentiles_of(feasible)
             cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(feasible) / objective.shape[1]:.3g} %"]
-            cells += [
-                number(float(feasible.min(initial=math.inf)) if len(feasible) else math.nan),
-                number(middle),
-                number(maximum),
-            ]
-            cells += [number(float(best[k])), number(float(bound[k])), str(data["proof"].values[k])]
+            least = float(feasible.min()) if len(feasible) else math.nan
+            cells += [number(value) for value in (least, middle, maximum, float(best[k]), float(bound[k]))]
+            cells.append(str(data["proof"].values[k]))
             rows.append([*cells, str(int((feasible < bound[k] * (1.0 - 1e-9)).sum()))])
         return [marked_table(head, rows)]
 
