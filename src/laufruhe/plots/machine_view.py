@@ -114,18 +114,9 @@ ROOM = 1.1
 
 @dataclass(frozen=True)
 class Scene:
-    """An engine with the names of its open parts.
+    """An engine with the names of its open rotors, mounts, pistons and cranks (shafts with open throws, lead or sizes).
 
-    Attributes
-    ----------
-    rotors, mounts, pistons
-        Names of open rotors, mounts and pistons.
-    cranks
-        Names of shafts with open throws, lead or sizes.
-    rods
-        True if sizes of the rods were open.
-    state
-        "optimised", or "open" in an initial design.
+    `rods` is true if sizes of the rods were open. The state is "optimised", or "open" in an initial design.
     """
 
     engine: Engine

@@ -34,13 +34,7 @@ def limits_on(result: Result, channel: Channel) -> list[Limit]:
 
 
 def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
-    """Mark operating points by thin lines, with names above the panel; set the ends of the axis before.
-
-    Parameters
-    ----------
-    lift
-        Height of the names above the panel [inch].
-    """
+    """Mark operating points by thin lines, their names `lift` above the panel [inch]; set the axis ends before."""
     points = sorted(result.problem.points, key=lambda point: point.speed)
     for point in points:
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)

@@ -89,16 +89,10 @@ def page(
     lead: float = 0.0,
     across: float | None = None,
 ) -> Page:
-    """Return panels of one size [inch]; `heading` adds the margins.
+    """Return `count` panels of one size [inch], by default rows times columns; `heading` adds the margins.
 
-    Parameters
-    ----------
-    count
-        Panels wanted, where fewer than rows times columns.
-    gap, across
-        Distance between panels; `across` between columns, if different [inch].
-    lead
-        Above each panel, for a heading of its own [inch].
+    The distance between panels is `gap`, between columns `across` if given; `lead` is above each panel, for its own
+    heading [inch].
     """
     across = gap if across is None else across
     width = columns * panel[0] + (columns - 1) * across

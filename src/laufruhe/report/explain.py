@@ -16,10 +16,7 @@ from laufruhe.report.strict_json import strict
 def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
     """Return the computed and neglected physics with reasons and cost, as text.
 
-    Parameters
-    ----------
-    milliseconds
-        Time of one evaluation with the chosen and with the exact physics.
+    One evaluation takes `milliseconds` with the chosen and with the exact physics.
     """
     pruned, exact = choice.numbers
     ratio = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""

@@ -61,8 +61,6 @@ class FileSet:
         Name of the option for error messages.
     verb
         Command; a folder holds the results of one command.
-    names
-        File names that may be made.
     adds
         True if files of earlier runs stay, unless they are made again.
     kept_names
@@ -104,15 +102,9 @@ class FileSet:
 def staged(target: FileSet) -> Iterator[Path]:
     """Yield a hidden folder that replaces the target folder atomically when all files are made.
 
-    Whether it can is found out on entry. After an error, an interrupt or a kill at any
-    moment the folder is as it was before, or all new; the next run takes away what a
-    killed one left behind.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written, holds what Laufruhe did not make and would
-        overwrite, or holds the results of another command.
+    After an error, an interrupt or a kill at any moment the folder is as it was before, or all new; the next run
+    takes away what a killed one left behind. `InputError` on entry if the folder cannot be written, holds what
+    Laufruhe did not make and would overwrite, or holds the results of another command.
     """
     target = replace(target, folder=Path(os.path.realpath(target.folder)))
     with ExitStack() as stack:
@@ -159,10 +151,7 @@ def _with_final_name(stage: Path, target: Path) -> Iterator[None]:
 def staged_file(path: Path, option: str) -> Iterator[Path]:
     """Yield a path to write data to; it replaces `path` when it is complete.
 
-    Raises
-    ------
-    InputError
-        If `path` cannot be written, or is a file that Laufruhe did not make.
+    `InputError` if `path` cannot be written, or is a file that Laufruhe did not make.
     """
     path = path.resolve()
     place = FileSet(path, option, "", ())

@@ -13,15 +13,7 @@ from laufruhe.solvers.result import Result
 
 
 def result_document(result: Result, pictures: Sequence[str], command: str) -> Document:
-    """Return the report of a result.
-
-    Parameters
-    ----------
-    pictures
-        Names without endings, of those that were drawn.
-    command
-        Command that reproduces the result.
-    """
+    """Return the report of a result, with the pictures that were drawn and the command that reproduces it."""
     return Document(result.problem.title, tuple(_blocks(result, pictures, command)))
 
 

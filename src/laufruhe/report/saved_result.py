@@ -60,8 +60,6 @@ class SavedResult(ResultContent):
     ----------
     problem, title
         Name of the problem file without its ending, and its title.
-    status, message, conflict, objective, certificate, decisions, limits
-        Same as in `Result`.
     record
         Whole content of the file, as plain Python values.
     """

@@ -22,15 +22,7 @@ HEADING = "Move the decisions"
 
 
 def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
-    """Return a report as HTML.
-
-    Parameters
-    ----------
-    pictures
-        SVG by name; they are part of the page.
-    live
-        Model for sliders in the page.
-    """
+    """Return a report as HTML with its pictures, SVG by name, and sliders where there is a live model."""
     inline = {name: data_address(svg) for name, svg in pictures.items()}
     return f"{template().render(document=document, pictures=inline, live=_live(live))}\n"
 

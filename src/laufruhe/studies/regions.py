@@ -41,17 +41,8 @@ class Region:
 class Regions:
     """Numbers of one part: `values` along case, draw and quantity, and `done` along case and piece.
 
-    Parameters
-    ----------
-    root
-        Folder of the store, which all parts of a study share; this part is a group in it.
-    regions
-        Region of every piece, by fingerprint.
-
-    Raises
-    ------
-    InputError
-        If something else stands there.
+    The folder `root` is the store of a whole study; this part is a group in it. `regions` has the region of every
+    piece by fingerprint. `InputError` if something else stands there.
     """
 
     def __init__(self, root: Path, name: str, template: Template, regions: Mapping[str, Region]) -> None:
@@ -139,13 +130,7 @@ def _standing(store: Any, name: str, about: Mapping[str, Any], forms: Mapping[st
 
 
 def _store_at(root: Path) -> Any:
-    """Return the group of a store, new in an empty folder; foreign files stay untouched.
-
-    Raises
-    ------
-    InputError
-        If the folder holds anything but a sound store that was made here.
-    """
+    """Return the group of a store, new in an empty folder; `InputError` if the folder holds anything else."""
     import zarr
 
     if not any(root.iterdir()):
@@ -166,13 +151,7 @@ def _store_at(root: Path) -> Any:
 
 @contextmanager
 def locked_store(root: Path) -> Iterator[None]:
-    """Lock a store against other runs.
-
-    Raises
-    ------
-    InputError
-        If another does, Zarr is not installed, or the folder cannot be made.
-    """
+    """Lock a store; `InputError` if another run does, Zarr is not installed, or the folder cannot be made."""
     try:
         import zarr  # noqa: F401
     except ImportError:

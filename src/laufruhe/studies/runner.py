@@ -44,7 +44,7 @@ def run(
 ) -> tuple[dict[str, xr.Dataset], dict[str, float]]:
     """Return all parts of a study as datasets, and the seconds that their points took on one core.
 
-    `InputError` where a scene is bad.
+    `InputError` where a scene is bad. The results do not depend on the number of processes `jobs`.
 
     Parameters
     ----------
@@ -54,8 +54,6 @@ def run(
         File of the finished points; points in it are not solved again.
     say
         Function called with the number of finished points and of all points.
-    jobs
-        Processes that may be used; the results do not depend on it.
     """
     scenes = Scenes(folder)
     work = [(part, point) for part in study.study.parts for point in part.points(scenes)]

@@ -227,12 +227,8 @@ class SweptPart(Part):
     def checked(self, scenes: Scenes) -> list[Problem]:
         """Return the problem of every case at the first values of all sweeps.
 
-        The last value of every sweep is built too, so that errors are found before the run.
-
-        Raises
-        ------
-        InputError
-            If a problem cannot be built, a number is swept and set or swept twice, or the metrics differ in unit.
+        The last value of every sweep is built too, so that errors are found before the run. `InputError` if a problem
+        cannot be built, a number is swept and set or swept twice, or the metrics differ in unit.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}

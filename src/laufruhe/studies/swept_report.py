@@ -59,13 +59,7 @@ def claim_of(data: xr.Dataset) -> str:
 
 
 def by_point(data: xr.Dataset, *named: str) -> list[Text]:
-    """Return a row per point: swept values with units, the metric and its proof.
-
-    Parameters
-    ----------
-    named
-        Coordinates that distinguish rows in addition to case and swept values.
-    """
+    """Return a row per point: case, `named` coordinates and swept values with units, the metric and its proof."""
     data = readable_metric(data)
     columns = ["case", *named, *swept_names(data)]
     metric, unit = data.attrs["metric"], data["objective"].attrs["units"]

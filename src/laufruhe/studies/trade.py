@@ -83,11 +83,7 @@ class TradeRow:
 class TimeDomain:
     """Difference between mount forces in the time and frequency domains, relative to their peak.
 
-    Attributes
-    ----------
-    integration, loss
-        Largest difference from the same equations in the frequency domain, and from
-        hysteretic loss, which has no law in time (E26).
+    `integration` compares the same equations, `loss` hysteretic loss, which has no law in time (E26).
     """
 
     point: str
@@ -107,11 +103,9 @@ class Trade:
         Crank inertia at which the constant speed was priced [kg m2], and the relative
         change of the objective that the uneven speed makes; None if no measure is of a load.
     time_domain
-        Comparison in time; None for rigid mounts.
+        None for rigid mounts.
     left_out
         Sentences about parts of the problem that a trade does not include.
-    is_complete
-        True if all fidelities were measured in the given time.
     """
 
     problem: Problem
@@ -182,12 +176,8 @@ def effort(problem: Problem) -> tuple[bool, int]:
 class _Decided:
     """Designs of the reference and of each fidelity, which start from it (F14).
 
-    Attributes
-    ----------
-    initial_value
-        Reference objective of the design as given.
-    minimum
-        Reference objective of the best design known that keeps the limits; zero of what cancels, NaN where none is.
+    The initial value is the reference objective of the design as given. The minimum is that of the best design known
+    that keeps the limits; zero of what cancels, NaN where none is.
     """
 
     def __init__(self, scale: Scale) -> None:

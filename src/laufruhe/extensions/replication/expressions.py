@@ -47,12 +47,8 @@ def checks_in(
 ) -> Iterator[tuple[Place, Any, Callable[[str], None]]]:
     """Yield every text with expressions in a table: its place, the text, and a function that checks it.
 
-    Parameters
-    ----------
-    known
-        Names, and the values that each is repeated for, where it is.
-    places
-        Dimensions, which the `x` of a curve knows too.
+    `known` are names with the values that each is repeated for, `places` dimensions, which the `x` of a curve knows
+    too.
     """
     if isinstance(entry, Table):
         known_here = {**known, **getattr(entry, "loops", {})}
@@ -78,10 +74,7 @@ def _check_braces(text: str, check: Callable[[str], None]) -> None:
 def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str]) -> None:
     """Check an expression before any name has a value.
 
-    Raises
-    ------
-    ExpressionError
-        If it cannot be read, or uses names, functions or cases that are not there.
+    `ExpressionError` if it cannot be read, or uses names, functions or cases that are not there.
     """
     nodes = _read(text)[0]
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
@@ -96,13 +89,7 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
 
 
 def check_name(name: str, known: Collection[str], what: str) -> None:
-    """Check that a name exists.
-
-    Raises
-    ------
-    ExpressionError
-        With the nearest one.
-    """
+    """Raise `ExpressionError` with the nearest name unless a name exists."""
     if name not in known:
         raise ExpressionError(f"'{name}' is no {what} here; {nearest(name, list(known))}")
 
@@ -110,10 +97,7 @@ def check_name(name: str, known: Collection[str], what: str) -> None:
 def value_of(text: Any, names: Mapping[str, Any]) -> Any:
     """Evaluate an expression; a value that is no text is returned as it is.
 
-    Raises
-    ------
-    ExpressionError
-        If it cannot be read, or names what is not there.
+    `ExpressionError` if it cannot be read, or names what is not there.
     """
     if not isinstance(text, str):
         return text
@@ -236,13 +220,7 @@ def _parts(text: str) -> Iterator[tuple[str, str, str]]:
 
 
 def number_of(text: Any, names: Mapping[str, Any]) -> float:
-    """Evaluate an expression that must be one number.
-
-    Raises
-    ------
-    ExpressionError
-        As `value_of` does, and where it is anything else.
-    """
+    """Evaluate an expression; `ExpressionError` also where it is anything but one number."""
     value = value_of(text, names)
     try:
         return float(value)
@@ -251,13 +229,7 @@ def number_of(text: Any, names: Mapping[str, Any]) -> float:
 
 
 def numbers_of(entries: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:
-    """Return numbers by name, each an expression over earlier ones; a table is a grid along its own dimension.
-
-    Raises
-    ------
-    ExpressionError
-        As `value_of` does.
-    """
+    """Return numbers by name, each an expression over earlier ones; a table is a grid along its own dimension."""
     numbers = dict(names)
     for name, text in entries.items():
         numbers[name] = grid(name, text) if isinstance(text, dict | GridTable) else value_of(text, numbers)

@@ -18,13 +18,7 @@ _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
 def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return coordinates of a dataset along statements and readings: printed, ours, verdict, why.
-
-    Parameters
-    ----------
-    readings
-        Values of the names in each reading of the source.
-    """
+    """Return coordinates of a dataset along statements and readings (values of names): printed, ours, verdict, why."""
     if not statements:
         return {}
     verdicts = [[_verdict(statement, names) for names in readings.values()] for statement in statements]

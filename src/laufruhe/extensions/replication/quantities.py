@@ -54,26 +54,14 @@ class Labelled(NamedTuple):
 
 
 def check_quantity(what: str | QuantityQuery) -> None:
-    """Check that a quantity exists.
-
-    Raises
-    ------
-    ExpressionError
-        With the nearest one.
-    """
+    """Raise `ExpressionError` with the nearest name unless a quantity exists."""
     name = what if isinstance(what, str) else what.quantity
     if not name.startswith(DECISION):
         check_name(name, [*RESULTS, *MEASURES], "quantity")
 
 
 def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
-    """Return a quantity of a case's design [SI].
-
-    Raises
-    ------
-    ModelError
-        If this engine has none of it.
-    """
+    """Return a quantity of a case's design [SI]; `ModelError` if this engine has none of it."""
     table = QuantityQuery(quantity=what) if isinstance(what, str) else what
     name = table.quantity
     if name in RESULTS:

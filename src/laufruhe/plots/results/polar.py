@@ -40,18 +40,10 @@ applies = has_mount_forces
 
 @dataclass(frozen=True)
 class Frame:
-    """Axis limits that all panels share.
+    """Axis limits that all panels share: the largest force [N], and the magnification of the forces by direction.
 
-    Attributes
-    ----------
-    size
-        The largest force [N].
-    times
-        Magnification of the forces, by direction.
-    along
-        The only direction that counts, whose force is shown over the crank angle; None for paths.
-    others
-        The largest force in the other direction [N].
+    `along` is the only direction that counts, whose force is shown over the crank angle, or None for paths; `others`
+    is the largest force in the other direction [N].
     """
 
     size: float
