@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.machine_view import MM, Scene, at, draw_views, legend_of, views
-from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, finish_page, point_name, series_of, styled
+from laufruhe.plots.style import VERMILION, Page, entry_of_dots, finish_page, point_name, series_of, styled
 from laufruhe.plots.words import in_thousands
 from laufruhe.present.measures import hardest_point, has_loads
 from laufruhe.present.numbers import number
@@ -37,15 +37,20 @@ def animate(result: Result, path: Path) -> None:
 
     scene = Scene.from_result(result)
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
-    loads = [_loads(item, k) for item in series] if has_loads(result) else []
+    loads = []
+    for item in series if has_loads(result) else ():
+        fields = forces_of({item.name: item.design}, FRAMES).fields
+        forces = {field.name: field.values[0, k] for field in fields}
+        shaking = forces["shaking_force"][:, None]
+        loads.append(np.concatenate([shaking, forces["mount_force"]], axis=1) if "mount_force" in forces else shaking)
     largest = max((float(np.abs(item[:, :, 1:]).max()) for item in loads), default=0.0)
     frames, (factor, unit) = [], in_thousands(largest, "N")
     for step in range(FRAMES):
         drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
         draw_views(drawn, scene, phi)
         _firings(drawn, scene, phi)
-        for item, forces in zip(series, loads, strict=False):
-            _arrows(drawn.panels[0], scene, forces[step], largest, item.colour)
+        for item, cycle in zip(series, loads, strict=False):
+            _arrows(drawn.panels[0], scene, cycle[step], largest, item.colour)
         angle = f"{math.degrees(phi):.1f}° of crank angle"
         scale = f"; longest arrow {number(factor * largest, 3)} {unit}" if largest else ""
         where = f", at {point_name(result, k)}" if loads else ""
@@ -73,12 +78,6 @@ def _firings(drawn: Page, scene: Scene, phi: float) -> None:
         side = (MM * part.x, MM * (place.imag if scene.is_flat else place.real))
         for axes, (x, y) in zip(drawn.panels, (at(place), side), strict=True):
             axes.plot(x, y, "o", color=VERMILION, markersize=7.0, zorder=9.5)
-
-
-def _loads(item: Series, k: int) -> Array:
-    fields = {field.name: field.values[0, k] for field in forces_of({item.name: item.design}, FRAMES).fields}
-    shaking = fields["shaking_force"][:, None]
-    return np.concatenate([shaking, fields["mount_force"]], axis=1) if "mount_force" in fields else shaking
 
 
 def _arrows(axes: Axes, scene: Scene, forces: Array, largest: float, colour: str) -> None:

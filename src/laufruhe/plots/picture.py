@@ -50,7 +50,16 @@ def _drawn(picture: Picture) -> Figure:
     drawn = page(rows, picture.columns, size, len(picture.panels), picture.gap, lead)
     for axes, panel in zip(drawn.panels, picture.panels, strict=True):
         _panel(axes, panel)
-    legend = [_entry(mark) for mark in _named(picture)]
+    labelled = {getattr(mark, "label", ""): mark for panel in picture.panels for mark in panel.marks}
+    marks = list(picture.legend) or [mark for label, mark in labelled.items() if label]
+    if len(marks) > MAX_ENTRIES:
+        marks = [marks[k] for k in np.linspace(0, len(marks) - 1, FEW_ENTRIES).round().astype(int)]
+    legend: list[Artist] = [
+        Line2D([], [], label=mark.label, **_look(mark))
+        if isinstance(mark, Line)
+        else Patch(color=colour_of(mark.colour), label=getattr(mark, "label", ""))
+        for mark in marks
+    ]
     heading(drawn.figure, picture.title, picture.words, legend, picture.credit)
     return drawn.figure
 
@@ -135,17 +144,3 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
         axes.grid(axis=name, visible=False)
         if name == "y":
             axes.tick_params(axis="y", length=0)
-
-
-def _named(picture: Picture) -> Sequence[Mark]:
-    labelled = {getattr(m, "label", ""): m for p in picture.panels for m in p.marks}
-    marks = list(picture.legend) or [mark for label, mark in labelled.items() if label]
-    if len(marks) <= MAX_ENTRIES:
-        return marks
-    return [marks[k] for k in np.linspace(0, len(marks) - 1, FEW_ENTRIES).round().astype(int)]
-
-
-def _entry(mark: Mark) -> Artist:
-    if isinstance(mark, Line):
-        return Line2D([], [], label=mark.label, **_look(mark))
-    return Patch(color=colour_of(mark.colour), label=getattr(mark, "label", ""))

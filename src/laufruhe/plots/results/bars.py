@@ -37,9 +37,15 @@ def figure(result: Result) -> Figure:
     series = series_of(result, loads=True)
     values = {k: [_measures(one.design, k) for one in series] for k in points}
     top = axis_end(float(table.max(initial=0.0)) for tables in values.values() for table in tables)
+    factor, unit = in_thousands(top, "N")
     for axes, (k, part) in zip(drawn.panels, rows, strict=True):
         _groups(axes, values[k], series, part, top)
-        _frame(axes, names, part, side, top)
+        axes.set_xticks(axes.get_xticks(), [fit_line(names[mount], GROUP - 0.08) for mount in part])
+        axes.tick_params(axis="x", length=0)
+        axes.grid(axis="x", visible=False)
+        # room for a number above the highest bar
+        room = 1.0 + 0.24 * axes.figure.dpi / axes.bbox.height
+        axes.set(xlim=(-0.55, side - 0.15), ylim=(0.0, room * factor * top), ylabel=f"force on the mount [{unit}]")
         if len(several) > 1 and part is parts[0]:
             axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10)
     at = f" at {result.problem.points[points[0]].name}" if len(points) == 1 else ""
@@ -77,13 +83,3 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
     axes.set_xticks(places)
     if all_mounts in part and len(part) > 1:
         axes.axvline(0.5 * (places[-1] + places[-2]), color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)))
-
-
-def _frame(axes: Axes, names: list[str], part: range, side: int, top: float) -> None:
-    factor, unit = in_thousands(top, "N")
-    axes.set_xticks(axes.get_xticks(), [fit_line(names[k], GROUP - 0.08) for k in part])
-    axes.tick_params(axis="x", length=0)
-    axes.grid(axis="x", visible=False)
-    # room for a number above the highest bar
-    room = 1.0 + 0.24 * axes.figure.dpi / axes.bbox.height
-    axes.set(xlim=(-0.55, side - 0.15), ylim=(0.0, room * factor * top), ylabel=f"force on the mount [{unit}]")

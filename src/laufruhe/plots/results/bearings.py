@@ -84,13 +84,9 @@ def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: fl
         closed = np.append(path, path[0])
         axes.plot(closed.imag, closed.real, color=item.colour, linewidth=1.5, solid_joinstyle="round")
         axes.plot(path[:1].imag, path[:1].real, "o", color=item.colour, markersize=4.0)
-    _wear(axes, paths[-1], size)
-
-
-def _wear(axes: Axes, path: Plane, size: float) -> None:
     angles = math.tau * np.arange(STEPS + 1) / STEPS
     inner = RING * size * np.exp(1j * angles)
-    outer = inner * (1.0 + THICK / RING * wear_of(path, angles))
+    outer = inner * (1.0 + THICK / RING * wear_of(paths[-1], angles))
     ring = np.concatenate([outer, inner[::-1]])
     axes.fill(ring.imag, ring.real, color=ORANGE, alpha=0.6, linewidth=0.0)
     axes.plot(inner.imag, inner.real, color=FAINT, linewidth=0.5)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import chain
 from typing import Any
 
 from matplotlib.artist import Artist
@@ -32,32 +33,28 @@ def figure(result: Result) -> Figure:
     limits = limits_on(result, channels.FREQUENCIES)
     bands = [limit.outside for limit in limits if limit.outside is not None]
     edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if math.isfinite(edge)]
-    frequencies = [
-        *facts.modes.frequencies,
-        *facts.with_fluid,
-        *edges,
-        *(edge for band in bands for edge in band),
-        1e-9,
-    ]
-    reach = 1.1 * float(max(frequencies))
-    legend = _draw_limits(axes, edges, bands)
+    reach = 1.1 * float(max(*facts.modes.frequencies, *facts.with_fluid, *edges, *chain(*bands), 1e-9))
+    legend: list[Artist] = order_entries(facts, AFTER)
+    legend.append(entry_of_dots("critical speed", color=AFTER, markersize=4.5))
+    for band in bands:
+        axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
+    for edge in edges:
+        axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
+    legend += [entry("limit", color=LIMIT, alpha=0.5, linewidth=2.4)] if edges else []
+    forbidden = "band that must have no natural frequency"
+    legend += [Patch(facecolor=LIMIT, alpha=0.13, label=forbidden)] if bands else []
     for k, order in enumerate(facts.orders):
         axes.plot([0.0, top * RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=STYLES[k], linewidth=1.4)
     axes.set(xlim=(0.0, top * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
     _modes(axes, facts)
     mark_points(axes, result)
-    critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
+    fluid: Any = {"color": BEFORE, "linewidth": 1.0, "linestyle": ":"}
+    for frequency in facts.with_fluid:
+        axes.axhline(frequency, zorder=1.5, **fluid)
+    legend += [entry("block and fluid together, undamped", **fluid)] if facts.with_fluid else []
     which = "of the final design" if is_changed(result) else "of the initial design"
     lines = f"Natural frequencies {which}, and the orders that excite each most.{stiffness_sentence(facts)}"
-    legend = [*order_entries(facts, AFTER), critical, *legend, *_with_fluid(axes, facts)]
     return finish_page(drawn, result, "Critical speeds", lines, legend)
-
-
-def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
-    look: Any = {"color": BEFORE, "linewidth": 1.0, "linestyle": ":"}
-    for frequency in facts.with_fluid:
-        axes.axhline(frequency, zorder=1.5, **look)
-    return [entry("block and fluid together, undamped", **look)] if facts.with_fluid else []
 
 
 def _modes(axes: Axes, facts: MountingFacts) -> None:
@@ -70,13 +67,3 @@ def _modes(axes: Axes, facts: MountingFacts) -> None:
         for order in facts.orders if excited else ():
             axes.plot(critical_speed(frequency, order) * RPM, frequency, "o", color=AFTER, markersize=4.5, zorder=5)
     label_lines(axes, facts.modes.frequencies.tolist(), names)
-
-
-def _draw_limits(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
-    for band in bands:
-        axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
-    for edge in edges:
-        axes.axhline(edge, color=LIMIT, linewidth=2.4, alpha=0.5, zorder=4)
-    ends = [entry("limit", color=LIMIT, alpha=0.5, linewidth=2.4)]
-    forbidden = [Patch(facecolor=LIMIT, alpha=0.13, label="band that must have no natural frequency")]
-    return [*(ends if edges else []), *(forbidden if bands else [])]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -37,7 +36,13 @@ def figure(result: Result) -> Figure:
     drawn = page(len(parts), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)
     for k, part in enumerate(parts):
         left, right = drawn.panels[2 * k], drawn.panels[2 * k + 1]
-        _diagrams(left, gas, part, point)
+        drawn_part = indicator_of(gas, part, point, np.linspace(0.0, math.tau, STEPS + 1))
+        for j, (name, pressure) in enumerate(drawn_part.pressures.items()):
+            left.plot(drawn_part.travel, BAR * pressure, color=COLOURS[j % len(COLOURS)], linewidth=1.2, label=name)
+        left.set_ylim(bottom=0.0)
+        left.legend(
+            frameon=False, handlelength=1.2, borderpad=0.0, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2
+        )
         _force(right, gas, part, point)
         for axes in (left, right):
             axes.set(
@@ -48,15 +53,6 @@ def figure(result: Result) -> Figure:
     legend = [entry("force of the chambers", color=INK, linewidth=1.4)]
     legend += [entry("force that accelerates the rod", color=FAINT, linestyle=(0, (4, 1.6)))]
     return finish_page(drawn, result, f"Indicator diagrams at {point.name}", lines, legend)
-
-
-def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:
-    drawn = indicator_of(gas, part, point, np.linspace(0.0, math.tau, STEPS + 1))
-    for k, (name, pressure) in enumerate(drawn.pressures.items()):
-        axes.plot(drawn.travel, BAR * pressure, color=COLOURS[k % len(COLOURS)], linewidth=1.2, label=name)
-    axes.set_ylim(bottom=0.0)
-    above: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "ncols": 2}
-    axes.legend(frameon=False, handlelength=1.2, borderpad=0.0, **above)
 
 
 def _force(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:

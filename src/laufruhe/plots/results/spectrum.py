@@ -40,7 +40,12 @@ def figure(result: Result) -> Figure:
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
     for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
         words, (factor, symbol) = omitted_words(top, max(tops), unit), in_thousands(top, unit)
-        _frame(axes, f"{label} [{symbol}]", factor * top, last)
+        axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * factor * top or 1.0))
+        axes.set_ylabel(f"{label} [{symbol}]")
+        axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, steps=[1, 2, 5, 10]))
+        round_ticks(axes.yaxis, 5)
+        axes.grid(axis="x", visible=False)
+        axes.tick_params(axis="x", length=2)
         if words:
             empty(axes, words)
         else:
@@ -87,11 +92,3 @@ def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> N
     for k, (values, colour) in enumerate(zip(series, colours, strict=True)):
         places = drawn * base + (k - 0.5 * (len(series) - 1)) * width
         axes.bar(places, values[drawn], width, color=colour, linewidth=0)
-
-
-def _frame(axes: Axes, label: str, top: float, last: float) -> None:
-    axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * top if top > 0.0 else 1.0), ylabel=label)
-    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, steps=[1, 2, 5, 10]))
-    round_ticks(axes.yaxis, 5)
-    axes.grid(axis="x", visible=False)
-    axes.tick_params(axis="x", length=2)

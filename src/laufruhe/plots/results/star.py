@@ -28,6 +28,7 @@ def figure(result: Result) -> Figure:
     """Draw the best stars: end view from the front, side view with every throw at its height."""
     phasing = ranking_of(result)
     stars = phasing.ranking[:MAX_STARS]
+    unit, scale = (result.objective.unit, result.objective.initial) if result.objective else ("", 0.0)
     side = min(max(4.0, 0.5 * len(phasing.places)), 4.7)
     drawn = page(len(stars), 2, (side, 2.1), lead=0.3, gap=0.1)
     for k, star in enumerate(stars):
@@ -35,28 +36,21 @@ def figure(result: Result) -> Figure:
         colour = AFTER if k == 0 else BEFORE
         _end_view(end, star, colour)
         _side_view(along, star, phasing.places, colour)
-        end.set_title(_title(result, star, k), loc="left", size=10, parse_math=False)
-        along.set_title(_balance(star), loc="left", size=SMALL, color=FAINT, parse_math=False)
+        built = f", with {', '.join(star.shafts)}" if star.shafts else ""
+        title = f"{k + 1}. {format_value(star.value, unit, scale=scale)}{built}"
+        end.set_title(title, loc="left", size=10, parse_math=False)
+        balance = ", ".join(
+            f"{h}: {number(force, 2, 1.0)} / {number(couple, 2, 1.0)}"
+            for h, force, couple in zip(star.orders, star.forces, star.couples, strict=True)
+        )
+        words = f"free force / couple of order {balance}"
+        along.set_title(words, loc="left", size=SMALL, color=FAINT, parse_math=False)
     legend = [entry("best star", color=AFTER, marker="o"), entry("next in the ranking", color=BEFORE, marker="o")]
     lines = (
         "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away. "
         "Free forces over that of one throw, couples over that times the spacing of throws."
     )
     return finish_page(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
-
-
-def _title(result: Result, star: RankedStar, k: int) -> str:
-    unit, scale = (result.objective.unit, result.objective.initial) if result.objective else ("", 0.0)
-    built = f", with {', '.join(star.shafts)}" if star.shafts else ""
-    return f"{k + 1}. {format_value(star.value, unit, scale=scale)}{built}"
-
-
-def _balance(star: RankedStar) -> str:
-    text = ", ".join(
-        f"{h}: {number(force, 2, 1.0)} / {number(couple, 2, 1.0)}"
-        for h, force, couple in zip(star.orders, star.forces, star.couples, strict=True)
-    )
-    return f"free force / couple of order {text}"
 
 
 def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
@@ -78,14 +72,12 @@ def _group_by_angle(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
     # throws at equal angles, to a degree
     groups: list[tuple[float, list[int]]] = []
     for k, angle in enumerate(throws):
-        matching = (
-            members for group_angle, members in groups if abs(math.remainder(angle - group_angle, math.tau)) < SAME
-        )
-        members = next(matching, None)
-        if members is None:
-            groups.append((angle, [k]))
+        for group_angle, members in groups:
+            if abs(math.remainder(angle - group_angle, math.tau)) < SAME:
+                members.append(k)
+                break
         else:
-            members.append(k)
+            groups.append((angle, [k]))
     return groups
 
 

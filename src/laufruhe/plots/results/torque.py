@@ -48,7 +48,9 @@ def figure(result: Result) -> Figure:
     degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
-    _move_down(drawn.panels[-1], 0.5)
+    # room for the label above the last panel
+    box, high = drawn.panels[-1].get_position(), drawn.figure.get_figheight()
+    drawn.panels[-1].set_position((box.x0, box.y0 - 0.5 / high, box.width, box.height))
     unit = in_thousands(largest, "N m")
     _torque(drawn.panels[0], visible, degrees, facts[k].mean, unit)
     _work(drawn.panels[1], parts["all"], degrees, facts[k])
@@ -68,11 +70,6 @@ def figure(result: Result) -> Figure:
     legend.append(entry(f"mean, {number(facts[k].mean, scale=largest)} N m", **_MEAN))
     legend += [entry(f"speed {item.name}", color=item.colour, linewidth=1.8) for item in turning]
     return finish_page(drawn, result, "Torque over one working cycle", lines, legend)
-
-
-def _move_down(axes: Axes, inches: float) -> None:
-    box, high = axes.get_position(), axes.figure.bbox.height / axes.figure.dpi
-    axes.set_position((box.x0, box.y0 - inches / high, box.width, box.height))
 
 
 def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, unit: Unit) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -26,7 +28,7 @@ def figure(result: Result) -> Figure:
     tests = result.problem.friction[:MAX_LINES]
     drawn = page(len(tests), 1, (6.4, 2.3), gap=0.75)
     for axes, test in zip(drawn.panels, tests, strict=True):
-        (_motored if test.is_motored else _fuelled)(axes, test)
+        _draw(axes, test)
     legend = [
         entry_of_dots("measured", color=INK), entry("least squares", color=SKY),
         entry("friction, and its deviations", color=AFTER),
@@ -38,29 +40,21 @@ def figure(result: Result) -> Figure:
     return finish_page(drawn, result, "Friction by measurement", f"Friction mean pressure {text}.", legend)
 
 
-def _fuelled(axes: Axes, test: FrictionTest) -> None:
-    """Draw fuel over brake mean pressure: the line reaches zero fuel at the friction."""
-    (intercept, slope), friction = test.line, test.friction
-    x, y = BAR * np.array(test.x), np.array(test.y)
-    ends = np.array([-friction.mean, max(*test.x, test.target)])
-    axes.plot(BAR * ends, intercept + slope * ends, color=SKY, linewidth=1.6)
-    axes.plot(x, y, "o", color=INK, markersize=5.0)
+def _draw(axes: Axes, test: FrictionTest) -> None:
+    """Draw fuel over brake mean pressure, whose line reaches zero fuel at the friction, or drag over speed."""
+    (intercept, slope), friction, motored = test.line, test.friction, test.is_motored
+    across, up = (RPM, BAR) if motored else (BAR, 1.0)
+    ends = np.array([min(*test.x, test.target) if motored else -friction.mean, max(*test.x, test.target)])
+    axes.plot(across * ends, up * (intercept + slope * ends), color=SKY, linewidth=1.6)
+    axes.plot(across * np.array(test.x), up * np.array(test.y), "o", color=INK, markersize=5.0)
+    look: Any = {"color": AFTER, "capsize": 4.0, "linewidth": 1.8}
     room = BAR * test.deviations * friction.deviation
-    axes.errorbar(-BAR * friction.mean, 0.0, xerr=room, color=AFTER, capsize=4.0, linewidth=1.8)
-    axes.plot(BAR * test.target, intercept + slope * test.target, "D", color=AFTER, markersize=6.0)
-    axes.axhline(0.0, color=INK, linewidth=0.8)
     axes.margins(0.06)
-    axes.set(xlabel=f"brake mean pressure at {test.at} [bar]", ylabel="fuel, as measured")
-
-
-def _motored(axes: Axes, test: FrictionTest) -> None:
-    (intercept, slope), friction = test.line, test.friction
-    ends = np.array([min(*test.x, test.target), max(*test.x, test.target)])
-    axes.plot(RPM * ends, BAR * (intercept + slope * ends), color=SKY, linewidth=1.6)
-    axes.plot(RPM * np.array(test.x), BAR * np.array(test.y), "o", color=INK, markersize=5.0)
-    room = BAR * test.deviations * friction.deviation
-    axes.errorbar(
-        RPM * test.target, BAR * friction.mean, yerr=room, color=AFTER, capsize=4.0, linewidth=1.8, marker="D"
-    )
-    axes.margins(0.06)
-    axes.set(xlabel=f"speed, asked for at {test.at} [rpm]", ylabel="drag [bar]")
+    if motored:
+        axes.errorbar(RPM * test.target, BAR * friction.mean, yerr=room, marker="D", **look)
+        axes.set(xlabel=f"speed, asked for at {test.at} [rpm]", ylabel="drag [bar]")
+    else:
+        axes.errorbar(-BAR * friction.mean, 0.0, xerr=room, **look)
+        axes.plot(BAR * test.target, intercept + slope * test.target, "D", color=AFTER, markersize=6.0)
+        axes.axhline(0.0, color=INK, linewidth=0.8)
+        axes.set(xlabel=f"brake mean pressure at {test.at} [bar]", ylabel="fuel, as measured")
