@@ -17,7 +17,6 @@ from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.transforms import Affine2D
-from scipy.optimize import isotonic_regression
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import FONT, families
@@ -105,10 +104,21 @@ def spread(places: Array, minimum: float, low: float = 0.0, high: float = 1.0) -
         return places
     order = np.argsort(places, kind="stable")
     steps = minimum * np.arange(len(places))
-    moved = np.clip(isotonic_regression(places[order] - steps).x, low, max(high - steps[-1], low))
+    moved = np.clip(_rising(places[order] - steps), low, max(high - steps[-1], low))
     result = np.empty(len(places))
     result[order] = moved + steps
     return result
+
+
+def _rising(values: Array) -> Array:
+    shared: list[tuple[float, int]] = []
+    for value in values:
+        mean, count = float(value), 1
+        while shared and shared[-1][0] > mean:
+            other_mean, other_count = shared.pop()
+            mean, count = (mean * count + other_mean * other_count) / (count + other_count), count + other_count
+        shared.append((mean, count))
+    return np.repeat([mean for mean, _ in shared], [count for _, count in shared])
 
 
 def label_lines(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
