@@ -169,9 +169,14 @@ class Scene:
         """Viewpoint of the second view."""
         return "from above" if self.is_flat else "from the left"
 
-    def is_decided(self, rotor: Rotor) -> bool:
-        """Return True for a rotor that was open."""
-        return rotor.name in self.rotors
+    @property
+    def rod_look(self) -> dict[str, Any]:
+        """Style of the rods."""
+        return DECIDED if self.rods else {"facecolor": METAL, "edgecolor": INK}
+
+    def piston_look(self, pose: Pose) -> dict[str, Any]:
+        """Return the style of a piston."""
+        return DECIDED if pose.part.name in self.pistons else PISTON
 
 
 def views(scene: Scene) -> Page:
@@ -216,8 +221,8 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
             bodies(axes, pose)
         else:
             places[_number_of(pose)] = cylinder(axes, pose, bore)
-            piston_at(axes, pose, bore, behind, **_piston_look(scene, pose))
-            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **_rod_look(scene))
+            piston_at(axes, pose, bore, behind, **scene.piston_look(pose))
+            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **scene.rod_look)
             slot(axes, pose, bore, behind)
         bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene, pose))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
@@ -267,10 +272,10 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
             axes.add_patch(Rectangle(corner, MM * body.width, max(levels) - min(levels), **look_of(body)))
             piston = 0.5 * (min(levels) + crank)
         if not pose.bodies:
-            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **_rod_look(scene))
+            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **scene.rod_look)
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
             walls, ends = (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high)
-            box(axes, walls, ends, 5.0, **_piston_look(scene, pose))
+            box(axes, walls, ends, 5.0, **scene.piston_look(pose))
         pistons.append((pose, piston))
     if not scene.is_star:
         _numbers(axes, pistons, quarter, bore)
@@ -346,7 +351,7 @@ def legend_of(scene: Scene) -> list[Line2D | Patch]:
     if not scene.cranks >= {part.shaft.name for part in scene.engine.slider_cranks}:
         entries.append(Patch(label="crank", **_PLAIN))
     # one entry per kind
-    kinds = {scene.is_decided(rotor): rotor for rotor in scene.weights}
+    kinds = {rotor.name in scene.rotors: rotor for rotor in scene.weights}
     entries += [
         Patch(label=f"weight, {scene.state}" if decided else "weight", **_weight_look(scene, rotor))
         for decided, rotor in sorted(kinds.items())
@@ -370,14 +375,6 @@ def _crank_look(scene: Scene, pose: Pose) -> dict[str, Any]:
     return DECIDED if pose.part.shaft.name in scene.cranks else _PLAIN
 
 
-def _piston_look(scene: Scene, pose: Pose) -> dict[str, Any]:
-    return DECIDED if pose.part.name in scene.pistons else PISTON
-
-
-def _rod_look(scene: Scene) -> dict[str, Any]:
-    return DECIDED if scene.rods else {"facecolor": METAL, "edgecolor": INK}
-
-
 def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:
     # edges separate overlapping weights
-    return {"facecolor": (AFTER if scene.is_decided(rotor) else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}
+    return {"facecolor": (AFTER if rotor.name in scene.rotors else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}

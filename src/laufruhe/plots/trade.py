@@ -52,7 +52,10 @@ def _drawn(trade: Trade) -> Figure:
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
     axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
     errors = _places(axes, np.array([row.error for row in rows]), times)
-    front = _front(rows)
+    front: list[TradeRow] = []
+    for row in sorted(rows, key=lambda row: (row.evaluation, row.error)):
+        if not front or row.error < front[-1].error:
+            front.append(row)
     joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= MIN_ERROR)
     axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
     decides = np.array([row.decides and not math.isnan(row.regret) for row in rows])
@@ -112,14 +115,6 @@ def _colour_bar(drawn: Page, dots: PathCollection) -> None:
     bar.ax.tick_params(labelsize=SMALL, which="major")
     bar.ax.minorticks_off()
     bar.ax.text(-0.02, 0.5, "regret of its optimum", transform=bar.ax.transAxes, ha="right", va="center", fontsize=9)
-
-
-def _front(rows: tuple[TradeRow, ...]) -> list[TradeRow]:
-    front: list[TradeRow] = []
-    for row in sorted(rows, key=lambda r: (r.evaluation, r.error)):
-        if not front or row.error < front[-1].error:
-            front.append(row)
-    return front
 
 
 def _name(axes: Axes, rows: tuple[TradeRow, ...], times: Array, errors: Array) -> None:

@@ -141,19 +141,17 @@ class Economics(Part):
         if not shafts_of(reference):
             raise scenes.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
         points = [Point(base, shafts=())]
-        points += [self._build(build, scenes) for build in self.builds]
+        for build in self.builds:
+            case = next((case for case in self.cases if case.name == build.case), base)
+            names = shafts_of(scenes.problem(Point(case)))
+            for shaft in build.shafts:
+                if shaft not in names:
+                    rule = f"has no shaft '{shaft}', which '{build.name}' builds"
+                    raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, names))
+            points.append(Point(case, shafts=tuple(build.shafts)))
         points += [_rebuilt(case, reference, scenes) for case in self.more_cylinders]
         _check_objectives(points, scenes)
         return points
-
-    def _build(self, build: BuildTable, scenes: Scenes) -> Point:
-        case = next((case for case in self.cases if case.name == build.case), self.cases[0])
-        names = shafts_of(scenes.problem(Point(case)))
-        for shaft in build.shafts:
-            if shaft not in names:
-                rule = f"has no shaft '{shaft}', which '{build.name}' builds"
-                raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, names))
-        return Point(case, shafts=tuple(build.shafts))
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the front of one engine."""
@@ -163,9 +161,9 @@ class Economics(Part):
             points = front(problem, self.mass_limits)
         except SolverError as error:
             raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
-        names = {"objective": problem.objective_name, "unit": problem.objective_unit or ""}
         return {
-            **names,
+            "objective": problem.objective_name,
+            "unit": problem.objective_unit or "",
             "shafts": len(shafts_of(problem)),
             "cylinders": len(problem.engine.cylinders),
             "points": points,

@@ -28,13 +28,15 @@ Names = Mapping[str, Any]
 def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
     """Return the picture of a table, evaluated in each reading of the source."""
     width = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
-    count = sum(1 if panel.once else len(readings) for panel in table.panels)
-    panels = [
-        row
-        for number, panel in enumerate(table.panels, 1)
-        for reading, names in list(readings.items())[: 1 if panel.once else None]
-        for row in _rows(_panel(panel, names, "" if panel.once else reading, number), width)
-    ]
+    count, panels = sum(1 if panel.once else len(readings) for panel in table.panels), list[Panel]()
+    for number, panel in enumerate(table.panels, 1):
+        for reading, names in list(readings.items())[: 1 if panel.once else None]:
+            try:
+                drawn = _panel(panel, names, "" if panel.once else reading)
+            except (TypeError, ValueError, LookupError) as error:
+                rule, _, remedy = str(error).partition("; ")
+                raise ExpressionError(f"panel {number} cannot be drawn: {rule}; {remedy or 'correct it'}") from None
+            panels += _rows(drawn, width)
     return Picture(
         table.title or data.attrs["title"],
         fill_in(table.words, next(iter(readings.values()))),
@@ -78,15 +80,7 @@ def _within(mark: Mark, row: range) -> Iterator[Mark]:
         yield replace(mark, places=np.asarray(mark.places)[indices], values=np.asarray(mark.values)[indices])
 
 
-def _panel(panel: PanelTable, names: Names, reading: str, number: int) -> Panel:
-    try:
-        return _drawn_panel(panel, names, reading)
-    except (TypeError, ValueError, LookupError) as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise ExpressionError(f"panel {number} cannot be drawn: {rule}; {remedy or 'correct it'}") from None
-
-
-def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
+def _panel(panel: PanelTable, names: Names, reading: str) -> Panel:
     marks: list[Mark] = []
     for area in panel.areas:
         x, (low, high) = ([number_of(end, names) for end in ends] for ends in (area.x, area.y))

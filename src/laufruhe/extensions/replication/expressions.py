@@ -62,13 +62,13 @@ def checks_in(
     elif isinstance(entry, str):
         key = next(key for key in reversed(at) if isinstance(key, str))
         checked = partial(check, known=known, cases=cases)
-        yield at, entry, checked if key in EXPRESSIONS else partial(_check_braces, check=checked)
 
+        def check_braces(text: str) -> None:
+            for _, field, _ in _parts(text):
+                if field:
+                    checked(field)
 
-def _check_braces(text: str, check: Callable[[str], None]) -> None:
-    for _, field, _ in _parts(text):
-        if field:
-            check(field)
+        yield at, entry, checked if key in EXPRESSIONS else check_braces
 
 
 def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str]) -> None:
@@ -199,13 +199,12 @@ def _filled(text: str, names: Mapping[str, Any]) -> Any:
     parts = list(_parts(text))
     if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
         return value_of(parts[0][1], names)
-    return "".join(plain + _format(field, spec, names) for plain, field, spec in parts)
-
-
-def _format(field: str, spec: str, names: Mapping[str, Any]) -> str:
-    if not field:
-        return ""
-    return format(number_of(field, names), spec) if spec else str(value_of(field, names))
+    filled = ""
+    for plain, field, spec in parts:
+        filled += plain
+        if field:
+            filled += format(number_of(field, names), spec) if spec else str(value_of(field, names))
+    return filled
 
 
 def _parts(text: str) -> Iterator[tuple[str, str, str]]:

@@ -21,29 +21,22 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
     """Return coordinates of a dataset along statements and readings (values of names): printed, ours, verdict, why."""
     if not statements:
         return {}
-    verdicts = [[_verdict(statement, names) for names in readings.values()] for statement in statements]
+    verdicts = []
+    for statement in statements:
+        values = [{**names, "value": number_of(statement.value, names)} for names in readings.values()]
+        whys = (fill_in(statement.why, names) for names in values)
+        verdicts.append([(n["value"], verdict(statement, n), why) for n, why in zip(values, whys, strict=True)])
+    texts = [one.text + (f" ({one.where})" if one.where else "") for one in statements]
     return {
         "by_reading": list(readings),
-        "statement": (
-            "statement",
-            [statement.text + (f" ({statement.where})" if statement.where else "") for statement in statements],
-        ),
-        "printed": (
-            "statement",
-            [UNSTATED if statement.printed is None else statement.printed for statement in statements],
-        ),
-        "unit": ("statement", [statement.unit for statement in statements]),
+        "statement": ("statement", texts),
+        "printed": ("statement", [UNSTATED if one.printed is None else one.printed for one in statements]),
+        "unit": ("statement", [one.unit for one in statements]),
         **{
             name: (("statement", "by_reading"), [[cell[k] for cell in row] for row in verdicts])
             for k, name in enumerate(("ours", "verdict", "why"))
         },
     }
-
-
-def _verdict(statement: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
-    value = number_of(statement.value, names)
-    names_and_value = {**names, "value": value}
-    return value, verdict(statement, names_and_value), fill_in(statement.why, names_and_value)
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:

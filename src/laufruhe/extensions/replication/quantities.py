@@ -116,20 +116,6 @@ def _turning(part: slice, result: Result, table: QuantityQuery) -> Labelled:
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
 
 
-def _bound(result: Result, _: QuantityQuery) -> Labelled:
-    return Labelled(result.certificate.lower_bound if result.certificate else math.nan, {})
-
-
-def _intervals(result: Result, _: QuantityQuery) -> Labelled:
-    values = [math.degrees(angle) for angle in result.final.engine.firing_intervals]
-    return Labelled(values, {"firing": list(range(1, len(values) + 1))})
-
-
-def _energy(result: Result, _: QuantityQuery) -> Labelled:
-    energy = mounting_in(result.final.engine).modes.energy
-    return Labelled(energy.tolist(), {"motion": list(MOTIONS), "mode": list(range(1, 7))})
-
-
 RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "mount forces": _signal,
     "mean force by mount": partial(_by_mount, "mean"),
@@ -138,9 +124,14 @@ RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "free couple": partial(_by_order, COUPLE),
     "turning force": partial(_turning, FORCE),
     "turning couple": partial(_turning, COUPLE),
-    "firing intervals": _intervals,
-    "energy shares": _energy,
-    "lower bound": _bound,
+    "firing intervals": lambda result, _: Labelled(
+        [math.degrees(angle) for angle in result.final.engine.firing_intervals],
+        {"firing": list(range(1, len(result.final.engine.firing_intervals) + 1))},
+    ),
+    "energy shares": lambda result, _: Labelled(
+        mounting_in(result.final.engine).modes.energy.tolist(), {"motion": list(MOTIONS), "mode": list(range(1, 7))}
+    ),
+    "lower bound": lambda result, _: Labelled(result.certificate.lower_bound if result.certificate else math.nan, {}),
     **{f"{c} over the cycle": partial(_over_cycle, Measure(c)) for c in CHANNELS.values() if c.is_load},
 }
 """Quantities in addition to the measures."""

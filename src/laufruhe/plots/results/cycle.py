@@ -61,12 +61,6 @@ class Row:
     ends: tuple[float, float]
     left_out: str = ""
 
-    @property
-    def words(self) -> str:
-        """Label of the axis."""
-        only = next(iter(self.curves)) if len(self.curves) == 1 else ""
-        return f"{only} {self.label.split()[-1]}" if only else self.label
-
 
 @styled()
 def figure(result: Result) -> Figure:
@@ -100,9 +94,10 @@ def figure(result: Result) -> Figure:
     lines = f"{what}{at}; above, the {firings} by cylinder.{none}"
     firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(item.entry() for item in series), firing]
-    return finish_page(
-        drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, points, mounts)
-    )
+    every_point, every_mount = len(result.problem.points), len(result.final.mount_names)
+    note = f"{len(points)} of {every_point} operating points. " if len(points) < every_point else ""
+    note += f"The {len(mounts)} most loaded of {every_mount} mounts. " if len(mounts) < every_mount else ""
+    return finish_page(drawn, result, "Forces and moments over one working cycle", lines, legend, note)
 
 
 def _draw_row(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours: Sequence[str]) -> None:
@@ -118,8 +113,9 @@ def _draw_row(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colour
             axes.set_ylim(top=axes.get_ylim()[1] + 0.3 * (axes.get_ylim()[1] - axes.get_ylim()[0]))
     for axes in panels:
         axes.set_ylim(top=max(other_axes.get_ylim()[1] for other_axes in panels))
-    first = panels[0]
-    first.set_ylabel(f"{fit_line(richest.words, HIGH + 0.1)}\n[{unit}]", va="center")
+    only = next(iter(richest.curves)) if len(richest.curves) == 1 else ""
+    words = f"{only} {richest.label.split()[-1]}" if only else richest.label
+    panels[0].set_ylabel(f"{fit_line(words, HIGH + 0.1)}\n[{unit}]", va="center")
 
 
 def _points(result: Result) -> list[int]:
@@ -137,12 +133,6 @@ def _mounts(result: Result) -> list[int]:
         return []
     size = np.abs(forces.coefficients).sum(axis=(0, 2))
     return sorted(np.argsort(-size, kind="stable")[:MAX_MOUNTS].tolist())
-
-
-def _left_out(result: Result, indices: Sequence[int], mounts: Sequence[int]) -> str:
-    points, names = len(result.problem.points), len(result.final.mount_names)
-    selection = f"{len(indices)} of {points} operating points. " if len(indices) < points else ""
-    return selection + (f"The {len(mounts)} most loaded of {names} mounts. " if len(mounts) < names else "")
 
 
 def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[Row]:

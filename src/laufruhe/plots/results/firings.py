@@ -14,7 +14,7 @@ from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, finish_page, page,
 from laufruhe.plots.words import SMALL, ink_on, width_of
 from laufruhe.present.measures import has_firing, has_ranking, ranking_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.stars.ranking import PhasingResult, RankedOrder
+from laufruhe.solvers.stars.ranking import RankedOrder
 
 MAX_ORDERS = 6
 # two shades distinguish neighbouring firings
@@ -25,7 +25,10 @@ applies = has_ranking
 @styled()
 def figure(result: Result) -> Figure:
     """Draw firing orders as bars over one working cycle, a segment between two firings."""
-    orders = _selected(ranking_of(result))
+    ranking = ranking_of(result).ranking
+    orders = [(0, order) for order in ranking[0].firing_orders][: MAX_ORDERS // 2 + 1]
+    orders += [(k, star.firing_orders[0]) for k, star in enumerate(ranking) if k and star.firing_orders]
+    orders = orders[:MAX_ORDERS]
     count = len(orders[0][1].order)
     cycle = math.degrees(sum(orders[0][1].intervals))
     uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in orders)
@@ -44,15 +47,6 @@ def figure(result: Result) -> Figure:
     title, who = fires if has_firing(result) else dead_centres
     lines = f"{who}, and the crank angle to the next{intervals}"
     return finish_page(drawn, result, title, lines, legend[: 1 + any(k for k, _ in orders)])
-
-
-def _selected(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
-    best = [(0, order) for order in phasing.ranking[0].firing_orders][: MAX_ORDERS // 2 + 1]
-    next_best = [
-        (k, order) for k, star in enumerate(phasing.ranking) for order in star.firing_orders
-        if k and order == star.firing_orders[0]
-    ]  # fmt: skip
-    return (best + next_best)[:MAX_ORDERS]
 
 
 def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[str, str]) -> None:

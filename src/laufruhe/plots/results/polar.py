@@ -85,9 +85,22 @@ def figure(result: Result) -> Figure:
         _frame(axes, frame, factor, cycle.turns)
         _name(axes, mount, result.final.engine.mounts[m])
     _label(drawn, columns, frame, unit)
-    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_explanation(frame)}{steady}"
-    title = "Mount forces over one working cycle"
-    return finish_page(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
+    legend: list[Artist] = [
+        item.entry(linewidth=width) for item, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)
+    ]
+    why = ""
+    if frame.along is None:
+        legend.append(entry_of_dots("every 90° of the crank", color=INK, markersize=3.6))
+        legend.append(entry_of_dots(f"{first.name} fires", color=INK, markersize=7, markerfacecolor="none"))
+    else:
+        other = NAMES[LATERAL if frame.along == VERTICAL else VERTICAL]
+        at_most = f"no more than {words(frame.others, 'N', 2)}" if frame.others > 1e-9 * frame.size else "zero"
+        why = f" The {other} force is {at_most}, so the {NAMES[frame.along]} one is shown over the crank angle."
+    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{why}{steady}"
+    forward, count = max(float(np.abs(path[..., 0]).max(initial=0.0)) for path in paths), paths[0].shape[1]
+    note = "Longitudinal forces are not shown. " if forward > 0.01 * frame.size else ""
+    note += f"The first {MAX_PANELS} of {count} mounts. " if count > MAX_PANELS else ""
+    return finish_page(drawn, result, "Mount forces over one working cycle", lines, legend, note)
 
 
 def _closed(samples: Array) -> Array:
@@ -148,27 +161,3 @@ def _label(drawn: Page, columns: int, frame: Frame, unit: str) -> None:
         axes.tick_params(labelbottom=not below, labelleft=k % columns == 0, length=2)
         axes.set(xlabel="" if below else across.replace(", ", ",\n"))
         axes.set(ylabel="" if k % columns else up.replace(", ", ",\n"))
-
-
-def _explanation(frame: Frame) -> str:
-    if frame.along is None:
-        return ""
-    other = NAMES[LATERAL if frame.along == VERTICAL else VERTICAL]
-    at_most = f"no more than {words(frame.others, 'N', 2)}" if frame.others > 1e-9 * frame.size else "zero"
-    return f" The {other} force is {at_most}, so the {NAMES[frame.along]} one is shown over the crank angle."
-
-
-def _left_out(paths: list[Array], frame: Frame) -> str:
-    along = max(float(np.abs(path[..., 0]).max(initial=0.0)) for path in paths)
-    count = paths[0].shape[1]
-    forces = "Longitudinal forces are not shown. " if along > 0.01 * frame.size else ""
-    return forces + (f"The first {MAX_PANELS} of {count} mounts. " if count > MAX_PANELS else "")
-
-
-def _legend(series: list[Series], frame: Frame, first: str) -> list[Artist]:
-    lines = [item.entry(linewidth=width) for item, width in zip(series, (2.4, 1.5)[-len(series) :], strict=True)]
-    if frame.along is not None:
-        return lines
-    dot = entry_of_dots("every 90° of the crank", color=INK, markersize=3.6)
-    ring = entry_of_dots(f"{first} fires", color=INK, markersize=7, markerfacecolor="none")
-    return [*lines, dot, ring]
