@@ -177,9 +177,9 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     from tempfile import TemporaryDirectory
 
     from laufruhe.files.reader import tables_and_path
-    from laufruhe.studies.finished_points import FINISHED_POINTS
     from laufruhe.studies.reader import load_study
     from laufruhe.studies.runner import run
+    from laufruhe.studies.stores import FINISHED_POINTS
 
     check_integer("jobs", jobs, 1)
     _, path = tables_and_path(source)

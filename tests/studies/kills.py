@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import laufruhe
-from laufruhe.studies.finished_points import FINISHED_POINTS
+from laufruhe.studies.stores import FINISHED_POINTS
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
 STUDY = """

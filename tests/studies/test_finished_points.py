@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from laufruhe.studies.finished_points import FINISHED_POINTS, FinishedPoints
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
+from laufruhe.studies.stores import FINISHED_POINTS, FinishedPoints
 from problem_files import PROBLEMS
 
 MARKS = [f"{k:032x}" for k in range(5)]

@@ -24,10 +24,10 @@ from laufruhe.numerics.workers import working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
 from laufruhe.studies import scenes
-from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.regions import Regions
 from laufruhe.studies.runner import run
+from laufruhe.studies.stores import FINISHED_POINTS
 from problem_files import PROBLEMS, changed, written
 
 pytestmark = of_clusters("zarr")

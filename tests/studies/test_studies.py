@@ -29,7 +29,6 @@ from laufruhe.problem.measure import MEASURES, Limit, Measure
 from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
 from laufruhe.studies import kinds, runner
-from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.layout_comparison import LayoutComparison
@@ -37,6 +36,7 @@ from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.stores import FINISHED_POINTS
 from laufruhe.studies.swept import solve_scene
 from problem_files import PROBLEMS
 
@@ -351,7 +351,7 @@ def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 HALTS = """
 import time
 import laufruhe.cli.supervised
-from laufruhe.studies.finished_points import FinishedPoints
+from laufruhe.studies.stores import FinishedPoints
 laufruhe.cli.supervised.PATIENCE = 300
 keep, kept = FinishedPoints.keep, []
 def keep_three(*words):

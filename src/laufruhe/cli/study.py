@@ -14,10 +14,10 @@ from laufruhe.present.picture import Picture
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
-from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.stores import FINISHED_POINTS
 
 
 def run_study(

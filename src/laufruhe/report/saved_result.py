@@ -109,7 +109,17 @@ def read_result(path: str | Path) -> SavedResult:
         raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json")
     place = Path(path)
     place = place / RESULT if place.is_dir() else place
-    record = _content(place)
+    try:
+        record = json.loads(place.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise refused("file", "", "does not exist", "check the path", place) from None
+    except OSError as error:
+        raise refused("file", "", f"cannot be read ({error.strerror})", "check its permissions", place) from None
+    except (ValueError, RecursionError):
+        raise refused("file", "", "is no JSON", "name a result.json of laufruhe solve or evaluate", place) from None
+    if not isinstance(record, dict) or not {"problem", "status"} <= record.keys():
+        rule = "is no result of laufruhe solve or evaluate"
+        raise refused("file", "", rule, "give a result.json of one of these commands, or its folder", place)
     try:
         file = _File.model_validate(record)
     except ValidationError as error:
@@ -128,18 +138,3 @@ def read_result(path: str | Path) -> SavedResult:
         conflict=tuple(file.conflict),
         record=record,
     )
-
-
-def _content(path: Path) -> dict[str, Any]:
-    try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise refused("file", "", "does not exist", "check the path", path) from None
-    except OSError as error:
-        raise refused("file", "", f"cannot be read ({error.strerror})", "check its permissions", path) from None
-    except (ValueError, RecursionError):
-        raise refused("file", "", "is no JSON", "name a result.json of laufruhe solve or evaluate", path) from None
-    if not isinstance(record, dict) or not {"problem", "status"} <= record.keys():
-        rule = "is no result of laufruhe solve or evaluate"
-        raise refused("file", "", rule, "give a result.json of one of these commands, or its folder", path)
-    return record

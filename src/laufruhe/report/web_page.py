@@ -23,8 +23,16 @@ HEADING = "Move the decisions"
 
 def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
     """Return a report as HTML with its pictures, SVG by name, and sliders where there is a live model."""
-    inline = {name: data_address(svg) for name, svg in pictures.items()}
-    return f"{template().render(document=document, pictures=inline, live=_live(live))}\n"
+    inline, sliders = {name: data_address(svg) for name, svg in pictures.items()}, None
+    if live is not None and (live.sliders or live.unmoved):
+        if why := live.why_not or live.too_large:
+            content: dict[str, Any] = {"sentences": (why, *live.notes)}
+        else:
+            # of our own making, and JSON without an opening bracket
+            texts = {"model": live.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
+            content = {name: Markup(text) for name, text in texts.items()}
+        sliders = {"heading": HEADING, **content}
+    return f"{template().render(document=document, pictures=inline, live=sliders)}\n"
 
 
 @cache
@@ -35,17 +43,6 @@ def template() -> Template:
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["marked"] = _marked
     return environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
-
-
-def _live(model: LiveModel | None) -> dict[str, Any] | None:
-    if model is None or not (model.sliders or model.unmoved):
-        return None
-    why = model.why_not or model.too_large
-    if why:
-        return {"heading": HEADING, "sentences": (why, *model.notes)}
-    # of our own making, and JSON without an opening bracket
-    texts = {"model": model.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
-    return {"heading": HEADING, **{name: Markup(text) for name, text in texts.items()}}
 
 
 def data_address(svg: str) -> str:

@@ -172,7 +172,13 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
         single_bar = [(k + 0.0, best[k], "before" if plain[k] else "after")]
         pair = [(k - 0.2, initial[k], "before"), (k + 0.2, best[k], "after")]
         width = 0.5 if single.all() else 0.36
-        marks += [(bar[0], _bar(*bar, width, maximum)) for bar in (single_bar if single[k] else pair)]
+        for place, value, colour in single_bar if single[k] else pair:
+            if np.isfinite(value):
+                numbers = [figures(without_rounding(value, maximum))]
+                marks.append((place, p.Bars([place], [value], width, colour, numbers=numbers)))
+            else:
+                words_of_none = p.Words(place, 0.02 * maximum, "no design", across="center", along="bottom")
+                marks.append((place, words_of_none))
     labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
     widest = max(len(line) for label in labels for line in str(label).split("\n"))
     width_of_group = max(1.15, 0.2 + LETTER * widest)
@@ -194,9 +200,3 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     size = (max(p.WIDE, side * width_of_group), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
     gap = 0.42 + 0.16 * lines
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=size, gap=gap, legend=legend)
-
-
-def _bar(place: float, value: float, colour: str, width: float, maximum: float) -> p.Mark:
-    if not np.isfinite(value):
-        return p.Words(place, 0.02 * maximum, "no design", across="center", along="bottom")
-    return p.Bars([place], [value], width, colour, numbers=[figures(without_rounding(value, maximum))])

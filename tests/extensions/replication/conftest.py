@@ -13,9 +13,9 @@ import xarray as xr
 
 from laufruhe.extensions.replication.expressions import value_of
 from laufruhe.extensions.replication.part import Replication
-from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import StudyFile, load_study
 from laufruhe.studies.runner import run
+from laufruhe.studies.stores import FINISHED_POINTS
 from problem_files import PROBLEMS
 from shared import once
 

@@ -170,7 +170,21 @@ class FreeForces(Part):
         """Draw bars of the free loads and of the part that crank weights cannot take, printed values as dots."""
         count = data.sizes["case"]
         columns = [(what, order) for order in data["order"].values for what in WHAT]
-        panels = [_column(data, what, order, first=k == 0) for k, (what, order) in enumerate(columns)]
+        panels = []
+        for k, (what, order) in enumerate(columns):
+            names = (what, f"{what}_against", f"{what}_printed")
+            free, against, printed = (data.sel(order=order)[name].values for name in names)
+            rows, maximum = range(count), float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
+            marks: list[p.Mark] = [
+                p.Bars(rows, free, 0.62, upright=False),
+                p.Bars(rows, against, 0.26, "pale", upright=False),
+                p.Line(printed, rows, width=0.0, marker="o", size=3.5),
+            ]
+            for row, value in zip(rows, free, strict=True):
+                marks.append(p.Words(value + 0.04 * maximum, row, f"{value:.4g}" if value > 1e-9 else "0"))
+            ticks = [(float(row), str(name)) for row, name in enumerate(data["case"].values)] if k == 0 else []
+            side = p.Axis(ends=(count - 0.4, -0.6), ticks=ticks, grid=False)
+            panels.append(p.Panel(marks, p.Axis(ends=(0.0, 1.3 * maximum)), side, f"{what}, order {order}"))
         legend: list[p.Mark] = [
             p.Bars(label="free"),
             p.Bars(colour="pale", label="part against the crank"),
@@ -179,20 +193,3 @@ class FreeForces(Part):
         words = "Free loads of the pistons. Unit: force of one cylinder, for couples times the spacing."
         size = (1.75, 0.2 * count + 0.2)
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
-
-
-def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:
-    selected = data.sel(order=order)
-    free, against, printed = (selected[name].values for name in (what, f"{what}_against", f"{what}_printed"))
-    rows = range(len(free))
-    maximum = float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
-    marks: list[p.Mark] = [
-        p.Bars(rows, free, 0.62, upright=False),
-        p.Bars(rows, against, 0.26, "pale", upright=False),
-        p.Line(printed, rows, width=0.0, marker="o", size=3.5),
-    ]
-    for row, value in zip(rows, free, strict=True):
-        marks.append(p.Words(value + 0.04 * maximum, row, f"{value:.4g}" if value > 1e-9 else "0"))
-    ticks = [(float(k), str(name)) for k, name in enumerate(data["case"].values)] if first else []
-    side = p.Axis(ends=(rows[-1] + 0.6, -0.6), ticks=ticks, grid=False)
-    return p.Panel(marks, p.Axis(ends=(0.0, 1.3 * maximum)), side, f"{what}, order {order}")

@@ -175,10 +175,18 @@ class SpeedMapStudy(Part):
             for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
                 values = curves.sel(measure=name)
                 proof, label = str(curves["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
-                cells = _row_of(*(values[what].values for what in ("speed", "value", "limit")))
-                # a case lists only its own measures
-                if cells is not None or proof in ("infeasible", FAILED):
-                    rows.append([case, design, label, *(cells or [DASH] * 5), proof])
+                speeds, sizes, limits = (values[what].values for what in ("speed", "value", "limit"))
+                cells, finite = [DASH] * 5, limits[np.isfinite(limits)]
+                if not np.isnan(sizes).all():
+                    maximum = int(np.nanargmax(sizes))
+                    cells[:3] = [number(np.nanmin(sizes)), number(sizes[maximum]), f"{speeds[maximum]:.4g}"]
+                    over = speeds[sizes > limits * (1.0 + 1e-6)]
+                    where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
+                    cells[3:] = [number(finite[0]), where] if len(finite) else [DASH, DASH]
+                elif proof not in ("infeasible", FAILED):
+                    # a case lists only its own measures
+                    continue
+                rows.append([case, design, label, *cells, proof])
         return [marked_table([*head, "proof"], rows)]
 
     @staticmethod
@@ -200,16 +208,6 @@ class SpeedMapStudy(Part):
         legend += [p.Line(dash=p.DASHES[1], width=1.2, label="limit")] if data["limit"].notnull().any() else []
         size = (p.WIDE, p.HIGH if len(panels) == 1 else 2.2)
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, gap=0.8, legend=legend)
-
-
-def _row_of(speeds: Array, values: Array, limits: Array) -> list[str] | None:
-    if np.isnan(values).all():
-        return None
-    maximum, finite = int(np.nanargmax(values)), limits[np.isfinite(limits)]
-    cells = [number(np.nanmin(values)), number(values[maximum]), f"{speeds[maximum]:.4g}"]
-    over = speeds[values > limits * (1.0 + 1e-6)]
-    where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
-    return [*cells, number(finite[0]), where] if len(finite) else [*cells, DASH, DASH]
 
 
 def _speed_curves(
