@@ -37,12 +37,6 @@ def slot(axes: Axes, pose: Pose, bore: float, order: float) -> None:
     bar(axes, *ends, order, facecolor=METAL, edgecolor=INK)
 
 
-def heights_of(radius: float, along: float) -> tuple[float, float]:
-    """Return the lowest and highest point of a half disc about its centre [m]."""
-    up, across = math.cos(along), radius * abs(math.sin(along))
-    return (-radius if up < 0.0 else -across), (radius if up > 0.0 else across)
-
-
 def at(place: complex) -> tuple[float, float]:
     """Return the coordinates of a point in the view from the front [mm]."""
     return MM * place.imag, MM * place.real
@@ -70,12 +64,6 @@ def look_of(body: Outline) -> dict[str, Any]:
     if body.moves:
         return {**PISTON, "zorder": 2.2}
     return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
-
-
-def bodies(axes: Axes, pose: Pose) -> None:
-    """Draw rotating bodies that stand in place of a piston, from the front."""
-    for body in pose.bodies:
-        axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
 
 
 def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
@@ -217,9 +205,9 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
     bore, places = bore_of(scene.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
-        if pose.bodies:
-            bodies(axes, pose)
-        else:
+        for body in pose.bodies:
+            axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
+        if not pose.bodies:
             places[_number_of(pose)] = cylinder(axes, pose, bore)
             piston_at(axes, pose, bore, behind, **scene.piston_look(pose))
             bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **scene.rod_look)
@@ -280,7 +268,10 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
     if not scene.is_star:
         _numbers(axes, pistons, quarter, bore)
     for rotor in scene.weights:
-        low, high = heights_of(half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter)
+        radius, along = half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter
+        # lowest and highest point of the half disc about its centre
+        up, across = math.cos(along), radius * abs(math.sin(along))
+        low, high = -radius if up < 0.0 else -across, radius if up > 0.0 else across
         middle = level(complex(rotor.shaft.z, rotor.shaft.y))
         ends = (rotor.x - 0.5 * THICKNESS, rotor.x + 0.5 * THICKNESS)
         box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(scene, rotor))
