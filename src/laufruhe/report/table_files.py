@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
-from functools import partial
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -47,9 +46,16 @@ def write_book(tables: Mapping[str, Table], path: Path) -> None:
         book = Workbook(path, {**_OPTIONS, "tmpdir": rows})
         book.set_properties({"created": _CREATED})
         plain = book.add_format()
+
+        def write_text(page: Any, row: int, column: int, text: str, _: Any) -> int | None:
+            # a text that looks like marks of formatting is a text
+            if not (text.startswith("<r>") and text.endswith("</r>")):
+                return None
+            return int(page.write_rich_string(row, column, text[:2], plain, text[2:]))
+
         for name, table in zip(_page_names(tables), tables.values(), strict=True):
             page = book.add_worksheet(name)
-            page.add_write_handler(str, partial(_write_text, plain=plain))
+            page.add_write_handler(str, write_text)
             page.freeze_panes(1, 0)
             for k, row in enumerate(chain([table.head], table.rows)):
                 # most cells are numbers
@@ -61,12 +67,6 @@ def write_book(tables: Mapping[str, Table], path: Path) -> None:
         except FileCreateError as error:
             # a full disk is reported as for any other file
             raise error.args[0] from None
-
-
-def _write_text(page: Any, row: int, column: int, text: str, _: Any, plain: Any) -> int | None:
-    if not (text.startswith("<r>") and text.endswith("</r>")):
-        return None
-    return int(page.write_rich_string(row, column, text[:2], plain, text[2:]))
 
 
 def _page_names(names: Iterable[str]) -> list[str]:

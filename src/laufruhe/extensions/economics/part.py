@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -257,24 +257,19 @@ def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
 
 def check_comparable(problem: Problem, reference: Problem) -> None:
     """Raise `ModelError` if engines differ in more than the number of cylinders (eqs. 14-17)."""
-    first, second = _power_of(problem), _power_of(reference)
-    differ = [what for what in first if first[what] != second[what]]
+    compared: dict[str, Callable[[Problem], object]] = {
+        "cycle": lambda one: one.engine.cycle,
+        "bore": lambda one: {part.bore for part in one.engine.slider_cranks},
+        "stroke": lambda one: {part.crank_radius for part in one.engine.slider_cranks},
+        "speed": lambda one: [point.speed for point in one.points],
+        "gas": lambda one: [point.gas for point in one.points],
+    }
+    differ = [what for what, value_of in compared.items() if value_of(problem) != value_of(reference)]
     if differ:
         raise ModelError(
             f"'{problem.name}' and '{reference.name}' differ in {' and '.join(differ)}, so their numbers of cylinders "
             "do not tell their power; give both the same"
         )
-
-
-def _power_of(problem: Problem) -> dict[str, object]:
-    parts = problem.engine.slider_cranks
-    return {
-        "cycle": problem.engine.cycle,
-        "bore": {part.bore for part in parts},
-        "stroke": {part.crank_radius for part in parts},
-        "speed": [point.speed for point in problem.points],
-        "gas": [point.gas for point in problem.points],
-    }
 
 
 def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
@@ -304,11 +299,7 @@ def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str,
         for k in range(force.shape[1]):
             beaten = min(rivals[:, :k].min(initial=np.inf), fewer[:, k].min(initial=np.inf))
             on_front[b, k] = force[b, k] <= rivals[:, k].min() and force[b, k] < (1.0 - SAME) * beaten
-    return (
-        ("build", "mass_limit"),
-        on_front,
-        {"long_name": "true if no other design is better in every respect"},
-    )
+    return ("build", "mass_limit"), on_front, {"long_name": "true if no other design is better in every respect"}
 
 
 def _with_shafts(data: xr.Dataset) -> list[str]:

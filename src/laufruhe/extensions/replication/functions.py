@@ -55,9 +55,7 @@ def orders(values: xr.DataArray) -> Any:
     turns = (angle[1] - angle[0]) * len(angle) / 360.0
     at_orders = {"order": np.arange(amplitudes.shape[values.dims.index("angle")]) / turns}
     dims = ["order" if dim == "angle" else dim for dim in values.dims]
-    return xr.DataArray(
-        amplitudes, dims=dims, coords={**at_orders, **{d: values[d] for d in dims if d in values.coords}}
-    )
+    return xr.DataArray(amplitudes, {**at_orders, **{d: values[d] for d in dims if d in values.coords}}, dims)
 
 
 def couple_star(throws: Sequence[float], order: float = 1.0) -> complex:

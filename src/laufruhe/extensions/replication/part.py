@@ -105,24 +105,21 @@ class Replication(Part):
 
     def points(self, scenes: Scenes) -> list[Point]:
         """Return every case at every combination of swept numbers, reading by reading."""
-        pairs = itertools.product(self._all_readings().values(), self.cases)
-        return [point for reading, case in pairs for point in self._points(case, reading, scenes)]
+        points = []
+        for reading, case in itertools.product(self._all_readings().values(), self.cases):
+            grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
+            with self._blamed(case.name):
+                tables = self._tables(case.problem, scenes)
+                fill = filler(tables)
+                for values in itertools.product(*grids.values()):
+                    swept = dict(zip(grids, values, strict=True))
+                    names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
+                    changed = case.model_copy(update={"set": fill_in(case.set, names), "numbers": swept})
+                    points.append(Point(changed, base=tables if fill is None else fill(names)))
+        return points
 
     def _all_readings(self) -> Mapping[str, Mapping[str, Any]]:
         return self.readings or {"": {}}
-
-    def _points(self, case: ReplicaCase, reading: Mapping[str, Any], scenes: Scenes) -> Iterator[Point]:
-        grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
-        with self._blamed(case.name):
-            tables = self._tables(case.problem, scenes)
-        fill = filler(tables)
-        for values in itertools.product(*grids.values()):
-            swept = dict(zip(grids, values, strict=True))
-            with self._blamed(case.name):
-                names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
-                filled_tables = tables if fill is None else fill(names)
-                changed = case.model_copy(update={"set": fill_in(case.set, names), "numbers": swept})
-            yield Point(changed, base=filled_tables)
 
     def _tables(self, name: Any, scenes: Scenes, *parents: Any) -> dict[str, Any]:
         if name in parents or not isinstance(name, str):
