@@ -93,7 +93,7 @@ def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) ->
         axes.plot(*ends, color=FAINT, linewidth=0.6, zorder=order - 0.005)
 
 
-# both views side by side, of one page, and between them [inch]
+# width and height of both views, gap between them, least width of a view [inch]
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
 _OF_RODS = {"rod", "piston_pin", "bolts"}
 ROOM = 1.1

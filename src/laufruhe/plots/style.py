@@ -58,7 +58,7 @@ _SETTINGS: Any = {
     "axes.spines.right": False, "axes.axisbelow": True, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.7, "text.color": INK, "xtick.color": FAINT, "ytick.color": FAINT, "path.simplify": True,
     "text.parse_math": False, "legend.fontsize": SMALL, "svg.hashsalt": "laufruhe",
-    # letters as they are drawn, which is as wide as they are measured; headings of panels make way for nothing
+    # letters without hinting are drawn as wide as they are measured; headings of panels stay in place
     "text.hinting": "no_hinting", "axes.titley": 1.0,
 }  # fmt: skip
 
@@ -233,7 +233,7 @@ def as_png(figure: Figure) -> bytes:
     with styled():
         canvas.draw()
     drawn = io.BytesIO()
-    # no transparency
+    # a picture without transparency
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.save(drawn, format="png", compress_level=3, dpi=(DPI, DPI))
     return drawn.getvalue()

@@ -119,7 +119,7 @@ def _colour_bar(drawn: Page, dots: PathCollection) -> None:
 
 def _name(axes: Axes, rows: tuple[TradeRow, ...], times: Array, errors: Array) -> None:
     (left, right), (low, high) = (np.log10(side) for side in (axes.get_xlim(), axes.get_ylim()))
-    # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
+    # of dots at one height, the nearest to the names gets the lowest name, so that no line crosses another name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
     across = (np.log10(times) - left) / (right - left)
     for row, x, y, height in zip(rows, across, heights, spread(heights, NAME_HEIGHT), strict=True):

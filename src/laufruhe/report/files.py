@@ -259,7 +259,7 @@ def _clear(abandoned: Path, place: Path) -> None:
                 entry.unlink()
             elif not (place / entry.name).exists():
                 entry.rename(place / entry.name)
-        # last: it identifies the other files
+        # this file goes last, because it identifies the others
         (abandoned / MADE).unlink(missing_ok=True)
         abandoned.rmdir()
 
@@ -278,7 +278,7 @@ def _swap(stage: Path, folder: Path) -> None:
         ):
             if hasattr(libc, call) and getattr(libc, call)(*words) == 0:
                 return
-    # a file system that cannot swap: what is left after a kill in between, the next run puts in its place
+    # on a file system that cannot swap, the next run repairs what a kill between the renames leaves
     aside = stage.with_name(f"{stage.name}-before")
     folder.rename(aside)
     stage.rename(folder)

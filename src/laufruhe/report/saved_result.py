@@ -129,7 +129,7 @@ def read_result(path: str | Path) -> SavedResult:
         problem=file.problem,
         title=file.title,
         status=file.status,
-        # without a design there is no value of one
+        # a result without a design has no value
         objective=file.objective if has_design else None,
         certificate=file.certificate if file.certificate.method else None,
         decisions=tuple(file.decisions.values()),

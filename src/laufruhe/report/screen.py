@@ -89,7 +89,7 @@ def _print_grid(console: Console, grid: Table) -> None:
 
 
 def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
-    # tables that fit the screen; each begins with the leading text columns
+    # columns of tables that fit the screen; each table begins with the leading text columns
     minimum = [minimum for minimum, _ in _widths(grid)]
     lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
     columns = list(range(lead))

@@ -51,7 +51,7 @@ def write_study(
     for part in study.study.parts:
         say(f"writing {part.name}")
         name, data = part.name, datasets[part.name]
-        # a name with a space cannot be marked as a coordinate there
+        # netCDF cannot mark a name with a space as a coordinate
         spaced = {str(coord): str(coord).replace(" ", "_") for coord in data.coords if " " in str(coord)}
         data.rename(spaced).to_netcdf(folder / f"{name}.nc")
         if "csv" in part.ends:
@@ -118,7 +118,7 @@ def _flat(data: xr.Dataset) -> Any:
         for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
             # a reason has no unit
             columns[_headed(f"{name}: {of}", unit if values.dtype.kind in "fiu" else "")] = values.values[:, k]
-    # all at once: frames of many columns grow slowly
+    # columns are added all at once, because pandas is slow at adding many one by one
     return rows.join(type(rows)(columns, index=rows.index))
 
 

@@ -58,7 +58,7 @@ def write_book(tables: Mapping[str, Table], path: Path) -> None:
             page.add_write_handler(str, write_text)
             page.freeze_panes(1, 0)
             for k, row in enumerate(chain([table.head], table.rows)):
-                # most cells are numbers
+                # most cells are numbers, and need no conversion
                 page.write_row(
                     k, 0, [cell if type(cell) is float and math.isfinite(cell) else _book_cell(cell) for cell in row]
                 )

@@ -121,7 +121,7 @@ def _rankings(result: Result) -> Table:
     head = ["rank", f"objective [{unit or '-'}]", f"lower bound [{unit or '-'}]", "proven", "throws [deg]", "shafts",
             "firing order", "intervals [deg]", "neighbours", "roll content"]  # fmt: skip
     for order in ranking_of(result).ranking[0].orders:
-        # relative to the force of one throw, and that times the spacing
+        # forces are relative to the force of one throw, couples to that times the spacing
         head += [f"free force of order {order} [-]", f"free couple of order {order} [-]"]
     return Table(head, rows)
 
@@ -154,7 +154,7 @@ def _torque(result: Result) -> Table:
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
-    # no speed for a crank that would stop
+    # a crank that would stop has no speed
     parts = torque_parts(engine, point, fidelity)
     work = parts["all"].integral.values(angles)
     columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}

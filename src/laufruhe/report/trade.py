@@ -241,5 +241,5 @@ def _regret(row: TradeRow | None) -> str:
         return f"{_percent(row.violation)} beyond a limit"
     if row is None or math.isnan(row.regret):
         return DASH
-    # accuracy of the cone solver
+    # the cone solver is no more accurate
     return "0" if abs(row.regret) < 1e-8 else f"{row.regret:.1e}"

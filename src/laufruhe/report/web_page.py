@@ -28,7 +28,7 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
         if why := live.why_not or live.too_large:
             content: dict[str, Any] = {"sentences": (why, *live.notes)}
         else:
-            # of our own making, and JSON without an opening bracket
+            # these texts are safe: the package makes them, and the JSON has no opening bracket
             texts = {"model": live.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
             content = {name: Markup(text) for name, text in texts.items()}
         sliders = {"heading": HEADING, **content}

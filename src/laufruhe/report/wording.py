@@ -14,7 +14,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import RankedStar
 from laufruhe.solvers.values import AttainableLimit
 
-# relative change that is printed as zero
+# largest relative change that is printed as zero
 NO_CHANGE = 5e-4
 NO_BOUND = "no useful bound was found in the time given"
 NEGLIGIBLE = 1e-9

@@ -54,7 +54,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         return replace(layout, positions=places, throw_positions=throws)
 
     if phasing is not None:
-        # stars are realised in the new size
+        # engines of crank stars are built in the new size
         realise, layout = phasing.realise, phasing.layout
         phasing = replace(
             phasing,

@@ -140,7 +140,7 @@ def dataset(
         {name: unit for record in records for name, unit in record[key].items()} for key in ("units", "limit_units")
     )
     metrics = {record["metric"]: record["unit"] for record in records if record["metric"]}
-    # several metrics share a unit, or were refused
+    # metrics of different units were refused before
     metric, unit = next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
     by_order = {"order_force_given": "initial", "order_force": "final"}
     names = {order for record in records for name in by_order for order, size in record[name].items() if size}

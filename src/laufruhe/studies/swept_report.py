@@ -100,7 +100,7 @@ def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
     place, numbers = spread(data, names[-1]), data[names[-1]].dtype.kind in "fi"
     marks: list[p.Mark] = []
     for label, chosen, colour in groups(data, names[:-1]):
-        # labels are not joined, and many dots would hide their line
+        # points of labels are not joined by a line; many dots would hide theirs
         dots = not numbers or chosen.sum() <= MAX_DOTS
         size, width = (2.5, 1.5) if numbers else (6.0, 0.0)
         y = data["objective"].values[chosen]

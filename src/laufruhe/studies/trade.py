@@ -207,7 +207,7 @@ class _Decided:
 
     def by(self, variant: Problem) -> Engine | None:
         """Return the design that a fidelity decides; None if it finds none within the limits."""
-        # choices about modes of open mounts would change with them, and time decides nothing
+        # a tolerance would choose modes anew for every design of open mounts
         variant = variant.at(replace(variant.fidelity, tolerance=None))
         with working_on(SERIAL), suppress(SolverError, ModelError):
             if is_convex(variant):
@@ -247,7 +247,7 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeR
     return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
-        # the bound is relative to the computed value, the table to the reference
+        # the bound is relative to the computed value; the table states it relative to the reference
         estimate=scale.error_of(evaluation) * value / truth if truth > 0.0 else 0.0,
         evaluation=fresh if math.isnan(prepared) else prepared,
         gradient=gradient,

@@ -89,7 +89,7 @@ def transmissibility(ratio: Any, loss_factor: Any) -> Any:
     """Return foundation over exciting force of one mass on one spring (E11), also for labelled arrays."""
     import xarray as xr
 
-    # infinite at the critical speed without damping
+    # without damping the ratio is infinite at the critical speed
     with np.errstate(divide="ignore"):
         return xr.apply_ufunc(single_transmissibility, ratio, loss_factor)
 

@@ -58,7 +58,7 @@ class Replication(Part):
 
     @model_validator(mode="after")
     def _validate_names(self) -> Replication:
-        # checks names, cases, functions and quantities before anything is computed
+        # check names, cases, functions and quantities before anything is computed
         wrong = list[InitErrorDetails]()
         for place, entry, check_it in self._checks():
             try:
@@ -219,7 +219,7 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
         }
         labels_of = {str(dim): selected[dim].values for dim in selected[name].dims[1:]}
         padded = np.full([len(labels) for labels in (*coords.values(), *labels_of.values())], np.nan)
-        # by label: cases may nest their sweeps in any order
+        # values are placed by label, because cases may nest their sweeps in any order
         places = [
             [labels.tolist().index(label) for label in selected[c].values.tolist()] for c, labels in coords.items()
         ]

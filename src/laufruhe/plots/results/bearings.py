@@ -60,7 +60,7 @@ def figure(result: Result) -> Figure:
                 continue
             m, turn = chunk[column], turned if on_crank else 1.0
             _draw(axes, [factor * plane[:, m] * turn for plane in planes], series, factor * largest / FILLED)
-            # under the panel of its bearing
+            # the lower panel belongs to the bearing above it
             name = "on the crankshaft" if on_crank else f"bearing {names[m]}"
             axes.set_title(fit_line(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
             across, up = ("across", "along") if on_crank else ("lateral", "vertical")

@@ -38,7 +38,7 @@ def figure(result: Result) -> Figure:
     for k, place in enumerate(zip(x, y, strict=True)):
         if k == 0 or texts[k] != texts[k - 1]:
             axes.annotate(texts[k], place, xytext=(5, 6), textcoords="offset points", size=SMALL, color=FAINT)
-    # a bound with more freedom holds with less: steps extend to the point before
+    # a bound for a larger deviation holds for smaller ones, so its step extends to the point before
     freedom = [math.degrees(p.allowed) for p in trade]
     axes.plot(freedom, [p.lower_bound for p in trade], linewidth=1.2, drawstyle="steps-pre", zorder=1, **_BOUND)
     name, unit = (result.objective.name, result.objective.unit) if result.objective else ("", "")

@@ -56,7 +56,7 @@ def figure(result: Result) -> Figure:
 
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
-    # over the speeds that the limits hold at [rpm]
+    # a limit is drawn over the speeds [rpm] at which it holds
     limits = limits_on(result, channels.TRANSMISSIBILITY)
     lines = [(limit.maximum, limit.measure.points) for limit in limits]
     for maximum, point_names in lines:

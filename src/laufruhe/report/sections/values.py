@@ -140,7 +140,7 @@ def _range_of(rank: RankValue, name: str) -> str:
         return DASH
     unit, factor = readable(entry.unit)
     is_open = any(entry is equal for equal in rank.equal)
-    # values below this are roundings
+    # smaller values are rounding errors
     minimum = 1e-3 * max(abs(other.high) for other in rank.designs)
     values = (entry.low, entry.high) if is_open else (0.5 * (entry.low + entry.high),)
     ends = (trimmed(0.0 if abs(value) <= minimum else factor * value, 3) for value in values)

@@ -161,7 +161,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     columns = [(data.attrs["metric"], data["objective"].attrs["units"], best, [""] * points)]
     for k, name in enumerate(data["quantity"].values.tolist()):
         values = data["further"].values[:, k]
-        # loads that cancel leave a rounding
+        # loads that cancel leave a rounding error
         zero_level = _NEGLIGIBLE * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
         values = np.where(np.abs(values) < zero_level, 0.0, values)
         columns.append((name, str(data["quantity_unit"].values[k]), values, data["why_none"].values[:, k].tolist()))
