@@ -73,13 +73,13 @@ def _attainable(limit: AttainableLimit, lead: str) -> str:
         known, unknown = f"stays at {value}: {limit.why}; {required}", f"is not known: {limit.why}."
         return f"'{limit.name}' {known}" if is_known else f"The range of '{limit.name}' {unknown}"
     minimum, beyond = ("smallest", "lower") if limit.side == "at most" else ("largest", "higher")
-    found, none = f"the {minimum} value found of '{limit.name}' is {value}", f"; no design is {beyond} than {bound}"
+    best, none = f"the {minimum} value found of '{limit.name}' is {value}", f"; no design is {beyond} than {bound}"
     if value == bound or limit.proof == Proof.GLOBAL:
         text = f"the {minimum} value of '{limit.name}' is {value}, which is proven"
     elif limit.proof == Proof.WITHIN_GAP:
-        text = f"{found}; none is {beyond} than {bound}"
+        text = f"{best}; none is {beyond} than {bound}"
     else:
-        text = f"{found}, a local optimum{none if limit.bound > 0.0 else ' without a proof'}"
+        text = f"{best}, a local optimum{none if limit.bound > 0.0 else ' without a proof'}"
     ended = " Its search ended at the time limit; raise it." if limit.ended else ""
     text = f"{lead}{text}; {required}{ended}"
     return text[:1].upper() + text[1:]
