@@ -110,8 +110,8 @@ class RandomDesigns(Sampled):
             feasible = _feasible(data, objective, k)
             _, middle, maximum = percentiles_of(feasible)
             cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(feasible) / objective.shape[1]:.3g} %"]
-            least = float(feasible.min()) if len(feasible) else math.nan
-            cells += [number(value) for value in (least, middle, maximum, float(best[k]), float(bound[k]))]
+            minimum = float(feasible.min()) if len(feasible) else math.nan
+            cells += [number(value) for value in (minimum, middle, maximum, float(best[k]), float(bound[k]))]
             cells.append(str(data["proof"].values[k]))
             rows.append([*cells, str(int((feasible < bound[k] * (1.0 - 1e-9)).sum()))])
         return [marked_table(head, rows)]
