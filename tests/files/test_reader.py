@@ -88,6 +88,8 @@ BAD = [
         """engine.stroke = "1e-320 mm": is too small for any engine; write for example "120 mm", or 0"""),
     bad("a firing order of no cylinder", "[1, 3, 4, 2]", "[]",
         "engine.firing_order = []: names no cylinder; name every cylinder once"),
+    bad("a crank of no throw", "throws = [0, 180, 180, 0]", "throws = []",
+        "engine.throws = []: names no throw; give the angle of each throw"),
     bad("misspelt table", "[objective]", "[objektive]",
         """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
     bad("misspelt key of a tagged table", "imep =", "imp =",

@@ -259,8 +259,10 @@ def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
     """Return (key, number) for each key of [engine] that determines the number of cylinders."""
     throws, order, per_throw = table.throws, table.listed_order, table.kind.cylinders_per_throw
     counts = [("cylinders", table.cylinders)] if table.cylinders is not None else []
-    if order is not None and not order:
+    if order == []:
         raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
+    if throws == []:
+        raise Refused("engine.throws", [], "names no throw", "give the angle of each throw")
     counts += [("firing_order", len(order))] if order is not None else []
     return counts + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
