@@ -9,8 +9,9 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
+from laufruhe.load_models import uneven_model
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import LEFT_OUT, UnevenModel, UnevenSymbols, rotor_throws_of
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
@@ -50,10 +51,10 @@ def scene(folder, name, rest=MOUNT_FORCE):
     return phasing, start, ThrowMoves(phasing, places, start, phasing.intervals)
 
 
-def model_of(phasing, start, left_out=0.0):
+def model_of(phasing, start):
     problem = replace(phasing.realise(start), phasing=None)
     layout = phasing.layout(start.bank_angle, start.split_pin)
-    return UnevenModel(problem, layout, rotor_throws_of(phasing, start), left_out)
+    return UnevenModel(problem, layout, rotor_throws_of(phasing, start))
 
 
 def moved(moves, x):
@@ -64,7 +65,8 @@ def moved(moves, x):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_every_order_is_that_of_the_exact_model(tmp_path, name):
+def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
+    monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     phasing, start, moves = scene(tmp_path, name)
     model = model_of(phasing, start)
     rng = np.random.default_rng(3)
@@ -83,7 +85,8 @@ def test_every_order_is_that_of_the_exact_model(tmp_path, name):
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name):
+def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkeypatch):
+    monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     rms = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms")
     phasing, start, moves = scene(tmp_path, name, rms)
     model, x = model_of(phasing, start), ca.SX.sym("x", moves.size)
@@ -108,7 +111,7 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name):
 def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
     objective = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", measure)
     phasing, start, moves = scene(tmp_path, "four-stroke five", objective)
-    model = model_of(phasing, start, LEFT_OUT)
+    model = model_of(phasing, start)
     at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
     quantity = exact.objective[0].measure
     assert float(smooth_value(model, quantity, at, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
@@ -116,7 +119,7 @@ def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
 
 def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     phasing, start, moves = scene(tmp_path, "four-stroke five")
-    model = model_of(phasing, start, 1e-2)
+    model = model_of(phasing, start)
     at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
     rms = replace(exact.objective[0].measure, norm=NORMS["rms"])
     own = float(smooth_value(model, rms, at, 1e-9))

@@ -54,14 +54,9 @@ class AmplitudeObjective:
     terms: tuple[AmplitudeTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:  # noqa: ARG002
-        """Return the objective of many stars, shape (n,).
+        """Return the objective of many stars, shape (n,), from the step of every throw, shape (n, throws).
 
-        Parameters
-        ----------
-        stars
-            Step of every throw, shape (n, throws).
-        maximum
-            Value above which other objectives of this interface may return any number above `maximum`; unused here.
+        Other objectives of this interface may return any number above `maximum` in place of a larger value.
         """
         return self._values_of_sums(star_sums(stars, space.phases, space.places, self.orders))
 

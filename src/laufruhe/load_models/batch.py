@@ -137,10 +137,7 @@ class Designs:
 def prepare(problem: Problem, prune: bool = True) -> Designs:
     """Compute all that does not depend on the decisions.
 
-    Parameters
-    ----------
-    prune
-        Whether samples that repeat within the cycle, and components that are zero, are left out to save time.
+    With `prune`, samples that repeat within the cycle, and components that are zero, are left out to save time.
 
     Raises
     ------

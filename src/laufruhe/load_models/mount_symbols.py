@@ -57,13 +57,7 @@ class SymbolicMounts:
     laws: tuple[Dynamic, ...] = ()
 
     def added(self, omegas: Array) -> tuple[Any, Any]:
-        """Return the real and imaginary parts of the dynamic less the static stiffness [N/m], shape (n, frequencies).
-
-        Parameters
-        ----------
-        omegas
-            Angular frequencies [rad/s], shape (frequencies,).
-        """
+        """Return both parts of the dynamic less the static stiffness [N/m], shape (n, omegas), at omegas [rad/s]."""
         increases = [law.at(omegas) - law.static for law in self.laws]
         values = np.array(increases, dtype=complex).reshape(len(self.laws), len(omegas))
         return ca.DM(values.real.copy()), ca.DM(values.imag.copy())
@@ -171,15 +165,7 @@ class SymbolicResponse:
 
 
 def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -> SymbolicResponse:
-    """Return the response of the block to loads R w.
-
-    Parameters
-    ----------
-    omegas
-        Angular frequencies [rad/s], shape (n,).
-    real, imaginary
-        Real and imaginary parts of the loads R w, shape (6, n).
-    """
+    """Return the response of the block to both parts of loads R w, shape (6, n), at n angular frequencies [rad/s]."""
     count, unit = len(omegas), ca.DM.eye(6)
     added_stiffness, added_drag = mounts.added(omegas)
     is_moving = [float(w > 0.0) for w in omegas]

@@ -53,12 +53,8 @@ def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
 def peaks_of(problem: Problem, step_factor: int, is_coarse: bool = False) -> Peaks | None:
     """Return the local maxima of all simulated measures, or None if there are no such measures.
 
-    Parameters
-    ----------
-    step_factor
-        Time step over that of the final evaluation.
-    is_coarse
-        Whether the simulation may leave out its most expensive part.
+    The time step is `step_factor` times that of the final evaluation. A coarse simulation may leave out its most
+    expensive part.
     """
     measures = simulated_measures(problem)
     if not measures:

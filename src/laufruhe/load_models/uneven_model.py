@@ -74,19 +74,14 @@ class UnevenModel:
         Problem of the star from which a program starts, with its firing order.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
-    left_out
-        Largest share of the root mean square of the roll moment in omitted orders, if gas acts.
     """
 
-    def __init__(
-        self, problem: Problem, layout: Layout, rotor_throws: dict[str, int], left_out: float = LEFT_OUT
-    ) -> None:
+    def __init__(self, problem: Problem, layout: Layout, rotor_throws: dict[str, int]) -> None:
         self.problem, self.layout, self.rotor_throws = problem, layout, rotor_throws
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         firsts = [layout.pins.index(pin) for pin in range(len(layout.throw_positions))]
         self._start = [problem.engine.slider_cranks[k].throw - layout.pin_offsets[k] for k in firsts]
-        self._left_out = left_out
         self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], SymbolicSpectrum] = {}
 
     def rows(self, measure: Measure, symbols: UnevenSymbols) -> tuple[Any, Grid]:
@@ -194,7 +189,7 @@ class UnevenModel:
         """Return the wrench at an operating point; `gain` weights the orders of the roll moment for their selection."""
         if gain is None and (point, symbols) in self._wrenches:
             return self._wrenches[point, symbols]
-        share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
+        share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
         unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
         roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
         signal = lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :])  # noqa: E731

@@ -98,18 +98,9 @@ def _roots(denominator: int) -> NDArray[np.complex128]:
 
 
 def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """Return e^{2 pi i m t} for each multiple m and angle t.
+    """Return e^{2 pi i m t} for each multiple m of the base order and angle t in turns, shape (multiples, turns).
 
-    Parameters
-    ----------
-    turns
-        Angles as fractions of a turn, length n.
-    multiples
-        Integers, shape (m,): orders as multiples of the base order.
-
-    Returns
-    -------
-    Shape (m, n). Exact fractions give table values, floats plain exponentials.
+    Exact fractions give table values, floats plain exponentials.
     """
     waves = np.empty((len(multiples), len(turns)), dtype=complex)
     for column, turn in enumerate(turns):
@@ -124,20 +115,10 @@ def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.c
 def star_sum(
     weights: NDArray[np.float64], turns: Sequence[Turn], multiples: NDArray[np.int64]
 ) -> NDArray[np.complex128]:
-    """Return the sums over a star sum_k w_k e^{2 pi i m t_k}, with exact zeros.
+    """Return the sums over a star sum_k w_k e^{2 pi i m t_k}, shape (multiples, c), with exact zeros.
 
-    Parameters
-    ----------
-    weights
-        Real weights of each of n members in c components, shape (n, c).
-    turns
-        Angles of the members as fractions of a turn, length n.
-    multiples
-        Integers, shape (m,).
-
-    Returns
-    -------
-    Shape (m, c). Real and imaginary parts below the rounding error of their sum, (n + 2) eps sum |w|, are zero.
+    The n members have weights in c components, shape (n, c), and angles in turns. Real and imaginary parts below the
+    rounding error of their sum, (n + 2) eps sum |w|, are zero.
     """
     return _star_sum(phasors(turns, multiples), weights)
 

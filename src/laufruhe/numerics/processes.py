@@ -14,12 +14,12 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import Context
 from functools import partial
 from pkgutil import resolve_name
-from queue import Empty, SimpleQueue
+from queue import SimpleQueue
 from types import TracebackType
 from typing import IO, Any, NoReturn, ParamSpec, TypeAlias, TypeVar
 
@@ -28,7 +28,6 @@ from laufruhe.numerics.cores import ONE_THREAD, end_with_parent, processors
 
 P = ParamSpec("P")
 T = TypeVar("T")
-_Call: TypeAlias = tuple[Future[Any], bytes]
 _SERVES = False
 _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
 
@@ -157,8 +156,10 @@ class ForkedWorker:
 
     def kill(self) -> None:
         """Kill the process."""
-        if not self._is_over:
-            os.kill(self.pid, signal.SIGKILL)
+        # another thread may have waited for it
+        with suppress(ProcessLookupError):
+            if not self._is_over:
+                os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
         """Wait until the process has ended."""
@@ -170,10 +171,11 @@ class ForkedWorker:
 _Child: TypeAlias = subprocess.Popen[bytes] | ForkedWorker
 
 
-class Processes(Executor):
+class Processes(ThreadPoolExecutor):
     """Executor on up to `count` processes, which start with the first calls and end with the executor.
 
-    Each process uses one thread for linear algebra and does not receive Ctrl-C; the owner of the executor ends them.
+    A thread for each process passes calls to it. Each process uses one thread for linear algebra and does not receive
+    Ctrl-C; the owner of the executor ends them.
 
     Parameters
     ----------
@@ -185,51 +187,32 @@ class Processes(Executor):
 
     def __init__(self, count: int | None = None, first: Sequence[ForkedWorker] = ()) -> None:
         self.count = count if count is not None else processors()
+        super().__init__(self.count)
         self._first = list(first)
-        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
-        self._lock = threading.Lock()
-        self._tenders: list[threading.Thread] = []
         self._children: set[_Child] = set(first)
-        self._open = 0
-        self._closed = False
+        self._of_thread = threading.local()
+        self._lock = threading.Lock()
+        self._is_over = False
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Schedule a call of picklable arguments."""
-        future: Future[T] = Future()
-        call = pickle.dumps((fn, args, kwargs))
-        with self._lock:
-            if self._closed:
-                raise RuntimeError("cannot schedule new futures after shutdown")
-            self._open += 1
-            if len(self._tenders) < min(self.count, self._open):
-                tender = threading.Thread(target=self._tend, daemon=True)
-                self._tenders.append(tender)
-                tender.start()
-        self._calls.put((future, call))
-        return future
+        return super().submit(self._answer, pickle.dumps((fn, args, kwargs)))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """End the processes when all calls are done, or at once with `cancel_futures`."""
-        with self._lock:
-            self._closed = True
-            children, tenders = tuple(self._children), tuple(self._tenders)
-        if cancel_futures:
-            # a worker thread may take the last call at the same time
-            with suppress(Empty):
-                while True:
-                    call = self._calls.get_nowait()
-                    if call is not None:
-                        call[0].cancel()
+        try:
+            super().shutdown(wait and not cancel_futures, cancel_futures=cancel_futures)
+        finally:
+            # also where Ctrl-C ends the wait
+            with self._lock:
+                self._is_over = True
+                children = tuple(self._children) if wait or cancel_futures else ()
             for child in children:
                 child.kill()
-        for _ in tenders:
-            self._calls.put(None)
-        for tender in tenders if wait else ():
-            tender.join()
-        with self._lock:
-            idle, self._first = self._first, []
-        for child in idle:
-            self._end(child)
+            # a thread ends when its process is dead
+            super().shutdown(wait or cancel_futures)
+            for child in children:
+                self._end(child)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -243,26 +226,19 @@ class Processes(Executor):
         with self._lock:
             return tuple(child.pid for child in self._children)
 
-    def _tend(self) -> None:
-        """Pass calls to one process one after another, and end it with this thread."""
-        child: _Child | None = None
-        while (call := self._calls.get()) is not None:
-            future, request = call
-            if future.set_running_or_notify_cancel():
-                try:
-                    child = self._start() if child is None else child
-                    is_answer, answer = _exchange(child, request)
-                except (OSError, EOFError, pickle.UnpicklingError) as error:
-                    self._end(child)
-                    child = None
-                    died = WorkerDied("a worker process died during a call; check that there is enough memory")
-                    died.__cause__ = error
-                    future.set_exception(died)
-                else:
-                    future.set_result(answer) if is_answer else future.set_exception(answer)
-            with self._lock:
-                self._open -= 1
-        self._end(child)
+    def _answer(self, request: bytes) -> Any:
+        """Return the answer of the process of this thread to a call."""
+        child: _Child | None = getattr(self._of_thread, "child", None)
+        try:
+            child = self._of_thread.child = child or self._start()
+            is_answer, answer = _exchange(child, request)
+        except (OSError, EOFError, pickle.UnpicklingError) as error:
+            self._of_thread.child = None
+            self._end(child)
+            raise WorkerDied("a worker process died during a call; check that there is enough memory") from error
+        if is_answer:
+            return answer
+        raise answer
 
     def _start(self) -> _Child:
         with self._lock:
@@ -276,8 +252,8 @@ class Processes(Executor):
         )  # fmt: skip
         with self._lock:
             self._children.add(child)
-            closed = self._closed
-        if closed:
+            is_over = self._is_over
+        if is_over:
             child.kill()
         return child
 

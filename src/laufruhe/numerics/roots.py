@@ -8,14 +8,9 @@ _MAX_HALVINGS = 200
 
 
 def rising_root(function: Callable[[float], float], below: float, above: float) -> float:
-    """Return the zero of a rising function to the last digit of a float, by bisection.
+    """Return the zero of a function that never falls to the last digit of a float, by bisection.
 
-    Parameters
-    ----------
-    function
-        Function that never falls.
-    below, above
-        Arguments with a value of at most zero, and with a value above zero.
+    The value is at most zero at `below`, and above zero at `above`.
     """
     for _ in range(_MAX_HALVINGS):
         middle = 0.5 * (below + above)
@@ -29,11 +24,9 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
 
 
 def bisect_property(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
-    """Bisect the interval where a property ends: it holds at `start` and not at `end`.
+    """Return the last argument where a property holds and the first where it does not, after some halvings.
 
-    Returns
-    -------
-    Last argument where the property holds and first where it does not, after `halvings` halvings.
+    The property holds at `start` and not at `end`.
     """
     for _ in range(halvings):
         middle = 0.5 * (start + end)

@@ -78,15 +78,7 @@ class Spectrum:
         )
 
     def shift(self, turn: Turn, angle: float) -> Spectrum:
-        """Return the signal delayed by a crank angle.
-
-        Parameters
-        ----------
-        turn
-            Delay as a fraction of the period.
-        angle
-            The same delay [rad].
-        """
+        """Return the signal delayed by a crank angle [rad]; `turn` is the same delay as a fraction of the period."""
         phases = phasors([-turn], np.arange(len(self.coefficients)))
         coefficients = self.coefficients * phases.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         kinks = None if self.kinks is None else self.kinks.shift(angle).folded(self.period, 1)
@@ -139,13 +131,9 @@ class Spectrum:
     def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
         """Return values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
 
-        Orders above half the number of samples are folded, so every value is that of the complete series.
-
-        Parameters
-        ----------
-        offset
-            Angle by which kinks are evaluated later than each step [rad]. With `JUMP_OFFSET` all terms of a sum take
-            the same side of a jump that lies on a step; with zero, rounding decides.
+        Orders above half the number of samples are folded, so every value is that of the complete series. Kinks are
+        evaluated later than each step by `offset` [rad]. With `JUMP_OFFSET` all terms of a sum take the same side of a
+        jump that lies on a step; with zero, rounding decides.
         """
         if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + offset
@@ -399,17 +387,7 @@ def spectrum_with_kinks(
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return the largest magnitude of a vector on its ellipse, Re c e^{i h phi} (M5).
-
-    Parameters
-    ----------
-    coefficient
-        Shape (..., components).
-
-    Returns
-    -------
-    Shape (...): the semi-major axis.
-    """
+    """Return the largest magnitude of vectors c, shape (..., components), on their ellipses Re c e^{i h phi} (M5)."""
     total = np.sum(np.abs(coefficient) ** 2, axis=-1)
     # an undamped resonance has infinite coefficients and an infinite amplitude
     finite = np.where(np.isfinite(total)[..., None], coefficient, 0.0)

@@ -23,25 +23,14 @@ _reports: ContextVar[list[BoundError] | None] = ContextVar("reports", default=No
 
 
 def is_over(bound: float, value: float, zero_level: float = 0.0) -> bool:
-    """Return True if a lower bound exceeds the value of a known design, or is NaN.
-
-    Parameters
-    ----------
-    zero_level
-        Absolute difference that counts as zero, in the unit of the bound.
-    """
+    """Return True if a lower bound exceeds the value of a known design by more than `zero_level`, or is NaN."""
     return not bound <= value + EXCESS * abs(value) + zero_level
 
 
 def check_bound(what: str, bound: float, value: float, zero_level: float = 0.0) -> bool:
-    """Return True if a lower bound does not exceed the value of a known design; else report the contradiction.
+    """Return True if a lower bound does not exceed the value of a known design; else report that `what` contradicts it.
 
-    Parameters
-    ----------
-    bound, value
-        Lower bound, and value of the design, in the same unit.
-    zero_level
-        Absolute difference that counts as zero, in that unit.
+    An absolute difference up to `zero_level` counts as zero.
     """
     if not is_over(bound, value, zero_level):
         return True

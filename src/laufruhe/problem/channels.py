@@ -45,12 +45,7 @@ OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
     """Return a function from loads to a signal inside the crankcase, which depends on the moving parts only.
 
-    Parameters
-    ----------
-    name
-        Name of the load in the error without moving parts.
-    signal
-        Function of the engine with these moving parts and of the loads.
+    `signal` is a function of the engine with these parts and of the loads; an error without them gives the `name`.
     """
 
     def inside_load(loads: PointLoads) -> Spectrum:
@@ -315,8 +310,6 @@ def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor
 
     Parameters
     ----------
-    name, unit
-        Name in files and reports; SI unit.
     where
         Keys, needed part and place names of the channel.
     load

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from laufruhe.errors import ModelError, check_integer
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.modes import MOTIONS
@@ -129,39 +129,19 @@ class Fields:
 
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
-    """Return the loads on block, mounts and bearings, and the mount travel, over the cycle (C7).
-
-    Parameters
-    ----------
-    steps
-        Number of samples over the cycle.
-    """
+    """Return the loads on block, mounts and bearings, and the mount travel, at some steps over the cycle (C7)."""
     check_integer("steps", steps, 1, MAX_STEPS)
     first = next(iter(designs.values()))
-    turn = first.engine.cycle.angle
-    angles = CurveAxis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")
-    axes, names = ("x", "y", "z"), [loads.point.name for loads in first.loads]
-
-    def sampled(signals: list[list[Spectrum]]) -> Array:
-        base = first.engine.cycle.base_order
-        return np.array(
-            [[with_common_base(base, [one])[0].sample(steps) for one in of_design] for of_design in signals]
-        )
-
-    wrenches = sampled([[loads.wrench for loads in design.loads] for design in designs.values()])
-    direction = CurveAxis("direction", axes)
-    fields = [
-        Field("shaking_force", "shaking force", "N", (direction,), wrenches[..., :3]),
-        Field("shaking_moment", "shaking moment", "N m", (direction,), wrenches[..., 3:]),
-    ]
-    for name, words, place, channel in _places(first):
-        values = sampled([[channel.signal(loads) for loads in design.loads] for design in designs.values()])
-        places = CurveAxis(place, tuple(channel.places(first.engine)))
-        if values.shape[-1] == len(axes):
-            fields.append(Field(name, words, channel.unit, (places, direction), values))
+    cycle, direction, fields = first.engine.cycle, CurveAxis("direction", ("x", "y", "z")), []
+    for name, words, unit, axes, signal, part in _signals(first, _WRENCH):
+        spectra = [[with_common_base(cycle.base_order, [signal(x)])[0] for x in d.loads] for d in designs.values()]
+        values = np.array([[spectrum.sample(steps) for spectrum in row] for row in spectra])[..., part]
+        if values.shape[-1] == len(direction.labels):
+            fields.append(Field(name, words, unit, (*axes, direction), values))
         else:
-            fields.append(Field(name, words, channel.unit, (places,), values[..., 0]))
-    rows = (CurveAxis("point", tuple(names)), angles)
+            fields.append(Field(name, words, unit, axes, values[..., 0]))
+    angles = CurveAxis("angle", tuple(float(k) for k in np.degrees(cycle.angle) * np.arange(steps) / steps), "deg")
+    rows = (CurveAxis("point", tuple(loads.point.name for loads in first.loads)), angles)
     return Fields("Loads over the crank angle", CurveAxis("design", tuple(designs)), rows, tuple(fields))
 
 
@@ -169,31 +149,23 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     """Return the amplitudes by order of the loads on block, mounts and bearings (C8)."""
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
-    signals: dict[str, tuple[str, str, tuple[CurveAxis, ...], Callable[[PointLoads], Spectrum]]] = {
-        "shaking_force": ("shaking force", "N", (), lambda loads: loads.wrench.mapped(lambda c: c[..., :3])),
-        "shaking_moment": ("shaking moment", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 3:])),
-        "roll_moment": ("roll moment", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 3:4])),
-        "rocking_couple": ("rocking couple", "N m", (), lambda loads: loads.wrench.mapped(lambda c: c[..., 4:])),
-    }
-    for name, words, place, channel in _places(first):
-        axes = (CurveAxis(place, tuple(channel.places(first.engine))),)
-        signals[name] = (words, channel.unit, axes, channel.signal)
-    spectra = {
-        name: [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
-        for name, (_, _, _, signal) in signals.items()
-    }
-    count = max(len(spectrum.coefficients) for rows in spectra.values() for row in rows for spectrum in row)
+    signals = list(_signals(first, (*_WRENCH, *_MOMENTS)))
+    spectra = [
+        [[signal(loads).with_finer_base(base) for loads in design.loads] for design in designs.values()]
+        for *_, signal, _ in signals
+    ]
+    count = max(len(spectrum.coefficients) for of_signal in spectra for row in of_signal for spectrum in row)
 
-    def amplitudes(spectrum: Spectrum) -> Array:
+    def amplitudes(coefficients: ComplexArray) -> Array:
         # a resonance has no finite amplitude
         with np.errstate(invalid="ignore"):
-            values = order_amplitude(spectrum.coefficients)
+            values = order_amplitude(coefficients)
         values = np.pad(values, [(0, count - len(values))] + [(0, 0)] * (values.ndim - 1))
         return np.where(np.isfinite(values), values, math.inf)
 
     fields = [
-        Field(name, words, unit, axes, np.array([[amplitudes(spectrum) for spectrum in row] for row in spectra[name]]))
-        for name, (words, unit, axes, _) in signals.items()
+        Field(name, words, unit, axes, np.array([[amplitudes(s.coefficients[..., part]) for s in row] for row in rows]))
+        for (name, words, unit, axes, _, part), rows in zip(signals, spectra, strict=True)
     ]
     orders = CurveAxis("order", tuple(float(k * base) for k in range(count)))
     points = CurveAxis("point", tuple(loads.point.name for loads in first.loads))
@@ -222,14 +194,26 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
     )
 
 
-def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
-    # name, words, name of the place axis, and channel of each load with several places
+_Signal: TypeAlias = tuple[str, str, str, tuple[CurveAxis, ...], Callable[[PointLoads], Spectrum], slice]
+"""Name, words, unit, axis of places, spectrum of a load at an operating point, and its components."""
+_WRENCH = (("shaking force", "N", slice(0, 3)), ("shaking moment", "N m", slice(3, 6)))
+_MOMENTS = (("roll moment", "N m", slice(3, 4)), ("rocking couple", "N m", slice(4, 6)))
+
+
+def _signals(design: Evaluation, parts: Sequence[tuple[str, str, slice]]) -> Iterator[_Signal]:
+    # parts of the wrench, then each load with several places
+    for words, unit, part in parts:
+        yield words.replace(" ", "_"), words, unit, (), lambda loads: loads.wrench, part
+    places: list[tuple[str, str, str, LoadChannel]] = []
     if design.engine.mounts:
-        yield "mount_force", "force on", "mount", MOUNT_FORCE
+        places.append(("mount_force", "force on", "mount", MOUNT_FORCE))
     if design.engine.mounts and design.engine.block is not None:
-        yield "mount_travel", "travel at", "mount", MOUNT_TRAVEL
+        places.append(("mount_travel", "travel at", "mount", MOUNT_TRAVEL))
     if has_bearing_loads(design.engine, design.fidelity):
-        yield "crank_torque", "torque of", "shaft", CRANK_TORQUE
+        places.append(("crank_torque", "torque of", "shaft", CRANK_TORQUE))
         if design.engine.bearings:
-            yield "main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE
-            yield "crank_pin_force", "force on pin of", "cylinder", CRANK_PIN_FORCE
+            places.append(("main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE))
+            places.append(("crank_pin_force", "force on pin of", "cylinder", CRANK_PIN_FORCE))
+    for name, words, place, channel in places:
+        axis = CurveAxis(place, tuple(channel.places(design.engine)))
+        yield name, words, channel.unit, (axis,), channel.signal, slice(None)

@@ -121,13 +121,6 @@ class Numbers:
     mounts: list[list[Any]] = field(default_factory=list)
     changes: dict[tuple[Kind, Any], float] = field(default_factory=dict)
 
-    @classmethod
-    def from_engine(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
-        """Return the numbers of an engine; `mounts` has those of its springs if decisions may change them."""
-        unbalances = {rotor.name: rotor.unbalance for rotor in engine.rotors}
-        places: dict[str, list[Any]] = {rotor.name: list(rotor.place) for rotor in engine.rotors}
-        return cls(unbalances, places, [list(row) for row in mounts])
-
     def engine(self, base: Engine) -> Engine:
         """Return an engine with these numbers."""
         rotors = []

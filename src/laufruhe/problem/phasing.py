@@ -234,10 +234,7 @@ class PhasingOf(Generic[P]):
     ) -> Candidate:  # fmt: skip
         """Return the candidate of a star with even firing, with the first of its firing orders.
 
-        Parameters
-        ----------
-        steps
-            Angle of each throw in steps.
+        The angles of its throws are `steps`, of which one turn has `phases`.
         """
         layout = self.layout(*geometry)
         order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)
@@ -261,22 +258,18 @@ class PhasingOf(Generic[P]):
             return ((None, None),)
         split = self.split or (0.0, 0.0)
         bank_open, split_open = self.is_geometry_open
-        if not bank_open and not split_open:
-            return ((self.bank[0], split[0]),)
         step = math.tau / (self.cylinders // math.gcd(self.cycle.turns, self.cylinders))
-        if bank_open and split_open:
-            banks = sorted({self.bank[0], self.bank[1], 0.5 * (self.bank[0] + self.bank[1])})
-            return tuple((b, s) for b in banks for s in _multiples(step, split, b))
-        if bank_open:
-            return tuple((b, split[0]) for b in _multiples(step, self.bank, split[0]))
-        return tuple((self.bank[0], s) for s in _multiples(step, split, self.bank[0]))
 
+        def multiples(bounds: tuple[float, float], offset: float) -> list[float]:
+            # values between bounds whose sums with `offset` are multiples of the step
+            low = math.ceil((bounds[0] + offset) / step - 1e-9)
+            high = math.floor((bounds[1] + offset) / step + 1e-9)
+            return [m * step - offset for m in range(low, high + 1)]
 
-def _multiples(step: float, bounds: tuple[float, float], offset: float) -> list[float]:
-    # values between bounds whose sums with `offset` are multiples of a step
-    low = math.ceil((bounds[0] + offset) / step - 1e-9)
-    high = math.floor((bounds[1] + offset) / step + 1e-9)
-    return [m * step - offset for m in range(low, high + 1)]
+        if bank_open and not split_open:
+            return tuple((b, split[0]) for b in multiples(self.bank, split[0]))
+        banks = sorted({*self.bank, 0.5 * (self.bank[0] + self.bank[1])}) if bank_open else [self.bank[0]]
+        return tuple((b, s) for b in banks for s in (multiples(split, b) if split_open else [split[0]]))
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:

@@ -428,9 +428,11 @@ class Problem:
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
         """Return the numbers of the engine with decisions at these values; symbols of a smooth program are allowed."""
         selected = self.decisions if decisions is None else decisions
+        unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}
+        places = {rotor.name: list(rotor.place) for rotor in self.engine.rotors}
         on_mounts = any(decision.mount_drives for decision in selected)
-        numbers = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
-        return apply_decisions(numbers, selected, values)
+        mounts = [list(row) for row in self.mount_numbers] if on_mounts else []
+        return apply_decisions(Numbers(unbalances, places, mounts), selected, values)
 
 
 def _check_name(name: object) -> None:

@@ -74,6 +74,13 @@ class Subdifferential:
     others: tuple[Array, ...] = ()
 
 
+def hull(subgradients: Sequence[Array]) -> Subdifferential | None:
+    """Return the convex combinations of subgradients; None without any, or of more than `MAX_KINKS`."""
+    if not 0 < len(subgradients) <= MAX_KINKS:
+        return None
+    return Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
+
+
 @dataclass(frozen=True, eq=False)
 class Cones:
     """Norm as a second-order cone program: the minimum of value . t over epigraph variables t ("heads") (P1).
@@ -257,12 +264,9 @@ class Norm(ABC):
         raise TypeError(f"{self.name} is not known from lengths alone")
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float] | None:
-        """Return a quadratic upper bound of the norm that is exact at these row lengths, shape (k,) (R6).
+        """Return a quadratic upper bound of the norm that is exact at these row lengths, shape (k,); None without (R6).
 
-        Returns
-        -------
-        Coefficients a, shape (k,), and constant c with norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V. None if the
-        norm has no such bound.
+        It has coefficients a, shape (k,), and a constant c with norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V.
         """
         return None
 
@@ -287,12 +291,10 @@ class Norm(ABC):
     def smooth_limit(
         self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Return a smooth form of the limit norm(rows) <= maximum: expression <= value.
+        """Return a smooth form of the limit norm(rows) <= maximum.
 
-        Returns
-        -------
-        CasADi expression, its largest allowed value, and the derivative of that value by `maximum`. The expression is
-        smooth at zero rows too, and as exact as `smooth_expression` with unit one, which is the default.
+        It has a CasADi expression, its largest allowed value, and the derivative of that value by `maximum`. The
+        expression is smooth at zero rows too, and as exact as `smooth_expression` with unit one, which is the default.
         """
         return self.smooth_expression(program, grid, rows, 1.0, share), maximum, 1.0
 

@@ -26,6 +26,7 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     Norm,
     Subdifferential,
     curvature,
+    hull,
     lengths,
     softened_lengths,
 )
@@ -83,11 +84,7 @@ class PeakToPeak(Norm):
                     subgradient = np.zeros_like(rows)
                     subgradient[first + np.array(subset)] = 2.0 * shares[:, None] * directions[[*subset]]
                     subgradients.append(subgradient)
-        return (
-            Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
-            if 0 < len(subgradients) <= MAX_KINKS
-            else None
-        )
+        return hull(subgradients)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return half the sum of lengths; infinite if the rows of a signal do not sum to zero."""

@@ -14,12 +14,12 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import (
     LONGEST_TOL,
-    MAX_KINKS,
     Cones,
     EpigraphProgram,
     Grid,
     Norm,
     Subdifferential,
+    hull,
     lengths,
     softened_lengths,
 )
@@ -43,27 +43,21 @@ class WorstMean(Norm):
         """Return the subgradient of the mean at the worst operating point."""
         means, z = self._means(grid, rows), np.zeros_like(rows)
         if len(means):
-            rows_of_point = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
-            z[rows_of_point] = _MEAN.subgradient(Grid(_shares(grid)[rows_of_point], grid.steps), rows[rows_of_point])
+            part, own = _of_point(grid, int(np.argmax(means)))
+            z[part] = _MEAN.subgradient(own, rows[part])
         return z
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return the subgradients of the largest means; None if one of their rows vanishes."""
-        means, size, subgradients = self._means(grid, rows), _size(grid), list[Array]()
+        means, subgradients = self._means(grid, rows), list[Array]()
         for point in np.flatnonzero(means >= (1.0 - LONGEST_TOL) * means.max(initial=0.0)):
-            rows_of_point, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
-            mean = _MEAN.subdifferential(
-                Grid(_shares(grid)[rows_of_point], grid.steps), rows[rows_of_point], rows[rows_of_point]
-            )
+            (part, own), base = _of_point(grid, int(point)), np.zeros_like(rows)
+            mean = _MEAN.subdifferential(own, rows[part], rows[part])
             if len(mean.vanishing):
                 return None
-            base[rows_of_point] = mean.base
+            base[part] = mean.base
             subgradients.append(base)
-        return (
-            Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
-            if 0 < len(subgradients) <= MAX_KINKS
-            else None
-        )
+        return hull(subgradients)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return sum_p max_k |z_k| / w_k, with the weights of each operating point summing to one."""
@@ -130,6 +124,12 @@ def _shares(grid: Grid) -> Array:
     blocks = grid.weights.reshape(grid.points, _size(grid))
     sums = blocks.sum(axis=1, keepdims=True)
     return np.asarray(blocks / np.where(sums > 0.0, sums, 1.0)).reshape(-1)
+
+
+def _of_point(grid: Grid, point: int) -> tuple[slice, Grid]:
+    # rows of an operating point, and their grid
+    rows = slice(point * _size(grid), (point + 1) * _size(grid))
+    return rows, Grid(_shares(grid)[rows], grid.steps)
 
 
 def _counted(signals: Sequence[Spectrum], shares: Array) -> list[Spectrum]:
