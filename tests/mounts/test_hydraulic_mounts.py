@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.load_models.mount_symbols import response, symbolic_mounts
+from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
+from laufruhe.machine import OperatingPoint
 from laufruhe.machine.dynamic import FluidTrack, MeasuredStiffness
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
@@ -180,8 +182,9 @@ def test_symbols_and_numbers_agree(tmp_path: Path) -> None:
     symbols = symbolic_mounts(problem, mounting.block, ca.DM(x))
     omegas, at = np.array([40.0, 80.0]), loads.coefficients[1:]
     drive = at @ (time_model(mounting).load[:6]).T
-    found = response(symbols, omegas, ca.DM(drive.real.T.copy()), ca.DM(drive.imag.T.copy()))
-    real, imag = (np.array(ca.evalf(part)) for part in found.force)
+    spectrum = SymbolicSpectrum(omegas, ca.DM(drive.real.T.copy()), ca.DM(drive.imag.T.copy()))
+    found = response(symbols, OperatingPoint("one", 1.0), spectrum).force
+    real, imag = (np.array(ca.evalf(part)) for part in (found.real, found.imaginary))
     theirs = mounting.forces(loads, 40.0).coefficients[1:].reshape(2, -1).T
     assert real + 1j * imag == pytest.approx(theirs, rel=1e-9, abs=1e-9 * np.abs(theirs).max())
 

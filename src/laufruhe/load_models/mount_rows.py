@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
-from laufruhe.load_models.mount_symbols import SymbolicResponse
+from laufruhe.load_models.mount_symbols import PointResponse
 from laufruhe.load_models.symbolic_spectrum import cosines_and_sines
-from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
@@ -22,24 +20,6 @@ SAMPLES_PER_ORDER = 4
 """Number of samples per period of the highest order."""
 
 
-@dataclass(frozen=True, eq=False)
-class PointResponse:
-    """Response of the mounted block at one operating point.
-
-    Attributes
-    ----------
-    base
-        Order of the common period.
-    response
-        Mount forces and deflections of every order.
-    """
-
-    point: OperatingPoint
-    base: float
-    orders: Array
-    response: SymbolicResponse
-
-
 def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure: Measure) -> tuple[Any, Grid]:
     """Return the rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
 
@@ -47,29 +27,28 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
     shape (k, 3). `names` are those of the mounts, in the order of the response.
     """
     chosen = [response for response in points if measure.includes_point(response.point)]
+    signals = [one.force if measure.channel is channels.MOUNT_FORCE else one.travel for one in chosen]
     mounts = measure.places(names)
     total_weight = sum(response.point.weight for response in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
     # orders differ between points: all have the samples that the highest order needs
-    highest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
+    highest = max(float(signal.orders.max(initial=0.0)) / signal.base for signal in signals)
     samples = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
-    for point in chosen:
-        signal = point.response.force if measure.channel is channels.MOUNT_FORCE else point.response.travel
-        counted = np.flatnonzero(measure.counted(point.orders)).tolist()
-        orders, (real, imaginary) = point.orders[counted], (part[:, counted] for part in signal)
+    for response, signal in zip(chosen, signals, strict=True):
+        part = signal.select(np.flatnonzero(measure.counted(signal.orders)))
         if measure.norm.is_euclidean:
-            is_mean = orders == 0.0
-            values, steps = ca.horzcat(real, imaginary), np.append(0.5 + 0.5 * is_mean, 0.5 - 0.5 * is_mean)
+            is_mean = part.orders == 0.0
+            values, steps = ca.horzcat(part.real, part.imaginary), np.append(0.5 + 0.5 * is_mean, 0.5 - 0.5 * is_mean)
         else:
-            cosine, sine = cosines_and_sines(orders.tolist(), point.base, samples)
-            values, steps = real @ cosine - imaginary @ sine, np.full(samples, 1.0 / samples)
+            cosine, sine = cosines_and_sines(part.orders.tolist(), signal.base, samples)
+            values, steps = part.real @ cosine - part.imaginary @ sine, np.full(samples, 1.0 / samples)
         for k in mounts:
             rows = values[3 * k : 3 * k + 3, :].T
             if measure.direction_weights is not None:
                 rows = rows @ ca.diag(ca.DM(list(measure.direction_weights)))
             blocks.append(rows)
-            weights += [*(point.point.weight / total_weight / len(mounts) * steps)]
+            weights += [*(response.point.weight / total_weight / len(mounts) * steps)]
     return ca.vertcat(*blocks), Grid(np.array(weights), samples, points=len(chosen))
 
 
@@ -77,12 +56,12 @@ def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> li
     """Return sums of squares of forces on elastic and on rigid mounts, per operating point and order (E11)."""
     pairs = []
     counted = [measure.orders] if measure.orders is None else [(order,) for order in measure.orders]
-    for point in points:
-        for orders in counted if measure.includes_point(point.point) else ():
-            is_counted = (point.orders > 0.0) & replace(measure, orders=orders).counted(point.orders)
-            group = np.flatnonzero(is_counted).tolist()
-            if group:
-                forces = point.response.force, point.response.rigid_force
-                elastic, rigid = (sum(ca.sumsqr(part[:, group]) for part in parts) for parts in forces)
+    for response in points:
+        for orders in counted if measure.includes_point(response.point) else ():
+            found = response.force.orders
+            group = np.flatnonzero((found > 0.0) & replace(measure, orders=orders).counted(found))
+            if len(group):
+                forces = (response.force.select(group), response.rigid_force.select(group))
+                elastic, rigid = (ca.sumsqr(force.real) + ca.sumsqr(force.imaginary) for force in forces)
                 pairs.append((elastic, rigid))
     return pairs

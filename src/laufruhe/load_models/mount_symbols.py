@@ -12,10 +12,11 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
+from laufruhe.machine import OperatingPoint
 from laufruhe.machine.block import Block
 from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import symbols
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
@@ -55,12 +56,6 @@ class SymbolicMounts:
     directions: Any
     spring_travels: Any
     laws: tuple[Dynamic, ...] = ()
-
-    def added(self, omegas: Array) -> tuple[Any, Any]:
-        """Return both parts of the dynamic less the static stiffness [N/m], shape (n, omegas), at omegas [rad/s]."""
-        increases = [law.at(omegas) - law.static for law in self.laws]
-        values = np.array(increases, dtype=complex).reshape(len(self.laws), len(omegas))
-        return ca.DM(values.real.copy()), ca.DM(values.imag.copy())
 
 
 def mount_matrices(problem: Problem, block: Block) -> Any:
@@ -148,26 +143,32 @@ def _inverse(a: tuple[Any, Any]) -> tuple[Any, Any]:
 
 
 @dataclass(frozen=True, eq=False)
-class SymbolicResponse:
-    """Mount forces and deflections under loads at n angular frequencies (E4, E5).
+class PointResponse:
+    """Response of the mounted block at one operating point (E4, E5).
 
     Attributes
     ----------
     force, travel
-        Real and imaginary parts of mount forces [N] and deflections [m], shape (3 mounts, n) each.
+        Mount forces [N] and deflections [m], with components of all mounts, shape (3 mounts, n).
     rigid_force
-        Real and imaginary parts of the forces on rigid mounts [N] (E11).
+        Forces on rigid mounts [N] (E11).
     """
 
-    force: tuple[Any, Any]
-    travel: tuple[Any, Any]
-    rigid_force: tuple[Any, Any]
+    point: OperatingPoint
+    force: SymbolicSpectrum
+    travel: SymbolicSpectrum
+    rigid_force: SymbolicSpectrum
 
 
-def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -> SymbolicResponse:
-    """Return the response of the block to both parts of loads R w, shape (6, n), at n angular frequencies [rad/s]."""
+def response(mounts: SymbolicMounts, point: OperatingPoint, wrench: SymbolicSpectrum) -> PointResponse:
+    """Return the response of the block to loads R w."""
+    real, imaginary, omegas = wrench.real, wrench.imaginary, wrench.orders * point.speed
     count, unit = len(omegas), ca.DM.eye(6)
-    added_stiffness, added_drag = mounts.added(omegas)
+    # dynamic less static stiffness
+    increases = np.array([law.at(omegas) - law.static for law in mounts.laws], dtype=complex).reshape(
+        len(mounts.laws), count
+    )
+    added_stiffness, added_drag = ca.DM(increases.real.copy()), ca.DM(increases.imag.copy())
     is_moving = [float(w > 0.0) for w in omegas]
     reactances = [mounts.stiffness - float(w) ** 2 * unit for w in omegas]
     resistances = [moves * mounts.loss + float(w) * mounts.damping for moves, w in zip(is_moving, omegas, strict=True)]
@@ -186,8 +187,12 @@ def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -
         real_travel, imaginary_travel = mounts.rows @ yr, mounts.rows @ yi
         force_real += mounts.directions @ (added_stiffness * real_travel - added_drag * imaginary_travel)
         force_imaginary += mounts.directions @ (added_stiffness * imaginary_travel + added_drag * real_travel)
-    return SymbolicResponse(
-        (force_real, force_imaginary),
-        (mounts.travels @ yr, mounts.travels @ yi),
-        (mounts.springs @ rigid[0], mounts.springs @ rigid[1]),
+    force, travel, rigid_force = (
+        SymbolicSpectrum(wrench.orders, *parts)
+        for parts in (
+            (force_real, force_imaginary),
+            (mounts.travels @ yr, mounts.travels @ yi),
+            (mounts.springs @ rigid[0], mounts.springs @ rigid[1]),
+        )
     )
+    return PointResponse(point, force, travel, rigid_force)

@@ -35,6 +35,7 @@ from laufruhe.numerics.norms.norm import amplitudes, mean_square
 from laufruhe.numerics.spectrum import Spectrum, as_order, common_base, orders_equal
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, mass_rows, narrow_signal
+from laufruhe.problem.phasing import NO_OPEN_ANGLES, OpenAngles
 from laufruhe.problem.problem import Problem
 
 # smallest share of the load that keeps one of the lowest orders, and number of these orders
@@ -128,8 +129,6 @@ class ThrowWaves:
         Problem of a crank with its throws at any angles. No open unbalance turns with a throw.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
-    is_geometry_open
-        Whether the bank angle and the split pin are open.
     turns
         Change of all throw angles per unit of an open angle: the side of cylinder 1 if throws are counted from its
         dead centre, or 0.
@@ -144,7 +143,7 @@ class ThrowWaves:
 
     def __init__(
         self, problem: Problem, layout: Layout, rotor_throws: dict[str, int],
-        is_geometry_open: tuple[bool, bool] = (False, False), turns: float = 0.0,
+        is_geometry_open: OpenAngles = NO_OPEN_ANGLES, turns: float = 0.0,
     ) -> None:  # fmt: skip
         self.problem, self.layout, self._is_geometry_open, self._turns = problem, layout, is_geometry_open, turns
         self.throws = len(layout.throw_positions)
@@ -174,14 +173,13 @@ class ThrowWaves:
         engine, layout = self.problem.engine, self.layout
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
             problem, late = only_gas_of(self.problem, part.name), layout.late[k] if layout.late else 0.0
-            banks = BANK_SAMPLES if self._is_geometry_open[0] else (layout.banks[k],)
+            banks = BANK_SAMPLES if self._is_geometry_open.bank else (layout.banks[k],)
             copies = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
             evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in copies)
             # fixed angles shift the cylinder in time
-            ahead = 0.0 if self._is_geometry_open[0] else -layout.banks[k]
-            yield MovingPart(
-                pin, k, evaluations, ahead + (0.0 if self._is_geometry_open[1] else layout.pin_offsets[k]), {}
-            )
+            ahead = 0.0 if self._is_geometry_open.bank else -layout.banks[k]
+            ahead += 0.0 if self._is_geometry_open.split else layout.pin_offsets[k]
+            yield MovingPart(pin, k, evaluations, ahead, {})
 
     def _unbalances(self, rotor_throws: dict[str, int], inside: bool) -> Iterator[MovingPart]:
         # unbalances on every throw

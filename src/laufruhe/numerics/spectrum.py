@@ -215,9 +215,8 @@ class Spectrum:
         """Return the same signal with another base order, whose period must be a period of the signal."""
         if base is self.base or base == self.base:
             return self
-        fine, step = self, multiple_of_base(base, self.base)
-        if not step:
-            fine, step = self.with_finer_base(_common(base, self.base)), (base / self.base).numerator
+        fine = self.with_finer_base(_common(base, self.base))
+        step = int(base / fine.base)
         kinks = None if fine.kinks is None else fine.kinks.folded(fine.period / step, step)
         return Spectrum(base, fine.coefficients[::step], kinks)
 
@@ -315,12 +314,6 @@ def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
     return Fraction(gcd(a.numerator, b.numerator), lcm(a.denominator, b.denominator))
-
-
-def multiple_of_base(order: Fraction, base: Fraction) -> int:
-    """Return the whole number order / base; zero if the quotient is not whole."""
-    multiple, remainder = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
-    return 0 if remainder else multiple
 
 
 def common_base(orders: Sequence[Fraction]) -> Fraction:

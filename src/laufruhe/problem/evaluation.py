@@ -14,7 +14,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
-from laufruhe.numerics.spectrum import Spectrum, common_base, multiple_of_base
+from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mount_forces import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
@@ -250,7 +250,7 @@ def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_
 def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
     # signals over their common period, and the number of samples in it
     period_base = common_base([signal.repeat_order() for signal in signals])
-    periods = multiple_of_base(period_base, base)
-    if not periods or samples % periods:
+    periods = period_base / base
+    if periods.denominator > 1 or samples % periods:
         return with_common_base(base, signals), samples
-    return [signal.with_base(period_base) for signal in signals], samples // periods
+    return [signal.with_base(period_base) for signal in signals], samples // int(periods)

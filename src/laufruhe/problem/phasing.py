@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from laufruhe.errors import ModelError, counted
 from laufruhe.machine import Cycle
@@ -84,6 +84,16 @@ class Candidate:
     split_pin: float | None = None
     left_out: tuple[str, ...] = ()
     without_gas: bool = False
+
+
+class OpenAngles(NamedTuple):
+    """Whether the bank angle and the split pins are open."""
+
+    bank: bool
+    split: bool
+
+
+NO_OPEN_ANGLES = OpenAngles(bank=False, split=False)
 
 
 @dataclass(frozen=True)
@@ -211,10 +221,9 @@ class PhasingOf(Generic[P]):
         return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
 
     @property
-    def is_geometry_open(self) -> tuple[bool, bool]:
-        """True for an open bank angle, and for open split pins."""
-        bank, split = (pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split))
-        return bank, split
+    def is_geometry_open(self) -> OpenAngles:
+        """Whether the bank angle is open, and whether the split pins are."""
+        return OpenAngles(*(pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split)))
 
     @property
     def open_names(self) -> tuple[str, ...]:
@@ -222,8 +231,8 @@ class PhasingOf(Generic[P]):
         names = (
             ("throws", self.throws is None),
             ("firing order", self.firing_order is None),
-            ("bank angle", self.is_geometry_open[0]),
-            ("split pin angle", self.is_geometry_open[1]),
+            ("bank angle", self.is_geometry_open.bank),
+            ("split pin angle", self.is_geometry_open.split),
             (f"which of {counted(sum(map(len, self.shafts.optional)), 'shaft')} are built", bool(self.shafts.optional)),
         )
         return tuple(name for name, is_open in names if is_open)

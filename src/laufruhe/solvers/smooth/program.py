@@ -23,8 +23,8 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.block_loads import FixedCrankLoads, OpenCrankLoads, SymbolicLoads
-from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted_squares
-from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
+from laufruhe.load_models.mount_rows import sampled_rows, transmitted_squares
+from laufruhe.load_models.mount_symbols import PointResponse, elimination, response, symbolic_mounts
 from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
@@ -200,10 +200,9 @@ class SmoothProgram:
         # E4
         wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
-            PointResponse(point, wrench.base, wrench.orders,
-                   response(self._mounts, wrench.orders * point.speed, wrench.real, wrench.imaginary))
+            response(self._mounts, point, wrench)
             for point, wrench in zip(self.problem.points, self._loads.wrenches(wrench_map), strict=True)
-        ]  # fmt: skip
+        ]
 
     def _rows(self, measure: Measure) -> tuple[Any, Grid]:
         if measure.on_mounts and self._points:
@@ -274,7 +273,7 @@ class SmoothProgram:
             return sum((k for row in rows for k in row[:3]), ca.MX(0.0))
         pairs = transmitted_squares(self._points, quantity)
         if not pairs:
-            orders = sorted({float(order) for point in self._points for order in point.orders if order > 0.0})
+            orders = sorted({float(order) for point in self._points for order in point.force.orders if order > 0.0})
             names = ", ".join(f"{order:g}" for order in orders[:MAX_NAMED]) or "none"
             raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {names}")
         ratios = [ca.sqrt(force / rigid) for force, rigid in pairs]

@@ -160,7 +160,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
         objective = amplitude_objective(first, phasing, families[0].layout)
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
-    if phasing.is_geometry_open[0]:
+    if phasing.is_geometry_open.bank:
         # measures inside the crankcase depend on the open bank angle
         load_terms = tuple(term for term in problem.objective if not term.measure.is_inside)
         problem = replace(problem, objective=load_terms)
