@@ -302,7 +302,7 @@ def _check_decisions(problem: Problem) -> None:
         remedy = "fix some, or couple some to others"
         raise Refused(decisions[MAX_OPEN].name, None, f"is open in addition to {MAX_OPEN} other numbers", remedy)
     for decision in decisions:
-        if not any(drive.acts for drive in decision.drives):
+        if not decision.has_effect:
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
     if decisions and not problem.objective:
         raise Refused("objective", None, "is missing while numbers are open", "add [objective] with minimise")

@@ -168,10 +168,6 @@ class Drive(Protocol):
     def kind(self) -> Kind:
         """Kind of the number."""
 
-    @property
-    def acts(self) -> bool:
-        """True if the decision has an effect on the engine."""
-
     def move(self, numbers: Numbers, change: Any, /) -> None:
         """Change the number in place for a change of the decision from its start."""
 
@@ -184,11 +180,6 @@ class RotorDrive:
     gain: complex
     mirrored: bool = False
     kind: ClassVar[Kind] = Kind.UNBALANCE
-
-    @property
-    def acts(self) -> bool:
-        """True unless the gain is zero."""
-        return self.gain != 0.0
 
     def of(self, change: Value) -> Value:
         """Return the change of the unbalance for a change of the decision [kg m]."""
@@ -206,7 +197,6 @@ class PlaceDrive:
     rotor: str
     axis: int
     kind: ClassVar[Kind] = Kind.PLACE
-    acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
         """Change the position in place."""
@@ -220,7 +210,6 @@ class MountDrive:
     mount: int
     number: int
     gain: float
-    acts: ClassVar[bool] = True
 
     @property
     def kind(self) -> Kind:
@@ -245,7 +234,6 @@ class NumberDrive:
 
     kind: Kind
     key: Any
-    acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
         """Add the change to the changes of the number."""
@@ -268,7 +256,6 @@ class AddressDrive:
     path: tuple[str | int, ...]
     unit: str
     kind: ClassVar[Kind] = Kind.NUMBER
-    acts: ClassVar[bool] = True
 
     def written(self, value: Value) -> str | float:
         """Return the value as it is written in a file: with its unit, if there is one."""
@@ -329,6 +316,11 @@ class Decision:
     def kind(self) -> Kind:
         """Kind of the highest rank among the drives."""
         return max(drive.kind for drive in self.drives)
+
+    @property
+    def has_effect(self) -> bool:
+        """True if it changes a number of the engine; unbalances with gain zero stay."""
+        return any(not isinstance(drive, RotorDrive) or drive.gain != 0.0 for drive in self.drives)
 
     @property
     def is_affine(self) -> bool:

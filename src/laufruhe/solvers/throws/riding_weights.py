@@ -111,7 +111,7 @@ class Riders:
         self._throws = throws
         on_throws = {
             d.name: drives for d in problem.unbalances
-            if (drives := [drive for drive in d.rotor_drives if drive.rotor in throw_of_rotor and drive.acts])
+            if (drives := [drive for drive in d.rotor_drives if drive.rotor in throw_of_rotor and drive.gain])
         }  # fmt: skip
         free_decisions: list[Decision] = []
         for decision in problem.unbalances:
