@@ -33,12 +33,8 @@ _LEVERS: dict[Channel, int] = {SHAKING_FORCE: 0, SURGING_FORCE: 0, ROCKING_COUPL
 class AmplitudeTerm:
     """Term of the objective: w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2) over the orders h (S3).
 
-    F_h is the sum of e^{i h theta} over the throws, C_h the same sum weighted by throw positions.
-
-    Attributes
-    ----------
-    force, couple
-        Factors f_h and c_h of every order.
+    F_h is the sum of e^{i h theta} over the throws, C_h the same sum weighted by throw positions; `force` and `couple`
+    are the factors f_h and c_h of every order.
     """
 
     weight: float

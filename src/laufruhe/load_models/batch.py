@@ -28,13 +28,7 @@ _PARTS_OF_COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """Norm of the rows f . R of many designs.
-
-    Attributes
-    ----------
-    rows
-        Matrix R, shape (components, features, k); the features f of a design have the shape (features,).
-    """
+    """Norm of the rows f . R of many designs: R has the shape (components, features, k), the features f (features,)."""
 
     norm: Norm
     rows: Array
@@ -90,13 +84,7 @@ class BatchNorm:
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """Problem prepared for the evaluation of many designs: pairs (weight, norm) of terms and (maximum, norm) of limits.
-
-    Attributes
-    ----------
-    model
-        Loads of the problem, affine in the decision vector.
-    """
+    """Problem prepared for many designs: pairs (weight, norm) of the terms, and (maximum, norm) of the limits."""
 
     model: AffineModel
     terms: tuple[tuple[float, BatchNorm], ...]

@@ -134,10 +134,7 @@ class Term:
 class PriorityLevel:
     """Objective of one priority, minimised over the optima of all objectives of higher priority.
 
-    Attributes
-    ----------
-    within
-        Fraction of its minimum by which objectives of lower priority may increase it.
+    Those of lower priority may increase it by the fraction `within` of its minimum.
     """
 
     terms: tuple[Term, ...]

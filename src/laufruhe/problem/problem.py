@@ -28,13 +28,7 @@ Path: TypeAlias = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Drawing:
-    """Parts of a problem that depend on the numbers of its file.
-
-    Attributes
-    ----------
-    mount_numbers
-        Fourteen numbers of each elastic spring (E13).
-    """
+    """Parts of a problem that depend on the numbers of its file; each elastic spring has fourteen numbers (E13)."""
 
     engine: Engine
     points: tuple[OperatingPoint, ...]
@@ -125,12 +119,7 @@ class Origin:
 class KnownRows:
     """Rows of a measure in time: its value is the largest length of constant + slope x.
 
-    Attributes
-    ----------
-    constant
-        Rows at x = 0, shape (k, d).
-    slope
-        Derivatives by the columns x of the decisions that loads are affine in, shape (k, d, n).
+    The rows have the shapes (k, d) and (k, d, n); x are the columns of the decisions that loads are affine in.
     """
 
     constant: NDArray[np.float64]

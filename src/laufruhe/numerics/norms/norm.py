@@ -60,8 +60,7 @@ class Subdifferential:
     base
         One subgradient Z, shape (k, d).
     longest
-        Indices of the longest rows. A unit vector along each one alone is a subgradient too; empty if the base is the
-        only choice.
+        Indices of the longest rows. A unit vector along each one alone is a subgradient too.
     vanishing
         Indices of zero rows. Any vector not longer than the weight of the row may be added to the base there.
     others
