@@ -68,27 +68,14 @@ class FiringModel(StarModel):
         self._slots, self._origin_evaluation = slots, evaluate(self.problem)
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
+        stars, steps = super()._rows(samples, averaged), slot_steps(self.phasing.cycle, range(self.space.throws))
         # norms of the star in terms of slots, in the order of terms and limits
-        stars, steps = (
-            super()._rows(samples, averaged),
-            np.array(slot_steps(self.phasing.cycle, range(self.space.throws))),
-        )
-        star_norms = iter(
-            replace(
-                norm,
-                moves=norm.moves[:, steps],
-                slope_moves=None if norm.slope_moves is None else norm.slope_moves[:, steps],
-            )
-            for _, norm in (*stars.terms, *stars.limits)
-        )
-        terms, limits = (
-            tuple((number, self._norm(measure, samples, averaged, star_norms)) for number, measure in pairs)
-            for pairs in (
-                [(term.weight, term.measure) for term in self.problem.objective],
-                [(limit.maximum, limit.measure) for limit in self.problem.load_limits],
-            )
-        )
-        return StarProblem(terms, limits, self.domains, samples)
+        star_norms = iter([norm.with_steps(steps) for _, norm in (*stars.terms, *stars.limits)])
+        numbers = [(term.weight, term.measure) for term in self.problem.objective]
+        numbers += [(limit.maximum, limit.measure) for limit in self.problem.load_limits]
+        norms = [(number, self._norm(measure, samples, averaged, star_norms)) for number, measure in numbers]
+        count = len(self.problem.objective)
+        return StarProblem(tuple(norms[:count]), tuple(norms[count:]), self.domains, samples)
 
     def _norm(self, measure: Measure, samples: int, averaged: bool, star_norms: Iterator[StarNorm]) -> StarNorm:
         """Return a measure in all firing orders; `star_norms` yields the norms of the stars, in order."""

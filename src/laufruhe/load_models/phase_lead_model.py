@@ -111,10 +111,7 @@ class PhaseLeadModel:
         return self._cache[measure]
 
     def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
-        """Return a measure at given leads, with derivatives in the leads.
-
-        The parameters are those of `at`.
-        """
+        """Return a measure at given leads, with derivatives in the leads; see `at`."""
         if not measure.is_load:
             norm = self.base_model.norm(measure, samples)
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)

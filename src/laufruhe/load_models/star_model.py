@@ -66,6 +66,11 @@ class StarNorm:
         slope = self.slope if self.slope_moves is None else total(self.slope, self.slope_moves)
         return AffineNorm(self.norm, total(self.constant, self.moves), slope, self.grid)
 
+    def with_steps(self, steps: Sequence[int]) -> StarNorm:
+        """Return the norm with steps in place of the present ones, each equal to one of them."""
+        slope_moves = None if self.slope_moves is None else self.slope_moves[:, list(steps)]
+        return replace(self, moves=self.moves[:, list(steps)], slope_moves=slope_moves)
+
 
 @dataclass(frozen=True, eq=False)
 class StarProblem:

@@ -141,10 +141,6 @@ class SignalKinks:
         """Kinks of the derivative of a continuous signal; None without any."""
         return _left(self.angles, self.jumps[:, 1:])
 
-    def repeated(self, period: float, times: int) -> SignalKinks | None:
-        """Return the kinks of the same signal over `times` of its periods."""
-        return join_kinks([self.shift(k * period) for k in range(times)])
-
     def folded(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of a signal averaged over `times` shifts, with the angles reduced to `period` [rad]."""
         return merge_kinks(_within(self.angles, period), self.jumps / times)

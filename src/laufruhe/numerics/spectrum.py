@@ -195,7 +195,7 @@ class Spectrum:
         step = int(factor)
         spread = np.zeros(((len(self.coefficients) - 1) * step + 1, *self.coefficients.shape[1:]), dtype=complex)
         spread[::step] = self.coefficients
-        kinks = None if self.kinks is None else self.kinks.repeated(self.period, step)
+        kinks = None if self.kinks is None else join_kinks([self.kinks.shift(k * self.period) for k in range(step)])
         return Spectrum(base, spread, kinks)
 
     @cached_property

@@ -122,22 +122,20 @@ class ShaftChoice:
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
-        """Choices of sets, as tuples of their indices, that satisfy the limits."""
-        count = len(self.optional)
-        choices = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
-        return tuple(built for built in choices if self.allows(built))
+        """Choices of sets, as tuples of their indices, that satisfy the limits of number and mass and do not collide."""
+        count, allowed = len(self.optional), []
+        for code in range(1 << count):
+            built = tuple(k for k in range(count) if code >> k & 1)
+            number, mass = sum(len(self.optional[k]) for k in built), sum(self.masses[k] for k in built)
+            clashes = any(set(clash) <= set(built) for clash in self.clashes)
+            if not clashes and number <= self.maximum and mass <= self.most_mass * (1.0 + 1e-12):
+                allowed.append(built)
+        return tuple(allowed)
 
     @property
     def largest(self) -> tuple[tuple[int, ...], ...]:
         """Maximal allowed choices; smaller ones cannot be better, because a built shaft may have zero unbalance."""
         return tuple(b for b in self.allowed if not any(set(b) < set(other) for other in self.allowed))
-
-    def allows(self, built: Sequence[int]) -> bool:
-        """Return True if the sets with these indices satisfy the limits of number and mass and do not collide."""
-        number = sum(len(self.optional[k]) for k in built)
-        if any(set(clash) <= set(built) for clash in self.clashes):
-            return False
-        return number <= self.maximum and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
 
 
 @dataclass(frozen=True, eq=False)
