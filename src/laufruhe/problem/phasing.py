@@ -123,14 +123,15 @@ class ShaftChoice:
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
         """Choices of sets, as tuples of their indices, that satisfy the limits of number and mass and do not collide."""
-        count, allowed = len(self.optional), []
-        for code in range(1 << count):
-            built = tuple(k for k in range(count) if code >> k & 1)
-            number, mass = sum(len(self.optional[k]) for k in built), sum(self.masses[k] for k in built)
-            clashes = any(set(clash) <= set(built) for clash in self.clashes)
-            if not clashes and number <= self.maximum and mass <= self.most_mass * (1.0 + 1e-12):
-                allowed.append(built)
-        return tuple(allowed)
+        count = len(self.optional)
+        choices = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
+        return tuple(
+            built
+            for built in choices
+            if sum(len(self.optional[k]) for k in built) <= self.maximum
+            and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
+            and not any(set(clash) <= set(built) for clash in self.clashes)
+        )
 
     @property
     def largest(self) -> tuple[tuple[int, ...], ...]:
