@@ -122,7 +122,7 @@ class ShaftChoice:
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
-        """Choices of sets, as tuples of their indices, that satisfy the limits of number and mass and do not collide."""
+        """Choices of sets, as tuples of indices, that satisfy the limits of number and mass and do not collide."""
         count = len(self.optional)
         choices = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
         return tuple(
