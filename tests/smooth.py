@@ -6,7 +6,7 @@ from typing import Any
 
 import casadi as ca
 
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
+from laufruhe.load_models.uneven_model import UnevenModel
 from laufruhe.problem.measure import Measure
 
 
@@ -52,9 +52,9 @@ class WithVariables:
         self.held.append(ca.reshape(expression, -1, 1))
 
 
-def smooth_value(model: UnevenModel, measure: Measure, at: UnevenSymbols, share: float) -> Any:
+def smooth_value(model: UnevenModel, measure: Measure, share: float) -> Any:
     """What a program would minimise of a measure, softened by this much of one."""
-    rows, grid = model.rows(measure, at)
+    rows, grid = model.rows(measure)
     program = AtItsValues()
     value = measure.norm.smooth_expression(program, grid, rows, 1.0, share)
     for expression in program.held:

@@ -90,8 +90,8 @@ def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
     assert problem.phasing is not None
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
     star = problem.phasing.realise(Candidate(throws, (1, 2, 4, 5, 3)))
-    model = UnevenModel(star, problem.phasing.layout(None, None), {})
-    lines = model.wrench(star.points[0], UnevenSymbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1)))
+    symbols = UnevenSymbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1))
+    lines = UnevenModel(star, problem.phasing.layout(None, None), {}, symbols).wrench(star.points[0])
     real, imaginary = (np.array(ca.DM(part))[3] for part in (lines.real, lines.imaginary))
     return dict(zip(lines.orders.tolist(), (real + 1j * imaginary).tolist(), strict=True))
 

@@ -11,6 +11,7 @@ import pytest
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
@@ -147,17 +148,18 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
     problem = replace(phasing.realise(start), phasing=None)
-    model = UnevenModel(problem, phasing.layout(bank, split), rotor_throws_of(phasing, start))
+    domains, layout_of_start = domains_of(problem.unbalances), phasing.layout(bank, split)
     moved = tuple(rng.uniform(0.0, math.tau, count))
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
-    columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in model.domains)])[1:]
+    columns = np.concatenate([[0.0], *(0.3 * d.scale * rng.uniform(0.1, 1.0, d.width) for d in domains)])[1:]
     at = UnevenSymbols([ca.DM(angle) for angle in moved], bank, split, ca.DM(columns))
+    model = UnevenModel(problem, layout_of_start, rotor_throws_of(phasing, start), at)
     quantity = problem.objective[0].measure
-    smooth = float(smooth_value(model, quantity, at, 1e-9))
+    smooth = float(smooth_value(model, quantity, 1e-9))
     exact = phasing.realise(Candidate(moved, None, bank, split))
-    design = exact.design([d.complex_value(columns) for d in model.domains])
+    design = exact.design([d.complex_value(columns) for d in domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
-    rows, grid = model.rows(quantity, at)
+    rows, grid = model.rows(quantity)
     value, maximum, _ = quantity.norm.smooth_limit(AtItsValues(), grid, rows, smooth, 1e-9)
     assert float(ca.mmax(value)) == pytest.approx(maximum, rel=1e-6)
 

@@ -51,10 +51,10 @@ def scene(folder, name, rest=MOUNT_FORCE):
     return phasing, start, ThrowMoves(phasing, places, start, phasing.intervals)
 
 
-def model_of(phasing, start):
+def model_of(phasing, start, at):
     problem = replace(phasing.realise(start), phasing=None)
     layout = phasing.layout(start.bank_angle, start.split_pin)
-    return UnevenModel(problem, layout, rotor_throws_of(phasing, start))
+    return UnevenModel(problem, layout, rotor_throws_of(phasing, start), at)
 
 
 def moved(moves, x):
@@ -68,12 +68,11 @@ def moved(moves, x):
 def test_every_order_is_that_of_the_exact_model(tmp_path, name, monkeypatch):
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     phasing, start, moves = scene(tmp_path, name)
-    model = model_of(phasing, start)
     rng = np.random.default_rng(3)
     for _ in range(3):
         at, exact = moved(moves, rng.uniform(-0.25, 0.25, moves.size))
         wrench = evaluate(exact).loads[0].wrench
-        lines = model.wrench(exact.points[0], at)
+        lines = model_of(phasing, start, at).wrench(exact.points[0])
         parts = [np.array(part, dtype=float) for part in (lines.real, lines.imaginary)]
         smooth = {float(h): np.stack([part[:, k] for part in parts], axis=1) for k, h in enumerate(lines.orders)}
         assert 0.0 in smooth
@@ -89,9 +88,10 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkey
     monkeypatch.setattr(uneven_model, "LEFT_OUT", 0.0)
     rms = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "rms")
     phasing, start, moves = scene(tmp_path, name, rms)
-    model, x = model_of(phasing, start), ca.SX.sym("x", moves.size)
+    x = ca.SX.sym("x", moves.size)
+    model = model_of(phasing, start, UnevenSymbols(*moves.angles(x), ca.DM(0, 1)))
     quantity = model.problem.objective[0].measure
-    norm = smooth_value(model, quantity, UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), 1e-9)
+    norm = smooth_value(model, quantity, 1e-9)
     smooth = ca.Function("norm", [x], [norm, ca.gradient(norm, x)])
     point = np.random.default_rng(4).uniform(-0.2, 0.2, moves.size)
 
@@ -111,20 +111,19 @@ def test_measures_and_slopes_are_those_of_the_exact_model(tmp_path, name, monkey
 def test_orders_left_out_hardly_change_sampled_measures(tmp_path, measure):
     objective = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", measure)
     phasing, start, moves = scene(tmp_path, "four-stroke five", objective)
-    model = model_of(phasing, start)
     at, exact = moved(moves, np.random.default_rng(5).uniform(-0.2, 0.2, moves.size))
+    model = model_of(phasing, start, at)
     quantity = exact.objective[0].measure
-    assert float(smooth_value(model, quantity, at, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
+    assert float(smooth_value(model, quantity, 1e-6)) == pytest.approx(evaluate(exact).value(quantity), rel=1e-2)
 
 
 def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     phasing, start, moves = scene(tmp_path, "four-stroke five")
-    model = model_of(phasing, start)
     at, exact = moved(moves, np.random.default_rng(6).uniform(-0.2, 0.2, moves.size))
     rms = replace(exact.objective[0].measure, norm=NORMS["rms"])
-    own = float(smooth_value(model, rms, at, 1e-9))
+    own = float(smooth_value(model_of(phasing, start, at), rms, 1e-9))
     turned = replace(at, throws=[angle + 0.7 for angle in at.throws])
-    assert float(smooth_value(model, rms, turned, 1e-9)) == pytest.approx(own, rel=1e-12)
+    assert float(smooth_value(model_of(phasing, start, turned), rms, 1e-9)) == pytest.approx(own, rel=1e-12)
     # counted from the other end the roll moment is the same
     roll = '[objective]\nminimise = "mean roll moment"\n'
     phasing, start, moves = scene(tmp_path, "four-stroke five", roll)

@@ -19,7 +19,7 @@ from laufruhe.load_models import uneven_model
 from laufruhe.load_models.block_loads import OpenCrankLoads
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.throw_waves import ThrowWaves
-from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
+from laufruhe.load_models.uneven_model import rotor_throws_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import domains_of
@@ -96,7 +96,7 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     own = replace(phasing.realise(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
-    model = OpenCrankLoads(moves, UnevenModel(own, moves.layout, rotor_throws_of(phasing, start)), turns, columns)
+    model = OpenCrankLoads(own, moves, turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
     moved = replace(phasing.realise(moves.candidate(x)), phasing=None)

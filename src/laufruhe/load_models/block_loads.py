@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
+from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols, rotor_throws_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import stacked_coefficients
 from laufruhe.problem.decision import column_scales
 from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
 
 # relative size below which an order is left out
 MIN_SHARE = 1e-4
@@ -57,31 +58,30 @@ class FixedCrankLoads:
         return total
 
 
-class OpenCrankLoads:
+class OpenCrankLoads(UnevenModel):
     """Loads of a crank with open angles, smooth in throws, bank angle, split pin and unbalances (S19, S23).
 
     Parameters
     ----------
+    problem
+        Problem of the star from which angles are counted.
     moves
         Open angles and their bounds.
-    model
-        Loads as expressions of angles and unbalances.
     deviations, unbalances
         CasADi symbols of the open angles [rad], and of the decision vector of the unbalances.
     """
 
-    def __init__(self, moves: ThrowMoves, model: UnevenModel, deviations: Any, unbalances: Any) -> None:
-        self._moves, self._model = moves, model
-        self._deviations, self._unbalances = deviations, unbalances
-        self._symbols = UnevenSymbols(*moves.angles(deviations), unbalances)
+    def __init__(self, problem: Problem, moves: ThrowMoves, deviations: Any, unbalances: Any) -> None:
+        symbols = UnevenSymbols(*moves.angles(deviations), unbalances)
+        super().__init__(problem, moves.layout, rotor_throws_of(moves.phasing, moves.start), symbols)
+        self._moves, self._variables = moves, [deviations, unbalances]
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
         """Return the orders of the wrench that matter at any of `PROBES` designs, times a matrix of shape (6, 6)."""
-        relevant, bounds = [], column_scales(self._model.domains)
-        variables = [self._deviations, self._unbalances]
-        for point in self._model.problem.points:
-            wrench = self._model.wrench(point, self._symbols).mapped(transform)
-            function = ca.Function("sizes", variables, [wrench.real, wrench.imaginary])
+        relevant, bounds = [], column_scales(self.domains)
+        for point in self.problem.points:
+            wrench = self.wrench(point).mapped(transform)
+            function = ca.Function("sizes", self._variables, [wrench.real, wrench.imaginary])
             generator = np.random.default_rng(0)
             designs = [
                 (
@@ -93,10 +93,6 @@ class OpenCrankLoads:
             values = [np.abs(np.array(part, dtype=float)) for design in designs for part in function(*design)]
             relevant.append(wrench.select(_relevant_orders(np.max(values, axis=(0, 1)), wrench.orders)))
         return relevant
-
-    def rows(self, measure: Measure) -> tuple[Any, Grid]:
-        """Return the rows of a measure and their grid, as `UnevenModel.rows` does."""
-        return self._model.rows(measure, self._symbols)
 
 
 SymbolicLoads: TypeAlias = FixedCrankLoads | OpenCrankLoads

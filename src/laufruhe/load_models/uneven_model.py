@@ -74,24 +74,36 @@ class UnevenModel:
         Problem of the star from which a program starts, with its firing order.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
+    symbols
+        Variables of the expressions.
     """
 
-    def __init__(self, problem: Problem, layout: Layout, rotor_throws: dict[str, int]) -> None:
-        self.problem, self.layout, self.rotor_throws = problem, layout, rotor_throws
+    def __init__(self, problem: Problem, layout: Layout, rotor_throws: dict[str, int], symbols: UnevenSymbols) -> None:
+        self.problem, self._rotor_throws, self._symbols = problem, rotor_throws, symbols
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
+        parts = problem.engine.slider_cranks
         firsts = [layout.pins.index(pin) for pin in range(len(layout.throw_positions))]
-        self._start = [problem.engine.slider_cranks[k].throw - layout.pin_offsets[k] for k in firsts]
-        self._wrenches: dict[tuple[OperatingPoint, UnevenSymbols], SymbolicSpectrum] = {}
+        self._start = [parts[k].throw - layout.pin_offsets[k] for k in firsts]
+        self._wrenches: dict[OperatingPoint, SymbolicSpectrum] = {}
+        # star angle and bank angle of every cylinder
+        self._angles = []
+        for k, part in enumerate(parts):
+            side = layout.side(k)
+            bank = side * symbols.bank if symbols.bank is not None else part.bank
+            offset = -side * symbols.split if symbols.split is not None else layout.pin_offsets[k]
+            # the firing order fixes the number of turns before the firing
+            turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
+            self._angles.append((symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns, bank))
 
-    def rows(self, measure: Measure, symbols: UnevenSymbols) -> tuple[Any, Grid]:
+    def rows(self, measure: Measure) -> tuple[Any, Grid]:
         """Return the rows of a measure, shape (k, d), and their grid (P1).
 
         Rows are coefficients of orders for a root mean square (Parseval), and values at samples for other norms.
         """
         if measure.is_mass:
             counted = counted_rotors(measure, self.problem.engine.rotors)
-            rows = [(self._unbalance(r, symbols) / radius_of(r)).T for r in counted]
+            rows = [(self._unbalance(r) / radius_of(r)).T for r in counted]
             return ca.vertcat(*rows), Grid(np.ones(len(rows)), 1)
         chosen = [point for point in self.problem.points if measure.includes_point(point)]
         total_weight = sum(point.weight for point in chosen)
@@ -99,17 +111,14 @@ class UnevenModel:
         weights: list[Array] = []
         if measure.norm.is_euclidean:
             for point in chosen:
-                places = self._signal(measure, point, symbols)
+                places = self._signal(measure, point)
                 half = np.where(places[0].orders == 0.0, 1.0, 0.5) * point.weight / total_weight / len(places)
                 blocks += [part.T for place in places for part in (place.real, place.imaginary)]
                 weights += [half] * (2 * len(places))
             return ca.vertcat(*blocks), Grid(np.concatenate(weights), blocks[0].shape[0])
         # rigid mounts have one map for all orders, so that the wrench can be sampled first
         is_mapped_later = measure.channel is channels.MOUNT_FORCE and isinstance(self._mounting, RigidMounting)
-        signals = [
-            [self._counted(measure, p, symbols)] if is_mapped_later else self._signal(measure, p, symbols)
-            for p in chosen
-        ]
+        signals = [[self._counted(measure, p)] if is_mapped_later else self._signal(measure, p) for p in chosen]
         # orders differ between points: all have the samples that the highest order needs
         highest = max(float(place.orders.max()) / place.base for places in signals for place in places)
         steps = max(MIN_SAMPLES, int(SAMPLES_PER_ORDER * highest))
@@ -121,47 +130,38 @@ class UnevenModel:
             weights.append(np.full(len(values) * steps, point.weight / total_weight / len(values) / steps))
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
-    def _signal(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> list[SymbolicSpectrum]:
+    def _signal(self, measure: Measure, point: OperatingPoint) -> list[SymbolicSpectrum]:
         # one spectrum for each mount, one for the block, or one for each place inside the crankcase
         if measure.is_inside:
             # loads inside the crankcase, by every place (S37)
             return self._turned(
-                point, symbols,
+                point,
                 lambda loads: narrow_signal(
                     measure, measure.load.signal(loads).series, self.problem.engine
                 ).truncated(HIGHEST),
                 [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True,
             )  # fmt: skip
-        counted = self._counted(measure, point, symbols)
+        counted = self._counted(measure, point)
         if isinstance(measure.channel, LoadChannel) and measure.channel.part is not None:
             return [counted.mapped(np.eye(6)[measure.channel.part])]
         by_order = [self._maps(measure, float(h), point) for h in counted.orders]
         return [counted.map_orders([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
     def _turned(
-        self, point: OperatingPoint, symbols: UnevenSymbols, signal: Callable[[PointLoads], Spectrum],
-        selections: Sequence[OrderSelection], keep_places: bool,
+        self, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum], selections: Sequence[OrderSelection],
+        keep_places: bool,
     ) -> list[SymbolicSpectrum]:  # fmt: skip
-        engine = self.problem.engine
-        angles = []
-        for k, part in enumerate(engine.slider_cranks):
-            side = self.layout.side(k)
-            bank = side * symbols.bank if symbols.bank is not None else part.bank
-            offset = -side * symbols.split if symbols.split is not None else self.layout.pin_offsets[k]
-            # the firing order fixes the number of turns before the firing
-            turns = round((part.firing_angle + part.throw - part.bank) / math.tau)
-            angles.append((symbols.throws[self.layout.pins[k]] + offset - bank - math.tau * turns, bank))
         return turned_loads(
-            self.problem, self.problem.points.index(point), signal, selections, keep_places, angles,
-            symbols.bank is not None, lambda rotor: self._unbalance(rotor, symbols),
+            self.problem, self.problem.points.index(point), signal, selections, keep_places, self._angles,
+            self._symbols.bank is not None, self._unbalance,
         )  # fmt: skip
 
-    def _counted(self, measure: Measure, point: OperatingPoint, symbols: UnevenSymbols) -> SymbolicSpectrum:
+    def _counted(self, measure: Measure, point: OperatingPoint) -> SymbolicSpectrum:
         gain = None
         if measure.on_mounts and not isinstance(self._mounting, RigidMounting):
             # only the lowest orders of gas move a block on soft mounts
             gain = lambda h: float(np.abs(self._map(measure, h, point.speed)[:, :, ROLL]).max())  # noqa: E731
-        wrench = self.wrench(point, symbols, gain)
+        wrench = self.wrench(point, gain)
         counted = np.flatnonzero(measure.counted(wrench.orders))
         if len(counted):
             return wrench.select(counted)
@@ -183,22 +183,20 @@ class UnevenModel:
         travels = [travel_of(self.problem.engine, self._mounting, unit, speed) for unit in spectra]
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
-    def wrench(
-        self, point: OperatingPoint, symbols: UnevenSymbols, gain: Callable[[float], float] | None = None
-    ) -> SymbolicSpectrum:
+    def wrench(self, point: OperatingPoint, gain: Callable[[float], float] | None = None) -> SymbolicSpectrum:
         """Return the wrench at an operating point; `gain` weights the orders of the roll moment for their selection."""
-        if gain is None and (point, symbols) in self._wrenches:
-            return self._wrenches[point, symbols]
+        if gain is None and point in self._wrenches:
+            return self._wrenches[point]
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
         unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
         roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
         signal = lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :])  # noqa: E731
-        (wrench,) = self._turned(point, symbols, signal, [*unweighted, roll], False)
+        (wrench,) = self._turned(point, signal, [*unweighted, roll], False)
         if gain is None:
-            self._wrenches[point, symbols] = wrench
+            self._wrenches[point] = wrench
         return wrench
 
-    def _unbalance(self, rotor: Rotor, symbols: UnevenSymbols) -> Any:
+    def _unbalance(self, rotor: Rotor) -> Any:
         """Return the unbalance of a rotor (re, im) [kg m], turned with its throw."""
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
@@ -206,7 +204,7 @@ class UnevenModel:
             for drive in domain.decision.rotor_drives:
                 if drive.rotor != rotor.name:
                     continue
-                columns = symbols.unbalances[domain.columns]
+                columns = self._symbols.unbalances[domain.columns]
                 for j, direction in enumerate(domain.set.directions):
                     d = drive.of(direction)
                     real = real + d.real * columns[j]
@@ -214,10 +212,10 @@ class UnevenModel:
                 # the unbalance of the rotor has the baseline value of the decision in it
                 initial = drive.of(domain.decision.start)
                 real, imaginary = real - initial.real, imaginary - initial.imag
-        if rotor.name not in self.rotor_throws:
+        if rotor.name not in self._rotor_throws:
             return ca.vertcat(real, imaginary)
-        pin = self.rotor_throws[rotor.name]
-        turn = symbols.throws[pin] - self._start[pin]
+        pin = self._rotor_throws[rotor.name]
+        turn = self._symbols.throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
 

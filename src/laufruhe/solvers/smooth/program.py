@@ -27,7 +27,6 @@ from laufruhe.load_models.mount_rows import sampled_rows, transmitted_squares
 from laufruhe.load_models.mount_symbols import PointResponse, elimination, response, symbolic_mounts
 from laufruhe.load_models.simulated import COARSE_STEP
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_model import UnevenModel, rotor_throws_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
@@ -124,8 +123,7 @@ class SmoothProgram:
         if moves is None:
             # the affine model gives loads and unbalances, which do not depend on the mounts
             return FixedCrankLoads(AffineModel(off_resonance(self.problem)), self._unbalance_columns)
-        model = UnevenModel(self.problem, moves.layout, rotor_throws_of(moves.phasing, moves.start))
-        return OpenCrankLoads(moves, model, self._throw_deviations, self._unbalance_columns)
+        return OpenCrankLoads(self.problem, moves, self._throw_deviations, self._unbalance_columns)
 
     def _build(self) -> NonlinearProgram:
         minimum = ca.MX(0.0)
