@@ -148,7 +148,7 @@ class ThrowWaves:
         self.problem, self.layout, self._is_geometry_open, self._turns = problem, layout, is_geometry_open, turns
         self.throws = len(layout.throw_positions)
         if any(is_geometry_open) and self.throws == 1:
-            # one throw is cheap
+            # with one throw, stricter shares cost little
             self.share_left_out, self._arc_shares = (1e-6, 1e-6), (1e-9, 1e-9)
         engine = problem.engine
         remaining = tuple(

@@ -129,7 +129,7 @@ _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.BENT)
 )  # fmt: skip
-# not additive at an uneven speed
+# dependences that are lost at an uneven speed, where loads of parts do not add up
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
 
