@@ -58,6 +58,11 @@ class TestCis:
     def test_known_values(self, turn: Fraction, value: complex) -> None:
         assert _bits(cis(turn)) == _bits(value)
 
+    def test_an_equal_float_changes_no_fraction(self) -> None:
+        cis.cache_clear()
+        cis(0.125)
+        assert _bits(cis(Fraction(1, 8))) == _bits(complex(math.sqrt(0.5), math.sqrt(0.5)))
+
 
 class TestAsTurn:
     @given(PARTS)

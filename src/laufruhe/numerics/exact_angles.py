@@ -52,7 +52,8 @@ def angle_of(turn: Turn) -> float:
     return math.tau * float(turn)
 
 
-@lru_cache(maxsize=4096)
+# typed, because a float equals a fraction whose sine has other last digits
+@lru_cache(maxsize=4096, typed=True)
 def cis(turn: Turn) -> complex:
     """Return e^{2 pi i turn}, with every symmetry of the circle exact to the last bit.
 
