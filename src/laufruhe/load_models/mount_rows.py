@@ -58,8 +58,8 @@ def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> li
     counted = [measure.orders] if measure.orders is None else [(order,) for order in measure.orders]
     for response in points:
         for orders in counted if measure.includes_point(response.point) else ():
-            found = response.force.orders
-            group = np.flatnonzero((found > 0.0) & replace(measure, orders=orders).counted(found))
+            all_orders = response.force.orders
+            group = np.flatnonzero((all_orders > 0.0) & replace(measure, orders=orders).counted(all_orders))
             if len(group):
                 forces = (response.force.select(group), response.rigid_force.select(group))
                 elastic, rigid = (ca.sumsqr(force.real) + ca.sumsqr(force.imaginary) for force in forces)
