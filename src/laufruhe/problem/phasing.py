@@ -87,7 +87,7 @@ class Candidate:
 
 
 class OpenAngles(NamedTuple):
-    """Whether the bank angle and the split pins are open."""
+    """Angles of the layout that are open: True for each."""
 
     bank: bool
     split: bool
@@ -221,7 +221,7 @@ class PhasingOf(Generic[P]):
 
     @property
     def is_geometry_open(self) -> OpenAngles:
-        """Whether the bank angle is open, and whether the split pins are."""
+        """True for an open bank angle, and for open split pins."""
         return OpenAngles(*(pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split)))
 
     @property

@@ -43,15 +43,15 @@ class WorstMean(Norm):
         """Return the subgradient of the mean at the worst operating point."""
         means, z = self._means(grid, rows), np.zeros_like(rows)
         if len(means):
-            part, own = _of_point(grid, int(np.argmax(means)))
-            z[part] = _MEAN.subgradient(own, rows[part])
+            part, grid_of_point = _of_point(grid, int(np.argmax(means)))
+            z[part] = _MEAN.subgradient(grid_of_point, rows[part])
         return z
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return the subgradients of the largest means; None if one of their rows vanishes."""
         means, subgradients = self._means(grid, rows), list[Array]()
         for point in np.flatnonzero(means >= (1.0 - LONGEST_TOL) * means.max(initial=0.0)):
-            (part, own), base = _of_point(grid, int(point)), np.zeros_like(rows)
+            (part, grid_of_point), base = _of_point(grid, int(point)), np.zeros_like(rows)
             mean = _MEAN.subdifferential(own, rows[part], rows[part])
             if len(mean.vanishing):
                 return None
