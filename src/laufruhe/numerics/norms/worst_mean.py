@@ -52,7 +52,7 @@ class WorstMean(Norm):
         means, subgradients = self._means(grid, rows), list[Array]()
         for point in np.flatnonzero(means >= (1.0 - LONGEST_TOL) * means.max(initial=0.0)):
             (part, grid_of_point), base = _of_point(grid, int(point)), np.zeros_like(rows)
-            mean = _MEAN.subdifferential(own, rows[part], rows[part])
+            mean = _MEAN.subdifferential(grid_of_point, rows[part], rows[part])
             if len(mean.vanishing):
                 return None
             base[part] = mean.base
