@@ -192,7 +192,7 @@ def test_no_engine_refutes_an_entry(rounds: int) -> None:
 def test_samples_of_one_engine_refute_most_stronger_claims() -> None:
     """Where samples could not tell an entry from a stronger one, they would guard nothing."""
     entries: dict[tuple[str, Kind], list[tuple[Dependence, list[np.ndarray]]]] = {}
-    for _, channel, kind, claim, at in _entries([ALL_OPEN], 8):
+    for _, channel, kind, claim, at in _entries([ALL_OPEN], 5):
         entries.setdefault((channel.name, kind), []).append((claim, at))
     claims = {entry: (rows[0][0], STRONGER.get(rows[0][0], [])) for entry, rows in entries.items()}
     survivors = {
