@@ -232,10 +232,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
         remedy = f"fix one of the two, or let the firing be uneven: {uneven}"
         raise Refused("engine.split_pin_angle", None, rule, remedy)
-    throws, remainder = divmod(count, kind.cylinders_per_throw)
-    if remainder:
-        rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"
-        raise Refused("engine.cylinders", count, rule, "give one that is")
+    throws = count // kind.cylinders_per_throw
     if isinstance(engine.throws, list) and len(engine.throws) != throws:
         raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "make the numbers agree")
     check_order(phasing.firing_order, count)
