@@ -276,14 +276,6 @@ def test_starts_cover_every_variable_evenly_and_repeat_by_seed():
     assert np.array_equal(cells, np.tile(np.arange(10)[:, None], 2))
 
 
-def test_wrong_shapes_are_refused():
-    x = ca.SX.sym("x", 2)
-    with pytest.raises(ValueError, match="2 variables"):
-        NonlinearProgram(x, x[0], np.zeros(1), np.ones(2))
-    with pytest.raises(ValueError, match="above"):
-        NonlinearProgram(x, x[0], np.ones(2), np.zeros(2))
-
-
 def test_a_largest_of_many_rows_ends_no_worse_than_where_it_starts():
     """A hundred rows that are slack at the far end draw the path of a barrier there, whatever the start (N2)."""
     z = ca.SX.sym("z", 2)

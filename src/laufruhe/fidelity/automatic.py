@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, signals
-from laufruhe.fidelity.knob import OmittedPart
-from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.fidelity.knobs import KNOBS, OmittedPart
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.problem import Problem
@@ -24,8 +23,6 @@ class Choice:
 
     Attributes
     ----------
-    fidelity
-        The fidelity.
     error_estimate
         Upper bound of the relative error of the objective, for the design of the choice.
     description
@@ -45,33 +42,29 @@ class Choice:
 
 
 def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
-    """Return the cheapest sufficient fidelity for an objective (F10).
+    """Return the cheapest sufficient fidelity for an objective, by default at the design of the problem (F10).
 
-    Parameters
-    ----------
-    problem
-        Objective and operating points. An uneven crank speed stays uneven.
-    tolerance
-        Allowed relative error of the objective.
-    engine
-        Design of the choice; by default that of the problem as given.
-
-    Returns
-    -------
-    Choice with an error bound below the tolerance, if the reference is that exact. If the objective is zero, all parts
-    that are not zero are computed.
+    Its error bound is below the tolerance, if the reference is that exact. If the objective is zero, all parts that are
+    not zero are computed. An uneven crank speed stays uneven.
     """
     return choose_from_scale(Scale.of(problem, engine), tolerance)
 
 
 def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
-    """Choose the cheapest fidelity within a tolerance, from error bounds relative to a known reference (F10)."""
+    """Choose the cheapest fidelity as `choose` does, from error bounds relative to a known reference."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:
         fidelity = knob.chosen(scale, fidelity, allowed_error)
     estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
     left = [part for knob in KNOBS for part in knob.left_out(scale, fidelity)]
+    pruned = full = 0
+    for term in scale.terms:
+        spectra = signals(term.measure, scale.best)
+        directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in spectra)
+        mounts, width = spectra[0].coefficients.shape[1:]
+        pruned += max(fidelity.samples // scale.repeats, 24) * mounts * directions
+        full += scale.problem.fidelity.samples * mounts * width * len(spectra)
     return Choice(
         fidelity,
         # convert from an error relative to the reference to one relative to the computed value
@@ -79,7 +72,7 @@ def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
         tuple(text for knob in KNOBS for text in knob.describe(scale, fidelity)),
         # parts that are exactly zero come first
         tuple(sorted(left, key=lambda part: part.restored is not None)),
-        _numbers(scale.problem, scale, fidelity),
+        (pruned, full),
     )
 
 
@@ -98,14 +91,3 @@ def ladder(scale: Scale) -> list[tuple[str, Problem]]:
     if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]
     return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance, scale)) for tolerance in TRIED]
-
-
-def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int]:
-    pruned = full = 0
-    for term in scale.terms:
-        spectra = signals(term.measure, scale.best)
-        directions = sum(int(np.any(np.abs(s.coefficients) > 0.0, axis=(0, 1)).sum()) for s in spectra)
-        mounts, width = spectra[0].coefficients.shape[1:]
-        pruned += max(chosen.samples // scale.repeats, 24) * mounts * directions
-        full += problem.fidelity.samples * mounts * width * len(spectra)
-    return pruned, full

@@ -7,9 +7,8 @@ norm of that part. The curvature of the signal bounds the sampling error of a me
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -36,16 +35,7 @@ ROUNDING = 2e-12
 def reference(problem: Problem, engine: Engine | None = None, samples: int = REFERENCE_SAMPLES) -> Evaluation:
     """Return the evaluation of a design at the highest fidelity: all orders and modes, rigid rods, many gas samples.
 
-    The crank speed is uneven if it is in the problem.
-
-    Parameters
-    ----------
-    problem
-        Objective and operating points.
-    engine
-        Design; by default that of the problem as given.
-    samples
-        Number of samples over the cycle.
+    The crank speed is uneven if it is in the problem. By default the design is that of the problem as given.
     """
     fidelity = problem.fidelity
     best = replace(EXACT, samples=samples, crank_inertia=fidelity.crank_inertia, crankshaft=fidelity.crankshaft)
@@ -66,33 +56,21 @@ def relative(bound: float, value: float) -> float:
 def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
     """Return an upper bound of the sampling error of a measure, in its unit; zero without samples (F7, F8).
 
-    Parameters
-    ----------
-    measure
-        Measure.
-    evaluation
-        Evaluation of a design with its number of samples.
-    finest
-        Smallest number of samples with which these are compared.
+    The samples of the evaluation are compared with at least the number `finest`.
     """
     if measure.channel.simulation:
         return measure.channel.peak_error(evaluation.engine) * evaluation.value(measure)
     if measure.channel.depends_on_torque:
-        return _missed_of_torque(measure, evaluation, finest)
+        # the remaining error is assumed to be at most the change to the finest steps
+        fidelity = evaluation.fidelity
+        samples, gas_samples = (max(2 * steps, finest) for steps in (fidelity.samples, fidelity.gas_steps))
+        finer = replace(evaluation, fidelity=replace(fidelity, samples=samples, gas_samples=gas_samples))
+        value, finer_value = evaluation.value(measure), finer.value(measure)
+        return 2.0 * abs(finer_value - value) if math.isfinite(value) and math.isfinite(finer_value) else 0.0
     if not measure.is_load:
         return 0.0
     shares = measure.shares([loads.point for loads in evaluation.loads])
     return measure.norm.sampling_bound(signals(measure, evaluation), shares, evaluation.samples, finest)
-
-
-def _missed_of_torque(measure: Measure, evaluation: Evaluation, finest: int) -> float:
-    # the remaining error is assumed to be at most the change to the finest steps
-    fidelity = evaluation.fidelity
-    finer = replace(
-        fidelity, samples=max(2 * fidelity.samples, finest), gas_samples=max(2 * fidelity.gas_steps, finest)
-    )
-    value, finer_value = evaluation.value(measure), replace(evaluation, fidelity=finer).value(measure)
-    return 2.0 * abs(finer_value - value) if math.isfinite(value) and math.isfinite(finer_value) else 0.0
 
 
 class Scale:
@@ -100,8 +78,6 @@ class Scale:
 
     Attributes
     ----------
-    problem
-        Objective and operating points.
     best
         Evaluation at the reference.
     terms
@@ -114,7 +90,8 @@ class Scale:
         self.problem, self.best = problem, best
         self.terms = [term for term in problem.objective if term.measure.is_load]
         self.value = value_of_loads(problem, best)
-        self._known: dict[tuple[str, Fidelity], float] = {}
+        self._loss = cache(lambda f: relative(self.largest_change(self.evaluation(f), best), self.value))
+        self._sampling_error = cache(lambda f: relative(self.sampling_error(self.evaluation(f)), self.value))
 
     @classmethod
     def of(cls, problem: Problem, engine: Engine | None = None) -> Scale:
@@ -164,36 +141,27 @@ class Scale:
         """
         if than is not None:
             return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
-        return self._cached_bound("loses", fidelity, lambda candidate: self.largest_change(candidate, self.best))
+        return self._loss(replace(fidelity, tolerance=None))
 
     def relative_sampling_error(self, fidelity: Fidelity) -> float:
         """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
-        return self._cached_bound("misses", fidelity, self.sampling_error)
-
-    def _cached_bound(self, name: str, fidelity: Fidelity, error: Callable[[Evaluation], float]) -> float:
-        key = name, replace(fidelity, tolerance=None)
-        if key not in self._known:
-            self._known[key] = relative(error(self.evaluation(fidelity)), self.value)
-        return self._known[key]
+        return self._sampling_error(replace(fidelity, tolerance=None))
 
     def error_of(self, evaluation: Evaluation) -> float:
-        """Return an upper bound of the relative error of an evaluation of the same design, as `error_bound` does."""
+        """Return an upper bound of the error of the objective of an evaluation of the same design (F6-F9).
+
+        The error is relative to the objective of this evaluation; infinite if only that objective is zero.
+        """
         value = value_of_loads(self.problem, evaluation)
-        bound = (
-            self.largest_change(evaluation, self.best)
-            + self.sampling_error(evaluation, self.best.samples)
-            + self.gas_step_error
-        )
+        sampling_error = self.sampling_error(evaluation, self.best.samples)
+        bound = self.largest_change(evaluation, self.best) + sampling_error + self.gas_step_error
         return relative(bound + ROUNDING * value, value)
 
     @cached_property
     def repeats(self) -> int:
         """Number of times that all measured signals repeat within the cycle, for any values of decisions."""
-        ratios = tuple(
-            as_order(abs(rotor.shaft.ratio))
-            for rotor in self.problem.engine.rotors
-            if rotor.unbalance != 0 or rotor.name in self.open_rotors
-        )
+        rotors = [r for r in self.problem.engine.rotors if r.unbalance != 0 or r.name in self.open_rotors]
+        ratios = tuple(as_order(abs(rotor.shaft.ratio)) for rotor in rotors)
         bases = [signal.repeat_order(ratios) for signal in self.exciting_signals]
         return int(min(bases) / self.problem.engine.cycle.base_order) if bases else 1
 
@@ -227,11 +195,9 @@ class Scale:
     @cached_property
     def open_rotor_modes(self) -> set[int]:
         """Numbers of the natural modes that open rotors can excite, 1 the lowest."""
-        return (
-            {mode + 1 for load in self.open_wrenches for mode in self.mounting.excited(load)}
-            if self.mounting
-            else set()
-        )
+        if self.mounting is None:
+            return set()
+        return {mode + 1 for load in self.open_wrenches for mode in self.mounting.excited(load)}
 
     @cached_property
     def excited_modes(self) -> tuple[int, ...]:
@@ -248,25 +214,6 @@ class Scale:
         return {
             mode: self.relative_loss(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()
         }
-
-
-def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> float:
-    """Return an upper bound of the relative error of the objective of an evaluation (F6-F9).
-
-    Parameters
-    ----------
-    problem
-        Objective and operating points.
-    evaluation
-        Evaluation of a design at any fidelity.
-    best
-        Evaluation of the same design at the reference.
-
-    Returns
-    -------
-    Bound over the objective of `evaluation`; infinite if only the objective is zero.
-    """
-    return Scale(problem, best).error_of(evaluation)
 
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:

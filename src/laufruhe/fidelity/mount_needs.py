@@ -15,9 +15,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.fidelity.automatic import Choice
-from laufruhe.fidelity.knob import OmittedPart
-from laufruhe.fidelity.knobs import KNOBS
-from laufruhe.fidelity.mount_knobs import mode_names
+from laufruhe.fidelity.knobs import KNOBS, OmittedPart, mode_names
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
@@ -48,7 +46,12 @@ def needs(problem: Problem) -> Choice:
             )
         else:
             left.append(OmittedPart(name, "nothing that is asked depends on it"))
-    left += _modes_of_the_sag(problem)
+    if {measure.channel for measure in problem.measures if measure.is_mounting} == {channels.SAG}:
+        mounting = mounting_in(problem.engine)
+        drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))
+        still = [k + 1 for k in range(len(drive)) if drive[k] <= SAME * drive.max()]
+        if still:
+            left.append(OmittedPart(f"{mode_names(mounting, still)} of the block", "weight does not move them"))
     # mount force components that are sampled for these measures, and by an evaluation with all loads
     count = problem.fidelity.samples * 3 * len(problem.engine.mounts) * len(problem.points)
     return Choice(problem.fidelity, 0.0, tuple(dependences), tuple(left), (count if parts else 0, count))
@@ -78,8 +81,13 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """
     if problem.engine.block is None:
         return
+
+    def stiffen(spring: Mount) -> Mount:
+        x, y, z = spring.stiffness
+        return replace(spring, stiffness=(MORE * x, y, z / MORE))
+
     block, mounts = mounting_in(problem.engine).block, problem.engine.mounts
-    stiff = tuple(mount.mapped(_turned_stiffer) for mount in mounts)
+    stiff = tuple(mount.mapped(stiffen) for mount in mounts)
     inertia: Any = tuple(tuple(MORE * value for value in row) for row in block.inertia)
     parts: list[tuple[str, dict[str, Any]]] = [
         ("stiffness and places of the mounts", {"mounts": stiff}),
@@ -92,18 +100,3 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
         parts.append(("loss and damping of the mounts", {"mounts": firm}))
     for name, changed in parts:
         yield name, replace(problem, engine=replace(problem.engine, **changed))
-
-
-def _turned_stiffer(spring: Mount) -> Mount:
-    x, y, z = spring.stiffness
-    return replace(spring, stiffness=(MORE * x, y, z / MORE))
-
-
-def _modes_of_the_sag(problem: Problem) -> list[OmittedPart]:
-    if {measure.channel for measure in problem.measures if measure.is_mounting} != {channels.SAG}:
-        return []
-    mounting = mounting_in(problem.engine)
-    drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))
-    still = [k + 1 for k in range(len(drive)) if drive[k] <= SAME * drive.max()]
-    what = f"{mode_names(mounting, still)} of the block"
-    return [OmittedPart(what, "weight does not move them")] if still else []

@@ -8,10 +8,9 @@ from functools import partial
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import (
-    error_bound,
+    Scale,
     gas_sampling_errors,
     measure_sampling_error,
-    reference,
     relative,
     sampling_error,
 )
@@ -54,7 +53,7 @@ def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
         return 0.0
     if problem.fidelity.tolerance is None:
         return sampling_error(problem, evaluation)
-    return error_bound(problem, evaluation, reference(problem, evaluation.engine))
+    return Scale.of(problem, evaluation.engine).error_of(evaluation)
 
 
 def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Result) -> Result:
@@ -79,17 +78,10 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
         if result.certificate is None:
             return result
         gas_error, interpolated = gas_sampling_errors(result.problem, result.final)
-    proof, objective, gas_error = (
-        result.certificate,
-        result.objective,
-        gas_error + interpolated,
-    )
+    proof, objective, gas_error = result.certificate, result.objective, gas_error + interpolated
     if objective is None or proof is None or gas_error <= problem.tolerance * value_of_loads(problem, result.final):
         return result
-    bound, zero_level = (
-        max(proof.lower_bound - gas_error, 0.0),
-        numerical_zero(result.problem, result.final.engine),
-    )
+    bound, zero_level = max(proof.lower_bound - gas_error, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=PROOF_RANK), lower_bound=bound,
         gap=gap_of(objective.value, bound, zero_level), method=f"{proof.method}, less the error of the gas pressure",

@@ -30,11 +30,11 @@ from laufruhe.solvers.conclusion import (
     nearest_record,
     quote_names,
     refine_objective,
+    smallest_conflict,
     violated_limits,
 )
-from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue
+from laufruhe.solvers.values import AttainableLimit, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 MIN_SECONDS = 10.0
@@ -63,16 +63,10 @@ def with_attainable_limits(
 
     Parameters
     ----------
-    result
-        Infeasible or failed result.
-    problem
-        Problem as the caller of `solve` gave it.
-    kinds
-        Kinds of the open numbers.
+    problem, kinds
+        Problem as the caller of `solve` gave it, and kinds of its open numbers.
     spent
         Duration of the solve [s].
-    solve
-        Solver of any problem.
     """
     names = _violated_names(result, problem)
     limits = [limit for limit in problem.limits if limit.name in names]
@@ -88,19 +82,40 @@ def with_attainable_limits(
         for k, limit in enumerate(limits):
             report_progress("attainable limits", k, len(limits))
             with search_scope(f"attainable value of '{limit.name}'"), limit_time(seconds_left() / (len(limits) - k)):
-                answers.append(_mark_time_limit(_find_attainable(limit, problem, kinds, result, solve)))
+                answer = _find_attainable(limit, problem, kinds, result, solve)
+                entry = answer.attainable
+                is_ended = is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL
+                answers.append(replace(answer, attainable=replace(entry, ended=is_ended)))
         if len(result.conflict) > 1 and any(answer.is_infeasible for answer in answers):
-            result = _shrink_conflict(result, problem, solve)
+            # limits that conflict on one star may be met on another
+
+            def excluded(subset: Sequence[Limit]) -> bool:
+                part = _subproblem(problem, problem.objective, tuple(subset))
+                return not is_time_over() and solve(part).status is Status.INFEASIBLE
+
+            conflicting = [limit for limit in problem.limits if limit.name in result.conflict]
+            conflict = smallest_conflict(conflicting, excluded)
+            if len(conflict) < len(conflicting):
+                result = replace(result, conflict=conflict, message=conflict_message(conflict))
     designs = [answer.result for answer in answers if answer.result is not None]
     for candidate in designs:
         if is_core and candidate.final.violation(problem.limits) <= FEASIBILITY_TOL:
             return _feasible_result(result, problem, candidate)
     names = _violated_names(result, problem)
     result = replace(result, reached=tuple(answer.attainable for answer in answers if answer.attainable.name in names))
-    if result.status is Status.FAILED and is_core:
-        result = _infeasible_by_bound(result, problem)
-    near = _nearest_design(result, problem, designs) if is_core and result.status is Status.FAILED else None
-    return replace(result, nearest=near)
+    if result.status is not Status.FAILED or not is_core:
+        return replace(result, nearest=None)
+    for entry in result.reached:
+        # the problem is infeasible if the lower bound of a limited measure exceeds its limit
+        if entry.side == "at most" and entry.bound > entry.limit * (1.0 + FEASIBILITY_TOL):
+            names = tuple(limit.name for limit in problem.limits)
+            others = " that meets the other limits" if len(names) > 1 else ""
+            message = f"no design exists: none{others} meets '{entry.name}'"
+            infeasible = infeasible_result(problem, result.initial, names, result.timing)
+            return replace(infeasible, message=message, reached=result.reached)
+    known = [result.nearest] if result.nearest is not None else []
+    known += [nearest_record(problem, r.final, r.decisions) for r in (*designs, result) if not r.final.resonance]
+    return replace(result, nearest=min(known, key=lambda candidate: candidate.violation, default=None))
 
 
 def _solve_with_fine_sampling(solve: Solve, problem: Problem, part: Problem) -> Result:
@@ -143,28 +158,25 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
             known = {entry.name: entry.value for entry in result.limits}
             value = math.nan if result.initial.resonance else known.get(limit.name, math.nan)
             return _Answer(replace(entry, value=value, why="no open number changes it"))
-        limits = (
-            other_limits
-            if math.isinf(other_side.minimum) and math.isinf(other_side.maximum)
-            else (*other_limits, other_side)
-        )
+        is_open = math.isinf(other_side.minimum) and math.isinf(other_side.maximum)
+        limits = other_limits if is_open else (*other_limits, other_side)
         try:
-            if measure.channel.minimised and side == "at most":
-                answer = _minimise(entry, _subproblem(problem, (Term(measure),), limits), solve)
-            else:
+            if not measure.channel.minimised or side == "at least":
                 answer = _bisect(entry, one_side, problem, limits, result.status, solve)
+            else:
+                optimum = solve(_subproblem(problem, (Term(measure),), limits))
+                if optimum.status.has_design and optimum.objective is not None:
+                    proof, value = optimum.certificate, optimum.objective.value
+                    bound, kind = (proof.lower_bound, proof.kind) if proof else (math.nan, Proof.NONE)
+                    attainable = replace(entry, value=value, bound=bound, proof=kind, decisions=optimum.decisions)
+                    answer = _Answer(attainable, optimum)
+                else:
+                    answer = _answer_without_design(entry, optimum)
         except LaufruheError as error:
             return _Answer(replace(entry, why=str(error)))
         if not answer.is_infeasible:
             break
     return answer
-
-
-def _mark_time_limit(answer: _Answer) -> _Answer:
-    entry = answer.attainable
-    return replace(
-        answer, attainable=replace(entry, ended=is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL)
-    )
 
 
 def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
@@ -177,24 +189,6 @@ def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Lim
     return part.changed(decisions=decisions)
 
 
-def _minimise(entry: AttainableLimit, part: Problem, solve: Solve) -> _Answer:
-    """Return the attainable value of a measure by minimising it under the other limits."""
-    result = solve(part)
-    if not result.status.has_design or result.objective is None:
-        return _answer_without_design(entry, result)
-    proof = result.certificate
-    return _Answer(
-        replace(
-            entry,
-            value=result.objective.value,
-            bound=proof.lower_bound if proof else math.nan,
-            proof=proof.kind if proof else Proof.NONE,
-            decisions=result.decisions,
-        ),
-        result,
-    )
-
-
 def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
     # the other limits have no design either
     if result.status is Status.INFEASIBLE:
@@ -202,18 +196,6 @@ def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
         reason = f"the other limits cannot be met together either{names and ': no design meets '}{names}"
         return _Answer(replace(entry, why=reason), is_infeasible=True)
     return _Answer(replace(entry, why=LONG if is_time_over() else "no design was found that meets the other limits"))
-
-
-def _shrink_conflict(result: Result, problem: Problem, solve: Solve) -> Result:
-    # shrink the conflict: limits that conflict on one star may be met on another
-    limits = [limit for limit in problem.limits if limit.name in result.conflict]
-
-    def excluded(subset: Sequence[Limit]) -> bool:
-        part = _subproblem(problem, problem.objective, tuple(subset))
-        return not is_time_over() and solve(part).status is Status.INFEASIBLE
-
-    names = smallest_conflict(limits, excluded)
-    return result if len(names) == len(limits) else replace(result, conflict=names, message=conflict_message(names))
 
 
 def _bisect(
@@ -224,7 +206,12 @@ def _bisect(
     unlimited = solve(_subproblem(problem, problem.objective, others))
     if not unlimited.status.has_design:
         return _answer_without_design(entry, unlimited)
-    nearest, value = unlimited, _extreme_value(unlimited, limit, is_maximum)
+
+    def extreme(result: Result) -> float:
+        values = result.final.values(limit.measure)
+        return (max if is_maximum else min)(values, default=limit.maximum if is_maximum else limit.minimum)
+
+    nearest, value = unlimited, extreme(unlimited)
     unreached, bound = entry.limit, entry.limit if status is Status.INFEASIBLE else math.nan
     for _ in until_time_limit(range(HALVINGS)):
         if abs(value - unreached) <= CLOSE * abs(entry.limit):
@@ -233,29 +220,21 @@ def _bisect(
         bisected = replace(limit, maximum=middle) if is_maximum else replace(limit, minimum=middle)
         candidate = solve(_subproblem(problem, problem.objective, (*others, bisected)))
         if candidate.status.has_design:
-            nearest, value = candidate, _extreme_value(candidate, limit, is_maximum)
+            nearest, value = candidate, extreme(candidate)
         else:
             unreached, bound = middle, middle if candidate.status is Status.INFEASIBLE else bound
     proven = Proof.WITHIN_GAP if bound == unreached else Proof.LOCAL
     return _Answer(replace(entry, value=value, bound=bound, proof=proven, decisions=nearest.decisions), nearest)
 
 
-def _extreme_value(result: Result, limit: Limit, is_maximum: bool) -> float:
-    values = result.final.values(limit.measure)
-    return (max if is_maximum else min)(values, default=limit.maximum if is_maximum else limit.minimum)
-
-
 def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Result:
     """Return a feasible design that the search found, with the lower bound of the original objective."""
-    bound, zero_level = (
-        result.certificate.lower_bound if result.certificate else 0.0,
-        numerical_zero(problem, candidate.final.engine),
-    )
-    reading = refine_objective(problem, candidate.final, objective_value(problem, candidate.final), bound, zero_level)
-    candidate, value = replace(candidate, final=reading.evaluation), reading.value
+    bound = result.certificate.lower_bound if result.certificate else 0.0
+    zero_level, value = numerical_zero(problem, candidate.final.engine), objective_value(problem, candidate.final)
+    final, value, doubt = refine_objective(problem, candidate.final, value, bound, zero_level)
     method = f"found while {candidate.problem.objective_name} was minimised"
     proof = make_certificate(
-        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, method, reading.doubt
+        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, method, doubt
     )
     restored = candidate.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
@@ -264,29 +243,9 @@ def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Res
         status=Status.OPTIMAL if proof.kind is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, result.initial)),
         certificate=proof,
-        decisions=tuple(
-            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in candidate.decisions
-        ),
-        limits=limit_values(problem, candidate.final, {}, value),
+        decisions=tuple(d.without_price() for d in candidate.decisions),
+        limits=limit_values(problem, final, {}, value),
         initial=result.initial,
-        error=partial(objective_error, restored, candidate.final),
+        final=final,
+        error=partial(objective_error, restored, final),
     )
-
-
-def _infeasible_by_bound(result: Result, problem: Problem) -> Result:
-    # the problem is infeasible if the lower bound of a limited measure exceeds its limit
-    for entry in result.reached:
-        if entry.side == "at most" and entry.bound > entry.limit * (1.0 + FEASIBILITY_TOL):
-            names = tuple(limit.name for limit in problem.limits)
-            others = " that meets the other limits" if len(names) > 1 else ""
-            infeasible = infeasible_result(problem, result.initial, names, result.timing)
-            message = f"no design exists: none{others} meets '{entry.name}'"
-            return replace(infeasible, message=message, reached=result.reached)
-    return result
-
-
-def _nearest_design(result: Result, problem: Problem, designs: Sequence[Result]) -> NearestDesign | None:
-    # the design with the smallest violation
-    known = [result.nearest] if result.nearest is not None else []
-    known += [nearest_record(problem, r.final, r.decisions) for r in (*designs, result) if not r.final.resonance]
-    return min(known, key=lambda candidate: candidate.violation, default=None)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import cmath
 import math
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import TypeVar
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import BoundError, ModelError
 from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
@@ -21,7 +22,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate
+from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, gap_of, make_certificate, unproven_certificate
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers.accuracy import objective_error
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
@@ -29,6 +30,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import why_no_order
 from laufruhe.solvers.values import DecisionValue, LimitValue, NearestDesign, ObjectiveValue
 
+T = TypeVar("T")
 FEASIBLE = 1e-6
 """Relative violation of a limit that counts as zero."""
 FEASIBILITY_TOL = 10.0 * FEASIBLE
@@ -44,6 +46,9 @@ _ACTIVE_PRICE = 1e-3
 STEP, UNCHANGED = 1e-3, 1e-9
 """Step of a decision relative to its scale, and relative change of a measure that counts as none."""
 
+_UNPROVEN = {Status.OPTIMAL: Status.FEASIBLE, Status.INFEASIBLE: Status.FAILED}
+"""Status without proof, by the proven one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Design:
@@ -53,12 +58,8 @@ class Design:
     ----------
     problem
         Problem with the star and the firing order of the design.
-    values
-        Values of the decisions [SI].
-    value
-        Objective.
-    violation
-        Largest relative violation of a limit.
+    value, violation
+        Objective [SI], and largest relative violation of a limit.
     """
 
     problem: Problem
@@ -66,6 +67,12 @@ class Design:
     evaluation: Evaluation
     value: float
     violation: float
+
+    @classmethod
+    def of(cls, problem: Problem, values: Sequence[Value], evaluation: Evaluation) -> Design:
+        """Return a design from the values of all decisions and its evaluation."""
+        value = objective_value(problem, evaluation)
+        return cls(problem, tuple(values), evaluation, value, evaluation.violation(problem.limits))
 
     @property
     def rank(self) -> tuple[bool, float]:
@@ -101,106 +108,96 @@ class ProofData:
 
 
 def evaluate_design(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
-    """Evaluate a design by the exact model.
-
-    Parameters
-    ----------
-    values
-        Value of every decision of the problem [SI].
-    samples
-        Samples per cycle; those of the fidelity if None.
+    """Evaluate a design by the exact model from the value of every decision [SI].
 
     Raises
     ------
     ModelError
         If the design has no finite loads, for example at an undamped resonance.
     """
-    fixed = problem.fixed_at(values)
-    evaluation = evaluate(fixed, samples=samples)
-    value = objective_value(problem, evaluation)
-    return Design(problem, tuple(values), evaluation, value, evaluation.violation(problem.limits))
+    return Design.of(problem, values, evaluate(problem.fixed_at(values), samples=samples))
 
 
 def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
     """Return the initial design from its evaluation; None at an undamped resonance, where loads are infinite."""
-    if initial.resonance:
-        return None
-    value = objective_value(problem, initial)
-    return Design(problem, problem.start, initial, value, initial.violation(problem.limits))
-
-
-def better_design(design: Design, other: Design | None) -> Design:
-    """Return the design with the smaller violation of limits; at equal violation, with the smaller objective."""
-    if other is None:
-        return design
-    return min((design, other), key=lambda candidate: (max(candidate.violation, FEASIBILITY_TOL), candidate.value))
-
-
-@dataclass(frozen=True, eq=False)
-class SampledObjective:
-    """Objective of a design at enough samples for a comparison with a lower bound.
-
-    Attributes
-    ----------
-    evaluation
-        Evaluation at the samples of `value`.
-    value
-        Objective.
-    doubt
-        Largest error by which `value` may be too low: from sampling, and from violations within the tolerance.
-    """
-
-    evaluation: Evaluation
-    value: float
-    doubt: float
+    return None if initial.resonance else Design.of(problem, problem.start, initial)
 
 
 def refine_objective(
     problem: Problem, evaluation: Evaluation, value: float, bound: float, zero_level: float,
     prices: Mapping[Side, Price] | None = None,
-) -> SampledObjective:  # fmt: skip
-    """Return the objective of a design, with more samples while a lower bound exceeds it (P7).
+) -> tuple[Evaluation, float, float]:  # fmt: skip
+    """Return evaluation and objective of a design with more samples while a lower bound exceeds the objective (P7).
 
     A bound holds for the mean over the cycle, and a mean of few samples may be smaller than that.
 
     Parameters
     ----------
-    evaluation, value
-        Evaluation of the design and its objective.
-    bound
-        Lower bound of the objective.
     zero_level
         Value of the objective that is numerically zero.
     prices
         Shadow prices of limits, which value violations within the tolerance.
+
+    Returns
+    -------
+    Evaluation, its objective, and the largest error by which this objective may be too low: from sampling, and from
+    violations within the tolerance. The error is infinite if the design violates limits at many samples.
     """
     for _ in range(MAX_REFINEMENTS):
         if not is_over(bound, value, zero_level) or not any(is_sampled(term.measure) for term in problem.objective):
             break
         evaluation = with_fine_sampling(evaluation)
         value = objective_value(problem, evaluation)
-    return SampledObjective(
-        evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, zero_level) else 0.0
-    )
+    if not is_over(bound, value, zero_level):
+        return evaluation, value, 0.0
+    fine = with_fine_sampling(evaluation) if problem.limits else evaluation
+    if fine.violation(problem.limits) > FEASIBLE:
+        return evaluation, value, math.inf
+    doubt = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in problem.objective)
+    for (limit, side), price in (prices or {}).items():
+        standing = fine.check_limit(limit)
+        if standing.side == side and price.relaxed > 0.0:
+            doubt += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
+    return evaluation, value, doubt
 
 
 def refine_result(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
     """Return a result with more samples while a bound exceeds its objective, and the error of that objective."""
     if result.objective is None:
         return result, 0.0
-    read = refine_objective(result.problem, result.final, result.objective.value, bound, zero_level, result.prices)
-    return replace(result, final=read.evaluation, objective=replace(result.objective, value=read.value)), read.doubt
+    final, value, doubt = refine_objective(
+        result.problem, result.final, result.objective.value, bound, zero_level, result.prices
+    )
+    return replace(result, final=final, objective=replace(result.objective, value=value)), doubt
+
+
+def without_proof(result: Result, error: BoundError) -> Result:
+    """Return a result without any bound; its message states the contradiction between bound and design."""
+    value = result.objective.value if result.objective is not None else 0.0
+    certificate = result.certificate
+    if certificate is not None:
+        certificate = unproven_certificate(value, certificate.kkt_residual, certificate.method)
+    reason = f"its proof is withheld: {error}; please report it, with the problem file"
+    phasing = result.phasing
+    if phasing is not None:
+        ranking = tuple(replace(star, lower_bound=0.0, proven=False) for star in phasing.ranking)
+        trade = tuple(replace(point, lower_bound=0.0) for point in phasing.trade)
+        phasing = replace(phasing, ranking=ranking, trade=trade)
+    return replace(
+        result,
+        status=_UNPROVEN.get(result.status, result.status),
+        certificate=certificate,
+        message="; ".join(filter(None, (result.message, reason))),
+        conflict=(),
+        ranks=tuple(replace(rank, lower_bound=0.0, gap=1.0, proof=Proof.NONE) for rank in result.ranks),
+        phasing=phasing,
+    )
 
 
 def witness_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
-    """Return a design as a witness of lower bounds; None if its violation is larger than `violation`.
+    """Return a design as a witness of lower bounds; None if its relative violation is larger than `violation`.
 
-    Parameters
-    ----------
-    place
-        Coordinates of the design in the boxes of the bound, shape (n,).
-    violation
-        Largest relative violation of a witness.
+    Its coordinates in the boxes of the bound are `place`, shape (n,).
     """
     if design.violation > violation:
         return None
@@ -208,8 +205,8 @@ def witness_of(design: Design, place: Array, violation: float = FEASIBLE) -> Wit
 
     def read() -> float:
         zero_level = numerical_zero(problem, evaluation.engine)
-        reading = refine_objective(problem, evaluation, design.value, math.inf, zero_level)
-        return reading.value * (1.0 + VIOLATION_PENALTY * max(design.violation, 0.0)) + reading.doubt + zero_level
+        _, value, doubt = refine_objective(problem, evaluation, design.value, math.inf, zero_level)
+        return value * (1.0 + VIOLATION_PENALTY * max(design.violation, 0.0)) + doubt + zero_level
 
     return Witness(place, design.value, read)
 
@@ -219,60 +216,36 @@ def is_sampled(measure: Measure) -> bool:
     return measure.is_load and not measure.norm.is_euclidean
 
 
-def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
-    # P7: possible underestimate of the objective; infinite if the design violates limits at many samples
-    fine = with_fine_sampling(evaluation) if problem.limits else evaluation
-    if fine.violation(problem.limits) > FEASIBLE:
-        return math.inf
-    error = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in problem.objective)
-    for (limit, side), price in (prices or {}).items():
-        standing = fine.check_limit(limit)
-        if standing.side == side and price.relaxed > 0.0:
-            error += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
-    return error
-
-
 def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: dict[str, float]) -> Result:
-    """Return the result of a design, or of the initial design if that is better.
-
-    Parameters
-    ----------
-    initial
-        Evaluation of the initial design.
-    proof
-        Lower bound and shadow prices from the method.
-    timing
-        Seconds by stage of the solve.
-    """
+    """Return the result of a design, or of the initial design if that is better; `timing` has seconds by stage."""
     problem = design.problem
-    initial_value = objective_value(problem, initial)
-    baseline = Design(problem, problem.start, initial, initial_value, initial.violation(problem.limits))
+    baseline = Design.of(problem, problem.start, initial)
     design = min(design, baseline, key=lambda candidate: candidate.rank)
     is_feasible = design.violation <= FEASIBILITY_TOL
     zero_level = numerical_zero(problem, design.evaluation.engine)
+    message = f"the initial design has no finite loads: {initial.resonance}" if initial.resonance else ""
     if is_feasible:
-        reading = refine_objective(problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices)
-        design = replace(design, evaluation=reading.evaluation, value=reading.value)
+        evaluation, value, doubt = refine_objective(
+            problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices
+        )
+        design = replace(design, evaluation=evaluation, value=value)
         certificate = make_certificate(
-            design.value, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method,
-            reading.doubt,
-        )  # fmt: skip
+            value, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method, doubt
+        )
     else:
         # an infeasible design proves nothing
         bound = max(proof.bound, 0.0)
         gap = gap_of(design.value, bound, zero_level)
         certificate = Certificate(Proof.NONE, bound, gap, proof.kkt_residual, proof.method)
+        message = violation_message(problem, design.evaluation)
     # prices below the gap are rounding errors
     price_floor = max(_PRICE_FLOOR, min(certificate.gap, problem.tolerance))
     limits = limit_values(problem, design.evaluation, proof.prices, design.value, price_floor)
     proven = certificate.kind is Proof.GLOBAL
-    message = f"the initial design has no finite loads: {initial.resonance}" if initial.resonance else ""
-    if not is_feasible:
-        message = violation_message(problem, design.evaluation)
     return Result(
         problem=problem,
         status=Status.FAILED if not is_feasible else Status.OPTIMAL if proven else Status.FEASIBLE,
-        objective=ObjectiveValue.of(problem, design.value, initial_value),
+        objective=ObjectiveValue.of(problem, design.value, baseline.value),
         certificate=certificate,
         decisions=priced_decisions(design, proof.bounds, price_floor),
         limits=limits,
@@ -293,10 +266,7 @@ def violation_message(problem: Problem, evaluation: Evaluation) -> str:
 def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
     """Evaluate the initial design without a change; infeasible if its throws have no permitted firing order.
 
-    Parameters
-    ----------
-    allow_resonance
-        True if a search starts from the design: it may then stand on an undamped resonance.
+    If a search starts from it, the design may stand on an undamped resonance (`allow_resonance`).
     """
     started = time.perf_counter()
     problem = problem.drawing
@@ -326,6 +296,21 @@ def conflict_message(conflict: Sequence[str]) -> str:
     names = quote_names(conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return f"no design exists: {names} {verb}"
+
+
+def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
+    """Return a smallest subset for which `conflicts` is still True: without any of its elements it is False."""
+    subset = list(conflicting)
+    for element in tuple(subset):
+        reduced = [other for other in subset if other is not element]
+        if conflicts(reduced):
+            subset = reduced
+    return subset
+
+
+def smallest_conflict(limits: Sequence[Limit], conflicts: Callable[[Sequence[Limit]], bool]) -> tuple[str, ...]:
+    """Return the names of a smallest set of limits that no design meets together."""
+    return tuple(limit.name for limit in smallest_conflicting(limits, conflicts))
 
 
 def infeasible_result(
@@ -361,17 +346,10 @@ def nearest_record(problem: Problem, design: Evaluation, decisions: tuple[Decisi
     """Return the record of an infeasible design: its decisions, and the limit with the largest violation."""
     limit = max(problem.limits, key=lambda limit: design.check_limit(limit).violation)
     standing = design.check_limit(limit)
-    names = violated_limits(problem.limits, design)
     return NearestDesign(
-        limit.name,
-        standing.side,
-        standing.edge,
-        limit.measure.unit,
-        standing.value,
-        standing.violation,
-        names,
-        decisions,
-    )
+        limit.name, standing.side, standing.edge, limit.measure.unit, standing.value, standing.violation,
+        violated_limits(problem.limits, design), decisions,
+    )  # fmt: skip
 
 
 def limit_values(
@@ -381,14 +359,12 @@ def limit_values(
     value: float = 0.0,
     price_floor: float = _PRICE_FLOOR,
 ) -> tuple[LimitValue, ...]:
-    """Return value and shadow price of each limit at a design (E15).
+    """Return value and shadow price of each limit at a design with an objective `value` (E15).
 
     Parameters
     ----------
     prices
         Known shadow prices by side of a limit; None if nothing is open.
-    value
-        Objective.
     price_floor
         Share of the objective below which a price counts as zero.
     """
@@ -396,13 +372,9 @@ def limit_values(
 
 
 def _limit_value(
-    problem: Problem,
-    limit: Limit,
-    evaluation: Evaluation,
-    prices: Mapping[Side, Price] | None,
-    value: float,
+    problem: Problem, limit: Limit, evaluation: Evaluation, prices: Mapping[Side, Price] | None, value: float,
     price_floor: float = _PRICE_FLOOR,
-) -> LimitValue:
+) -> LimitValue:  # fmt: skip
     standing = evaluation.check_limit(limit)
     if prices is None:
         # no decision can move
@@ -415,21 +387,13 @@ def _limit_value(
         price = prices.get((limit, standing.side), Price.both(math.nan))
     is_priced = price.relaxed * abs(standing.edge) > _ACTIVE_PRICE * value and standing.violation >= -problem.tolerance
     active = bool(standing.violation >= -ACTIVE or is_priced)
-    price = (
-        price.floored(price_floor * value / abs(standing.edge) if standing.edge else 0.0) if active else Price(0.0, 0.0)
-    )
+    minimum = price_floor * value / abs(standing.edge) if standing.edge else 0.0
+    price = price.floored(minimum) if active else Price(0.0, 0.0)
     error = relative(measure_sampling_error(limit.measure, evaluation), standing.value)
     return LimitValue(
-        limit.name,
-        standing.value,
-        standing.edge,
-        limit.measure.unit,
-        active,
-        price.relaxed,
-        standing.side,
-        error,
+        limit.name, standing.value, standing.edge, limit.measure.unit, active, price.relaxed, standing.side, error,
         price.other,
-    )
+    )  # fmt: skip
 
 
 def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
@@ -492,28 +456,20 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
 def priced_decisions(
     design: Design, bounds: Mapping[str, Price] | None = None, price_floor: float = 0.0
 ) -> tuple[DecisionValue, ...]:
-    """Return the decision values of a design, with shadow prices of active bounds.
+    """Return the decision values of a design, with shadow prices of active bounds by the name of the size or angle.
 
-    Parameters
-    ----------
-    bounds
-        Shadow prices by the name of the size or angle.
-    price_floor
-        Share of the objective below which a price counts as zero.
+    A price counts as zero below the share `price_floor` of the objective.
     """
     minimum = price_floor * design.value
-    return tuple(
-        _priced(entry, (bounds or {}).get(entry.name), minimum)
-        for decision, value in zip(design.problem.decisions, design.values, strict=True)
-        for entry in decision_values(decision, value)
-    )
-
-
-def _priced(entry: DecisionValue, price: Price | None, minimum: float) -> DecisionValue:
-    if price is None or not entry.at_bound:
-        return entry
-    floored = price.floored(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
-    return replace(entry, shadow_price=floored.relaxed, tightening_price=floored.other)
+    entries = []
+    for decision, value in zip(design.problem.decisions, design.values, strict=True):
+        for entry in decision_values(decision, value):
+            price = (bounds or {}).get(entry.name)
+            if price is not None and entry.at_bound:
+                price = price.floored(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
+                entry = replace(entry, shadow_price=price.relaxed, tightening_price=price.other)
+            entries.append(entry)
+    return tuple(entries)
 
 
 def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ...]:

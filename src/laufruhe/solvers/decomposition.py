@@ -36,14 +36,14 @@ def _groups(problem: Problem) -> list[Kinds]:
     return [*(frozenset({kind}) for kind in alone), kinds.difference(alone)]
 
 
+def _groups_of(measure: Measure, problem: Problem) -> list[Kinds]:
+    return [group for group in _groups(problem) if group and depends(measure.channel, group, problem)]
+
+
 def is_separable(problem: Problem) -> bool:
     """Return True if flywheel or crankshaft are open with other numbers, and each measure depends on one group."""
-    groups = [group for group in _groups(problem) if group]
-    return len(groups) > 1 and all(len(_groups_of(measure, groups, problem)) <= 1 for measure in problem.measures)
-
-
-def _groups_of(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kinds]:
-    return [group for group in groups if group and depends(measure.channel, group, problem)]
+    is_divided = sum(map(bool, _groups(problem))) > 1
+    return is_divided and all(len(_groups_of(measure, problem)) <= 1 for measure in problem.measures)
 
 
 def solve_decomposed(problem: Problem, solve: Solve) -> Result:
@@ -55,7 +55,21 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
         If the objective depends on no decision of a group.
     """
     groups = _groups(problem)
-    by_group = {group: solve(part) for group, part in _subproblems(problem, groups).items()}
+    # measures that depend on no group belong to the last one
+    group_of = {measure: (_groups_of(measure, problem) or groups[-1:])[0] for measure in problem.measures}
+    parts = {
+        group: problem.changed(
+            decisions=tuple(d for d in problem.decisions if d.kind in group),
+            objective=tuple(term for term in problem.objective if group_of[term.measure] == group),
+            limits=tuple(limit for limit in problem.limits if group_of[limit.measure] == group),
+        )
+        for group in groups
+    }
+    for part in parts.values():
+        if part.decisions and not part.objective:
+            name = part.decisions[0].name.split(".")[0]
+            raise ModelError(f"{name} is open, but no objective term depends on it; add one, or fix it")
+    by_group = {group: solve(part) for group, part in parts.items() if part.decisions or part.objective or part.limits}
     results = list(by_group.values())
     for result in results:
         if result.status is Status.INFEASIBLE:
@@ -72,9 +86,11 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
     }
     decisions = {entry.name: entry for result in results for entry in result.decisions}
     value, initial = (sum(getattr(r.objective, key) for r in results if r.objective) for key in ("value", "initial"))
+    proven = all(r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in results)
+    status = Status.OPTIMAL if proven else Status.FEASIBLE
     return Result(
         problem=problem,
-        status=next((r.status for r in results if r.status is Status.FAILED), _status(results)),
+        status=Status.FAILED if any(r.status is Status.FAILED for r in results) else status,
         objective=ObjectiveValue.of(problem, value, initial),
         certificate=_joint_certificate(results, value),
         decisions=tuple(decisions.values()),
@@ -85,33 +101,6 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
         error=partial(largest_error, results),
         timing={key: took for r in results for key, took in r.timing.items()},
     )
-
-
-def _subproblems(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
-    parts = {group: _subproblem(problem, groups, group) for group in groups}
-    for part in parts.values():
-        if part.decisions and not part.objective:
-            what = part.decisions[0].name.split(".")[0]
-            raise ModelError(f"{what} is open, but no objective term depends on it; add one, or fix it")
-    return {group: part for group, part in parts.items() if part.decisions or part.objective or part.limits}
-
-
-def _subproblem(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
-    # measures that depend on no group belong to the last one
-
-    def belongs(measure: Measure) -> bool:
-        return (_groups_of(measure, groups, problem) or [groups[-1]])[0] == group
-
-    return problem.changed(
-        decisions=tuple(d for d in problem.decisions if d.kind in group),
-        objective=tuple(term for term in problem.objective if belongs(term.measure)),
-        limits=tuple(limit for limit in problem.limits if belongs(limit.measure)),
-    )
-
-
-def _status(results: list[Result]) -> Status:
-    proven = (r.certificate is None or r.certificate.kind is Proof.GLOBAL for r in results)
-    return Status.OPTIMAL if all(proven) else Status.FEASIBLE
 
 
 def _joint_certificate(results: list[Result], value: float) -> Certificate:

@@ -46,9 +46,7 @@ def solve_by_local_programs(
     Parameters
     ----------
     decide
-        Solver of a problem in which some decisions are fixed.
-    by_cones
-        Return True if a cone program solves a problem.
+        Solver of a problem in which some decisions are fixed; by a cone program if `by_cones` is True.
     starts
         Further values of all decisions from which local programs start.
     """

@@ -17,12 +17,13 @@ from dataclasses import replace
 from functools import partial
 
 from laufruhe.numerics.budget import is_time_over
-from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_sampling
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.evaluation import objective_value, with_fine_sampling
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import PROOF_RANK, Certificate, Proof
+from laufruhe.prove.certificate import PROOF_RANK, Proof
 from laufruhe.solvers.accuracy import largest_error
+from laufruhe.solvers.conclusion import is_sampled
 from laufruhe.solvers.cones.equal_designs import equal_designs
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import DecisionRange, ObjectiveValue, RankValue
@@ -47,23 +48,14 @@ def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
                 return result
             break
         stages.append(result)
-        limit = Limit(
-            rank.terms[0].measure.name,
-            rank.terms[0].measure,
-            _limit_on(result, max(rank.within, _smallest_slack(rank.terms[0].measure))),
-        )
+        measure, value = rank.terms[0].measure, result.objective.value
+        slack = max(rank.within, SAMPLED if is_sampled(measure) else CLOSE)
+        is_zero = value <= numerical_zero(result.problem, result.final.engine)
+        maximum = 0.0 if is_zero else value / result.problem.objective[0].weight * (1.0 + slack)
+        limit = Limit(measure.name, measure, maximum)
         rank_limits.append(limit)
         equal_by_rank.append(equal_designs(result, limit) if len(rank.terms) == 1 else ())
     return _joint_result(problem, stages, rank_limits, equal_by_rank)
-
-
-def _limit_on(result: Result, slack: float) -> float:
-    # limit on this objective for later ranks; zero if it is numerically zero
-    value = result.objective.value if result.objective else math.inf
-    weight = result.problem.objective[0].weight
-    if value <= numerical_zero(result.problem, result.final.engine):
-        return 0.0
-    return value / weight * (1.0 + slack)
 
 
 def _solve_stage(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], solve: Solve) -> Result:
@@ -76,22 +68,32 @@ def _solve_stage(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Li
     return result
 
 
-def _smallest_slack(measure: Measure) -> float:
-    return SAMPLED if measure.is_load and not measure.norm.is_euclidean else CLOSE
-
-
 def _joint_result(
     problem: Problem, stages: list[Result], rank_limits: list[Limit], equal_by_rank: list[tuple[DecisionRange, ...]]
 ) -> Result:
     """Return the design of the last rank, with the proof of every rank."""
-    last = stages[-1]
+    first, last = stages[0], stages[-1]
     count = len(problem.limits)
     # ranks may have different samples, so the final design is evaluated at fine sampling (P7)
     final = with_fine_sampling(last.final)
-    ranks = tuple(
-        _rank_value(stage, final, limit, last, k, count, designs)
-        for k, (stage, limit, designs) in enumerate(zip(stages, rank_limits, equal_by_rank, strict=True))
-    )
+    ranks = []
+    for k, (stage, limit, designs) in enumerate(zip(stages, rank_limits, equal_by_rank, strict=True)):
+        objective, certificate, is_last = stage.objective, stage.certificate, stage is last
+        assert objective is not None
+        rank = RankValue(
+            name=objective.name,
+            unit=objective.unit,
+            initial=objective.initial,
+            minimum=objective.value,
+            lower_bound=certificate.lower_bound if certificate else 0.0,
+            gap=certificate.gap if certificate else math.inf,
+            proof=certificate.kind if certificate else Proof.NONE,
+            final=objective.value if is_last else objective_value(stage.problem, final),
+            limit=None if is_last else limit.maximum,
+            price=math.nan if is_last else last.limits[count + k].shadow_price,
+            designs=designs,
+        )
+        ranks.append(rank)
     message = last.message
     if len(stages) < len(problem.ranks):
         name = problem.ranks[len(stages)].terms[0].measure.name
@@ -104,7 +106,10 @@ def _joint_result(
         message = f"objective {len(stages) + 1}, {name}, {reason}"
     weakest = min((rank.proof for rank in ranks), key=PROOF_RANK)
     is_complete = not message and all(stage.status is Status.OPTIMAL for stage in stages)
-    first = stages[0]
+    certificate = first.certificate
+    if certificate is not None:
+        method = f"{certificate.method}; then {len(ranks) - 1} further objectives in order"
+        certificate = replace(certificate, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
     problem_of_result = last.problem.changed(objective=problem.objective, ranks=problem.ranks, limits=problem.limits)
     # shadow prices of the last rank are not those of the first, which the report shows
     return replace(
@@ -112,55 +117,14 @@ def _joint_result(
         problem=problem_of_result,
         status=Status.OPTIMAL if is_complete and weakest is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, ranks[0].final, first.objective.initial if first.objective else math.nan),
-        certificate=_certificate(first, ranks, weakest),
-        decisions=tuple(
-            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in last.decisions
-        ),
+        certificate=certificate,
+        decisions=tuple(d.without_price() for d in last.decisions),
         limits=tuple(
             replace(x, shadow_price=math.nan if x.active else 0.0, tightening_price=None) for x in last.limits[:count]
         ),
         initial=replace(first.initial, samples=last.final.samples),
         message=message,
         error=partial(largest_error, stages),
-        timing=_total_timing(stages),
-        ranks=ranks,
+        timing={name: sum(stage.timing.get(name, 0.0) for stage in stages) for x in stages for name in x.timing},
+        ranks=tuple(ranks),
     )
-
-
-def _rank_value(
-    stage: Result, final: Evaluation, limit: Limit, last: Result, k: int, count: int, designs: tuple[DecisionRange, ...]
-) -> RankValue:
-    """Return the record of one rank: its optimum, and its value at the final design."""
-    assert stage.objective is not None
-    certificate = stage.certificate
-    is_last = stage is last
-    return RankValue(
-        name=stage.objective.name,
-        unit=stage.objective.unit,
-        initial=stage.objective.initial,
-        minimum=stage.objective.value,
-        lower_bound=certificate.lower_bound if certificate else 0.0,
-        gap=certificate.gap if certificate else math.inf,
-        proof=certificate.kind if certificate else Proof.NONE,
-        final=stage.objective.value if is_last else objective_value(stage.problem, final),
-        limit=None if is_last else limit.maximum,
-        price=math.nan if is_last else last.limits[count + k].shadow_price,
-        designs=designs,
-    )
-
-
-def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) -> Certificate | None:
-    # P12
-    certificate = first.certificate
-    if certificate is None:
-        return None
-    method = f"{certificate.method}; then {len(ranks) - 1} further objectives in order"
-    return replace(certificate, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
-
-
-def _total_timing(stages: list[Result]) -> dict[str, float]:
-    total: dict[str, float] = {}
-    for stage in stages:
-        for name, took in stage.timing.items():
-            total[name] = total.get(name, 0.0) + took
-    return total

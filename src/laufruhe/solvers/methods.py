@@ -12,7 +12,6 @@ from functools import cache, partial
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import is_time_over, limit_time
-from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
@@ -32,7 +31,11 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.solvers.attainable_limits import with_attainable_limits
+from laufruhe.solvers.boxes.flywheel import solve_flywheel
+from laufruhe.solvers.boxes.leads import solve_leads
 from laufruhe.solvers.boxes.place_boxes import without_places
+from laufruhe.solvers.boxes.places import solve_places, solve_places_with
+from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     ProofData,
@@ -42,17 +45,20 @@ from laufruhe.solvers.conclusion import (
     infeasible_result,
     violated_limits,
     with_constant_limits,
+    without_proof,
 )
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_polished
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
-from laufruhe.solvers.failed_proof import without_proof
+from laufruhe.solvers.general import solve_by_local_programs
 from laufruhe.solvers.lexicographic import solve_lexicographic
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
+from laufruhe.solvers.stars.even_search import refuse_long
+from laufruhe.solvers.stars.phasing_solver import solve_phasing
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
 from laufruhe.solvers.walk import check_by_walk
 
@@ -69,8 +75,6 @@ def solve_separable(problem: Problem) -> Result:
 
 def solve_with_places(problem: Problem) -> Result:
     """Return the best positions of shafts, with a bound by the method that decides all other numbers."""
-    from laufruhe.solvers.boxes.places import solve_places_with
-
     method = _method(without_places(problem))
     # `Method.solve` refines the fidelity, so the inner solver does not
     return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
@@ -82,45 +86,7 @@ def _closes_without_places(problem: Problem) -> bool:
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
     """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
-    from laufruhe.solvers.general import solve_by_local_programs
-
     return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
-
-
-def _solve_flywheel(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.flywheel import solve_flywheel
-
-    return solve_flywheel(problem)
-
-
-def _solve_leads(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.leads import solve_leads
-
-    return solve_leads(problem)
-
-
-def _solve_shared_leads(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
-
-    return solve_shared_leads(problem)
-
-
-def _solve_places(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.places import solve_places
-
-    return solve_places(problem)
-
-
-def _solve_phasing(problem: Problem) -> Result:
-    from laufruhe.solvers.stars.phasing_solver import solve_phasing
-
-    return solve_phasing(problem)
-
-
-def _refuse_long_cranks(problem: Problem) -> None:
-    from laufruhe.solvers.stars.even_search import refuse_long
-
-    refuse_long(problem)
 
 
 def _solve_joint(problem: Problem) -> Result:
@@ -133,10 +99,6 @@ def _solve_star_mounts(problem: Problem) -> Result:
     from laufruhe.solvers.mounts.stars import solve_star_mounts
 
     return solve_star_mounts(problem)
-
-
-def _is_rigid(problem: Problem) -> bool:
-    return problem.engine.block is None and not problem.fidelity.is_uneven
 
 
 def _distinguishes_stars(problem: Problem) -> bool:
@@ -153,18 +115,14 @@ _UNBALANCES = {Kind.UNBALANCE: _AFFINE}
 _MOUNTS = {**_UNBALANCES, Kind.STIFFNESS: (), Kind.MOUNT: ()}
 
 
-def _any_norm(_: Norm) -> bool:
-    return True
-
-
 _CORE: tuple[Method, ...] = (
     Method(
         "evaluation", {}, ProofStrength.EXACT, evaluate_only,
-        accepts_norm=_any_norm,
+        accepts_norm=lambda _: True,
         proves="the value itself",
     ),
     Method(
-        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT, _solve_flywheel,
+        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT, solve_flywheel,
         known_channels=frozenset(OF_FLYWHEEL),
         accepts_constant=lambda _: False,
         proves="the optimum",
@@ -180,7 +138,7 @@ _CORE: tuple[Method, ...] = (
         proves="the optimum",
     ),
     Method(
-        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, _solve_leads,
+        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, solve_leads,
         refines_fidelity=True,
         known_channels=frozenset({IRREGULARITY}),
         accepts_norm=is_pointwise,
@@ -188,23 +146,23 @@ _CORE: tuple[Method, ...] = (
         proves="the optimum, as far as the boxes go (P13)",
     ),
     Method(
-        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT, _solve_shared_leads,
+        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT, solve_shared_leads,
         refines_fidelity=True,
         known_channels=frozenset({MOUNT_FORCE, *OF_BLOCK}),
         accepts_norm=is_pointwise,
         accepts_constant=is_no_number,
-        accepts_problem=_is_rigid,
+        accepts_problem=lambda p: p.engine.block is None and not p.fidelity.is_uneven,
         proves="the optimum, as far as the boxes go (P15)",
     ),
     Method(
-        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT, _solve_places,
+        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT, solve_places,
         refines_fidelity=True,
         known_channels=OF_SHAFT_PLACES,
         accepts_norm=is_pointwise,
         proves="the optimum, as far as the boxes go (P8)",
     ),
     Method(
-        "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, _solve_phasing,
+        "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, solve_phasing,
         refines_fidelity=True,
         accepts_norm=is_pointwise,
         proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
@@ -231,7 +189,7 @@ _CORE: tuple[Method, ...] = (
     Method(
         "flywheel, crankshaft and other decisions separately",
         dict.fromkeys(sorted(set(KINDS.values()) - {Kind.STAR}), _ANY), ProofStrength.RELAXED, solve_separable,
-        accepts_norm=_any_norm,
+        accepts_norm=lambda _: True,
         accepts_problem=is_separable,
         proves="what each of them proves",
     ),
@@ -253,7 +211,7 @@ _CORE: tuple[Method, ...] = (
     ),
     Method(
         "local programs of all numbers", dict.fromkeys(KINDS.values(), _ANY), ProofStrength.RELAXED, solve_all_numbers,
-        accepts_norm=_any_norm,
+        accepts_norm=lambda _: True,
         proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most",
     ),
 )  # fmt: skip
@@ -350,12 +308,9 @@ def refuse(problem: Problem) -> None:
     ModelError
         If the objective depends on no open number, or a combination of open numbers has no method.
     """
-    reduction = next(
-        (reduction for reduction in reductions() if reduction.refuse is not None and reduction.applies(problem)), None
-    )
-    if reduction is not None and reduction.refuse is not None:
-        reduction.refuse(problem)
-        return
+    for reduction in reductions():
+        if reduction.refuse is not None and reduction.applies(problem):
+            return reduction.refuse(problem)
     kinds = open_kinds(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError(
@@ -368,20 +323,19 @@ def refuse(problem: Problem) -> None:
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
-    if problem.phasing is not None and _method(problem).solver is _solve_phasing:
-        _refuse_long_cranks(problem)
+    if problem.phasing is not None and _method(problem).solver is solve_phasing:
+        refuse_long(problem)
 
 
 def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
+    """Solve a problem by the first reduction that applies, else by the first method that suits it.
+
+    The bound of an exact method for part of the measures may raise that of the method.
+    """
     remaining = reductions() if remaining is None else remaining
     for k, reduction in enumerate(remaining):
         if reduction.applies(problem):
             return reduction.solve(problem, _solve_reduced, partial(_solve_reduced, remaining=remaining[k + 1 :]))
-    return _solve_by_method(problem)
-
-
-def _solve_by_method(problem: Problem) -> Result:
-    """Solve a problem by the first method that suits it, with the bound of an exact method for part of its measures."""
     method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
     conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} else ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class Slopes:
 
     @classmethod
     def smooth(cls, slope: Array) -> Slopes:
-        """Return the subgradients of a smooth function, from its gradient, shape (n,)."""
+        """Return the only subgradient of a smooth function, its gradient, shape (n,)."""
         return cls(slope[None], np.zeros((0, len(slope))))
 
     def scaled(self, units: Array) -> Slopes:
@@ -116,6 +116,8 @@ class Slopes:
 def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
     """Return the price of every active limit, then of every active bound (P19).
 
+    None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
+
     Parameters
     ----------
     objective
@@ -124,10 +126,6 @@ def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Arra
         Slopes of active limits.
     edges
         Outward normals of active bounds, shape (bounds, n).
-
-    Returns
-    -------
-    None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
     """
     count = len(limits) + len(edges)
     if not count:
@@ -179,53 +177,40 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
         bound = totals[k] if k >= count else np.zeros(last + 1)
         above += [unit[slopes] - bound, -unit[slopes] - bound]
         maximum.append(np.full(2 * len(slopes), 1.0 if k < count else 0.0))
-    program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *maximum]), count)
-    left = program.minimum(unit[last])
-    if not left <= BALANCED:
+    matrix, right = np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *maximum])
+    residual = _minimum(unit[last], matrix, right, count)
+    if not residual <= BALANCED:
         return None
-    program = program.under(unit[last], 1.01 * left + _RESIDUAL_MARGIN)
+    matrix, right = np.vstack([matrix, unit[last]]), np.append(right, 1.01 * residual + _RESIDUAL_MARGIN)
     prices = []
     for total, scale in zip(totals[count:], scales[count:], strict=True):
-        low, high = program.minimum(total), -program.minimum(-total)
+        low, high = (sign * _minimum(sign * total, matrix, right, count) for sign in (1.0, -1.0))
         if math.isnan(low) or math.isnan(high):
             return None
         prices.append(Price(max(low, 0.0) * size / scale, high * size / scale))
     return prices
 
 
-@dataclass(frozen=True, eq=False)
-class _Program:
-    """Linear program: the first `equal` rows are equal to the right-hand side, the others are at most that."""
+def _minimum(cost: Array, matrix: Array, right: Array, equal: int) -> float:
+    """Return the minimum of a linear program; -inf if it is unbounded, NaN if the solver failed.
 
-    rows: Array
-    right: Array
-    equal: int
+    The first `equal` rows of the matrix are equal to the right-hand side, the others are at most that.
+    """
+    import clarabel
 
-    def under(self, row: Array, maximum: float) -> _Program:
-        """Return the program with one more row, shape (n,), and its upper bound."""
-        return replace(self, rows=np.vstack([self.rows, row]), right=np.append(self.right, maximum))
-
-    def minimum(self, cost: Array) -> float:
-        """Return the minimum of a cost, shape (n,); -inf if unbounded, NaN if the solver failed."""
-        import clarabel
-
-        rows = ConeRows(len(cost))
-        rows.add(np.arange(len(self.right))[:, None], np.arange(len(cost)), self.rows, self.right)
-        rows.cones += [clarabel.ZeroConeT(self.equal), clarabel.NonnegativeConeT(len(self.right) - self.equal)]
-        answer = run_clarabel(rows, cost, {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10})
-        status = str(answer.status)
-        if "DualInfeasible" in status:
-            return -math.inf
-        return float(cost @ np.asarray(answer.x)) if "Solved" in status else math.nan
+    rows = ConeRows(len(cost))
+    rows.add(np.arange(len(right))[:, None], np.arange(len(cost)), matrix, right)
+    rows.cones += [clarabel.ZeroConeT(equal), clarabel.NonnegativeConeT(len(right) - equal)]
+    answer = run_clarabel(rows, cost, {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10})
+    if "DualInfeasible" in str(answer.status):
+        return -math.inf
+    return float(cost @ np.asarray(answer.x)) if "Solved" in str(answer.status) else math.nan
 
 
 def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
-    """Return outward normals of active bounds of a decision, shape (width,), by the name of its size or angle.
+    """Return outward normals of active bounds, shape (width,), by the name of the size or angle of a decision.
 
-    Parameters
-    ----------
-    column
-        Value of the decision [SI], shape (width,).
+    The decision has the value `column` [SI], shape (width,).
     """
     bounds = decision.set
     if bounds.width == 1:
@@ -244,14 +229,6 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
             # a rotation by one radian moves the vector by its size
             normals[angle_name(decision)] = sign * turn / size
     return normals
-
-
-def _angle_normals(decision: Decision, column: Array) -> list[Array]:
-    # outward normals of the bounds of an angle at size zero, shape (2,) each
-    bounds = decision.set
-    if bounds.width == 1 or bounds.free_angle or float(np.hypot(*column)) > bounds.scale * ACTIVE:
-        return []
-    return [sign * np.array([-edge[1], edge[0]]) for edge, sign in zip(bounds.edges, (-1.0, 1.0), strict=False)]
 
 
 def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Price]:
@@ -287,9 +264,10 @@ def affine_prices(
     ]  # fmt: skip
     # bounds of an angle act on a size of zero and have no price there
     apex = [
-        (domain.columns, normal)
+        (domain.columns, sign * np.array([-edge[1], edge[0]]))
         for domain in problem.domains
-        for normal in _angle_normals(domain.decision, x[domain.columns])
+        if domain.width == 2 and float(np.hypot(*x[domain.columns])) <= domain.scale * ACTIVE
+        for edge, sign in zip(domain.set.edges, (-1.0, 1.0), strict=False)
     ]
     normals = np.zeros((len(edges) + len(apex), problem.size))
     for row, (columns, normal) in zip(normals, [*edges.values(), *apex], strict=True):

@@ -19,7 +19,6 @@ from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
 Solve = Callable[[Problem], Result]
-PARTS = (("limits", "limit"), ("objective", "term"))
 
 
 def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve: Solve) -> Result:
@@ -27,12 +26,8 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
 
     Parameters
     ----------
-    problem
-        Problem with all limits and objective terms.
     relaxed
-        Problem without some limits and some non-negative objective terms.
-    prove, solve
-        Solvers of `relaxed` and of `problem`.
+        Problem without some limits and some non-negative objective terms; `prove` solves it.
     """
     proven = prove(relaxed)
     if proven.status is Status.INFEASIBLE:
@@ -40,34 +35,25 @@ def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve:
     certificate = proven.certificate
     is_optimal = certificate is not None and certificate.kind is Proof.GLOBAL and relaxed.objective == problem.objective
     if is_optimal and proven.final.violation(problem.limits) <= FEASIBILITY_TOL:
-        return _with_all_limits(proven, problem)
+        # limits left out of the relaxed problem have no price
+        values = dict(zip(proven.problem.limits, proven.limits, strict=True))
+        free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
+        missing_values = limit_values(problem, proven.final, free)
+        limits = (values.get(limit, value) for limit, value in zip(problem.limits, missing_values, strict=True))
+        return replace(proven, problem=proven.problem.changed(limits=problem.limits), limits=tuple(limits))
     result = solve(problem)
     if certificate is None:
         return result
-    counts = ((len(getattr(problem, what)) - len(getattr(relaxed, what)), name) for what, name in PARTS)
-    left_out = " and ".join(counted(count, name) for count, name in counts if count)
+    counts = {
+        "limit": len(problem.limits) - len(relaxed.limits),
+        "term": len(problem.objective) - len(relaxed.objective),
+    }
+    left_out = " and ".join(counted(count, name) for name, count in counts.items() if count)
     return with_better_bound(result, certificate.lower_bound, f"bound without {left_out}")
 
 
-def _with_all_limits(proven: Result, problem: Problem) -> Result:
-    # limits left out of the relaxed problem have no price
-    values = dict(zip(proven.problem.limits, proven.limits, strict=True))
-    free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
-    missing_values = limit_values(problem, proven.final, free)
-    limits = (values.get(limit, value) for limit, value in zip(problem.limits, missing_values, strict=True))
-    return replace(proven, problem=proven.problem.changed(limits=problem.limits), limits=tuple(limits))
-
-
 def with_better_bound(result: Result, bound: float, source: str) -> Result:
-    """Return a result with a lower bound from another source, if that is higher than its own.
-
-    Parameters
-    ----------
-    bound
-        Lower bound of the objective [SI].
-    source
-        Text for the method of the certificate.
-    """
+    """Return a result with a lower bound [SI] from another source, if that is higher than its own."""
     certificate, objective = result.certificate, result.objective
     if (
         certificate is None

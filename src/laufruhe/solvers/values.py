@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 from laufruhe.problem.evaluation import Evaluation, objective_value
@@ -17,8 +17,21 @@ DISTINCT_SHARE = 0.05
 """Share of the largest decision by which two designs differ."""
 
 
+class _Priced:
+    """Value with shadow prices of its active bound or limit."""
+
+    shadow_price: float
+    tightening_price: float | None
+
+    @property
+    def price(self) -> Price:
+        """Shadow price of the active bound or limit."""
+        other = self.tightening_price
+        return Price(self.shadow_price, self.shadow_price if other is None else other)
+
+
 @dataclass(frozen=True)
-class DecisionValue:
+class DecisionValue(_Priced):
     """Value of one decision [SI].
 
     Attributes
@@ -39,11 +52,9 @@ class DecisionValue:
     shadow_price: float = 0.0
     tightening_price: float | None = None
 
-    @property
-    def price(self) -> Price:
-        """Shadow price of the active bound."""
-        other = self.tightening_price
-        return Price(self.shadow_price, self.shadow_price if other is None else other)
+    def without_price(self) -> DecisionValue:
+        """Return the value with an unknown shadow price if a bound is active."""
+        return replace(self, shadow_price=math.nan if self.at_bound else 0.0, tightening_price=None)
 
     @property
     def is_zero(self) -> bool:
@@ -105,15 +116,13 @@ class RankValue:
 
 
 @dataclass(frozen=True)
-class LimitValue:
+class LimitValue(_Priced):
     """Value of one limit at a design [SI].
 
     Attributes
     ----------
     shadow_price
         Fall of the objective per unit by which the limit is relaxed; NaN if unknown.
-    side
-        "at most" or "at least".
     error_estimate
         Upper bound of the relative error of the value from sampling.
     tightening_price
@@ -131,12 +140,6 @@ class LimitValue:
     error_estimate: float = 0.0
     tightening_price: float | None = None
 
-    @property
-    def price(self) -> Price:
-        """Shadow price of the limit."""
-        other = self.tightening_price
-        return Price(self.shadow_price, self.shadow_price if other is None else other)
-
 
 @dataclass(frozen=True)
 class AttainableLimit:
@@ -146,14 +149,10 @@ class AttainableLimit:
     ----------
     side, limit
         "at most" or "at least", and the limit of the problem.
-    value
-        Value of the limited measure at the nearest design; NaN if no design was found.
+    value, decisions
+        Value of the limited measure and decisions at the nearest design; NaN and empty if no design was found.
     bound
         Bound of the measure over all designs that meet the other limits; NaN if unknown.
-    proof
-        Kind of proof of the value.
-    decisions
-        Decisions of the nearest design.
     why, ended
         Reason why there is no design, and True if the time limit ended the search.
     """

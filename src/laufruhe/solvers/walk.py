@@ -27,13 +27,12 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import unproven_certificate
 from laufruhe.solvers.accuracy import objective_error
-from laufruhe.solvers.conclusion import Design, limit_values, priced_decisions, values_of
-from laufruhe.solvers.failed_proof import without_proof
+from laufruhe.solvers.conclusion import Design, limit_values, priced_decisions, values_of, without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
 from laufruhe.solvers.stars.star_results import phase_decisions
-from laufruhe.solvers.values import ObjectiveValue, RankValue
+from laufruhe.solvers.values import ObjectiveValue
 
 MAX_EVALUATIONS, SEED = 64, 0
 """Largest number of evaluations, and seed of the random directions."""
@@ -49,16 +48,9 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Design before its evaluation.
+    """Design before its evaluation: a problem with its star, and the values of the decisions [SI].
 
-    Attributes
-    ----------
-    problem
-        Problem with the star of the design.
-    values
-        Values of the decisions [SI].
-    candidate
-        Star and firing order; None if neither is open.
+    The candidate is the star and firing order; None if neither is open.
     """
 
     problem: Problem
@@ -68,20 +60,15 @@ class Point:
 
 Move = Callable[[Point, float], Point | None]
 """Function that returns a design at a signed step, relative to the range of the decisions; None if bounds forbid it."""
+Change = Callable[[Candidate, float], Candidate | None]
+"""Function that returns a star and firing order at a signed step; None if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvaluatedPoint:
-    """Design evaluated by the exact model.
+    """Design evaluated by the exact model: its objective, and the largest relative violation of a limit.
 
-    Attributes
-    ----------
-    value
-        Objective.
-    violation
-        Largest relative violation of a limit.
-    upper_violation
-        Largest relative violation plus sampling error of a limit.
+    The upper violation includes the sampling error.
     """
 
     point: Point
@@ -145,7 +132,7 @@ class _LocalSearch:
 
     def run(self, seconds: float) -> EvaluatedPoint | None:
         """Return the best feasible design within a processor time [s]; None if no step leads to one."""
-        is_over = _deadline(seconds)
+        until = time.thread_time() + seconds
         best = self._evaluate(self.start, None)
         if best is None:
             return None
@@ -154,8 +141,8 @@ class _LocalSearch:
         pending = [next(source, None) for source in sources]
         count = 0
         for k in itertools.cycle(range(len(sources))):
-            if not any(pending) or count >= MAX_EVALUATIONS or is_over():
-                return witness
+            if not any(pending) or count >= MAX_EVALUATIONS or time.thread_time() >= until:
+                break
             if (step := pending[k]) is None:
                 continue
             move, share = step
@@ -198,7 +185,8 @@ class _LocalSearch:
 
     def _number_steps(self) -> Generator[tuple[Move, float], bool, None]:
         """Yield steps along coordinates and random directions; repeat each while it leads to better designs."""
-        moves = [*_coordinate_moves(self.start.problem), *self._angle_moves()]
+        columns = sum(domain.width for domain in domains_of(self.start.problem.decisions))
+        moves = [*(partial(_move_along, row) for row in np.eye(columns)), *self._angle_moves()]
         sizes = [STEP] * len(moves)
         for size in STEP * SHORTER ** np.arange(8.0):
             for k in self.random.permutation(len(moves)):
@@ -210,15 +198,16 @@ class _LocalSearch:
                 else:
                     sizes[k] *= SHORTER
                 if len(moves) > 1:
-                    columns = sum(domain.width for domain in domains_of(self.start.problem.decisions))
-                    yield _move_along(self.random.normal(size=columns) / math.sqrt(max(columns, 1))), size
+                    direction = self.random.normal(size=columns) / math.sqrt(max(columns, 1))
+                    yield partial(_move_along, direction), size
 
     def _angle_moves(self) -> list[Move]:
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None or not phasing.continuous:
             return []
-        moves = [_move_throw(phasing, k) for k in range(len(candidate.throws))]
-        return [*moves, *(_move_angle(phasing, name) for name in ("bank_angle", "split_pin"))]
+        changes: list[Change] = [partial(_move_throw, phasing, k) for k in range(len(candidate.throws))]
+        changes += [partial(_move_angle, phasing, name) for name in ("bank_angle", "split_pin")]
+        return [partial(_change, phasing, change) for change in changes]
 
     def _star_steps(self) -> Generator[tuple[Move, float], bool, None]:
         # ends when no neighbour is better
@@ -234,64 +223,33 @@ class _LocalSearch:
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None:
             return []
-        moves: list[Move] = []
+        changes: list[Change] = []
         if phasing.throws is None and phasing.throw_bounds is None:
             last = len(candidate.throws) - 1
             for i, j in itertools.combinations(range(last + 1), 2):
-                moves.append(_exchange(phasing, [(i, j)]))
+                changes.append(partial(_exchange, phasing, [(i, j)]))
                 if i + j < last and {i, j}.isdisjoint({last - i, last - j}):
-                    moves.append(_exchange(phasing, [(i, j), (last - i, last - j)]))
+                    changes.append(partial(_exchange, phasing, [(i, j), (last - i, last - j)]))
         if phasing.firing_order is None:
-            moves += [_change_order(phasing, k) for k in range(ORDERS)]
-        return [
-            *moves,
-            *(_build_shafts(phasing, shafts) for shafts in phasing.shafts.allowed if phasing.shafts.optional),
-        ]
+            changes += [partial(_change_order, phasing, k) for k in range(ORDERS)]
+        if phasing.shafts.optional:
+            changes += [partial(_build_shafts, phasing, shafts) for shafts in phasing.shafts.allowed]
+        return [partial(_change, phasing, change) for change in changes]
 
 
-def _deadline(seconds: float) -> Callable[[], bool]:
-    """Return a function that returns True after a processor time of this thread [s].
-
-    Processor time never exceeds wall time, so it is read only once the wall time has passed.
-    """
-    until, ends = time.thread_time() + seconds, time.perf_counter() + seconds
-
-    def is_over() -> bool:
-        nonlocal ends
-        if time.perf_counter() < ends:
-            return False
-        left = until - time.thread_time()
-        ends = time.perf_counter() + left
-        return left <= 0.0
-
-    return is_over
-
-
-# --- moves of numbers
-
-
-def _coordinate_moves(problem: Problem) -> list[Move]:
-    columns = sum(domain.width for domain in domains_of(problem.decisions))
-    return [_move_along(row) for row in np.eye(columns)]
-
-
-def _move_along(direction: Array) -> Move:
+def _move_along(direction: Array, point: Point, step: float) -> Point | None:
     """Return a step along a direction relative to the ranges of the decisions, shape (n,), with projection."""
-
-    def move(point: Point, step: float) -> Point | None:
-        domains = domains_of(point.problem.decisions)
-        x = decision_vector(domains, point.values)
-        if len(x) != len(direction):
-            return None
-        widths = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
-        moved = x + step * direction * np.array(widths)
-        for domain in domains:
-            moved[domain.columns] = domain.project(moved)
-        if np.array_equal(moved, x):
-            return None
-        return replace(point, values=tuple(_value(domain, moved) for domain in domains))
-
-    return move
+    domains = domains_of(point.problem.decisions)
+    x = decision_vector(domains, point.values)
+    if len(x) != len(direction):
+        return None
+    widths = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
+    moved = x + step * direction * np.array(widths)
+    for domain in domains:
+        moved[domain.columns] = domain.project(moved)
+    if np.array_equal(moved, x):
+        return None
+    return replace(point, values=tuple(_value(domain, moved) for domain in domains))
 
 
 def _value(domain: Domain, x: Array) -> Value:
@@ -299,88 +257,56 @@ def _value(domain: Domain, x: Array) -> Value:
     return value if domain.decision.is_affine else value.real
 
 
-# --- moves of throws and firing orders
+def _move_throw(phasing: Phasing, k: int, candidate: Candidate, step: float) -> Candidate:
+    # the first throw stays at zero without bounds of its own (C5)
+    throws = list(candidate.throws)
+    if phasing.throw_bounds is None:
+        width = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
+        throws[k] += step * width if k else 0.0
+    else:
+        low, high = phasing.throw_bounds[k]
+        throws[k] = min(max(throws[k] + step * (high - low), low), high)
+    return replace(candidate, throws=tuple(throws))
 
 
-def _move_throw(phasing: Phasing, k: int) -> Move:
-    """Return a move of throw `k`; the first throw stays at zero without bounds of its own (C5)."""
-    bounds = phasing.throw_bounds
-    width = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
-
-    def move(point: Point, step: float) -> Point | None:
-        assert point.candidate is not None
-        throws = list(point.candidate.throws)
-        if bounds is None:
-            throws[k] += step * width if k else 0.0
-        else:
-            low, high = bounds[k]
-            throws[k] = min(max(throws[k] + step * (high - low), low), high)
-        return _with_candidate(phasing, point, replace(point.candidate, throws=tuple(throws)))
-
-    return move
-
-
-def _move_angle(phasing: Phasing, name: str) -> Move:
-    """Return a move of the bank angle or of the split pins."""
+def _move_angle(phasing: Phasing, name: str, candidate: Candidate, step: float) -> Candidate | None:
     low, high = (phasing.bank if name == "bank_angle" else phasing.split) or (0.0, 0.0)
+    angle = getattr(candidate, name)
+    if angle is None:
+        return None
+    return replace(candidate, **{name: min(max(angle + step * (high - low), low), high)})
 
-    def move(point: Point, step: float) -> Point | None:
-        assert point.candidate is not None
-        angle = getattr(point.candidate, name)
-        if angle is None:
+
+def _exchange(phasing: Phasing, pairs: Sequence[tuple[int, int]], candidate: Candidate, _: float) -> Candidate | None:
+    """Exchange the throws of each pair, and their cylinders in the firing order."""
+    pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
+    for i, j in pairs:
+        cylinders, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
+        if len(cylinders) != len(other) or order is None:
             return None
-        angle = min(max(angle + step * (high - low), low), high)
-        return _with_candidate(phasing, point, replace(point.candidate, **{name: angle}))
-
-    return move
-
-
-def _exchange(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
-    """Return a move that exchanges the throws of each pair, and their cylinders in the firing order."""
-
-    def move(point: Point, _: float) -> Point | None:
-        candidate = point.candidate
-        assert candidate is not None
-        pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
-        for i, j in pairs:
-            cylinders, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
-            if len(cylinders) != len(other) or order is None:
-                return None
-            throws[i], throws[j] = throws[j], throws[i]
-            changed = dict(zip((*cylinders, *other), (*other, *cylinders), strict=True))
-            order = from_one([changed.get(number, number) for number in order])
-        # cylinder 1 keeps its angle (C5)
-        shift = candidate.throws[0] - throws[0]
-        rotated = tuple((angle + shift) % math.tau for angle in throws)
-        return _with_candidate(phasing, point, replace(candidate, throws=rotated, firing_order=order))
-
-    return move
+        throws[i], throws[j] = throws[j], throws[i]
+        changed = dict(zip((*cylinders, *other), (*other, *cylinders), strict=True))
+        order = from_one([changed.get(number, number) for number in order])
+    # cylinder 1 keeps its angle (C5)
+    shift = candidate.throws[0] - throws[0]
+    rotated = tuple((angle + shift) % math.tau for angle in throws)
+    return replace(candidate, throws=rotated, firing_order=order)
 
 
-def _change_order(phasing: Phasing, k: int) -> Move:
-
-    def move(point: Point, _: float) -> Point | None:
-        candidate = point.candidate
-        assert candidate is not None
-        orders = lap_orders(phasing.cycle, phasing.layout_of(candidate), candidate.throws)
-        order = next(itertools.islice(orders, k, None), None)
-        return None if order is None else _with_candidate(phasing, point, replace(candidate, firing_order=order))
-
-    return move
+def _change_order(phasing: Phasing, k: int, candidate: Candidate, _: float) -> Candidate | None:
+    orders = lap_orders(phasing.cycle, phasing.layout_of(candidate), candidate.throws)
+    order = next(itertools.islice(orders, k, None), None)
+    return None if order is None else replace(candidate, firing_order=order)
 
 
-def _build_shafts(phasing: Phasing, built: Sequence[int]) -> Move:
-
-    def move(point: Point, _: float) -> Point | None:
-        assert point.candidate is not None
-        return _with_candidate(phasing, point, replace(point.candidate, left_out=phasing.without(built)))
-
-    return move
+def _build_shafts(phasing: Phasing, built: Sequence[int], candidate: Candidate, _: float) -> Candidate:
+    return replace(candidate, left_out=phasing.without(built))
 
 
-def _with_candidate(phasing: Phasing, point: Point, candidate: Candidate) -> Point | None:
-    """Return the design of a candidate with the present decisions; None if its firing order is not permitted."""
-    if candidate == point.candidate:
+def _change(phasing: Phasing, change: Change, point: Point, step: float) -> Point | None:
+    """Return the design of a changed candidate with the present decisions; None if its firing order is not allowed."""
+    candidate = None if point.candidate is None else change(point.candidate, step)
+    if candidate is None or candidate == point.candidate:
         return None
     if phasing.firing_order is not None and candidate.firing_order != phasing.firing_order:
         return None
@@ -398,9 +324,6 @@ def _with_candidate(phasing: Phasing, point: Point, candidate: Candidate) -> Poi
     domains = domains_of(problem.decisions)
     x = projected_vector(domains, values)
     return Point(problem, tuple(_value(domain, x) for domain in domains), candidate)
-
-
-# --- contradictions between designs and bounds
 
 
 def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -> bool:
@@ -433,6 +356,7 @@ def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bo
         if candidate != next(iter(candidates_of(original.phasing, details.ranking[:1])), None):
             first = ranked_star(original.phasing, candidate, None, witness.value, 0.0, False)
             details = replace(details, ranking=(first, *details.ranking))
+    values = [objective_value(replace(original, objective=x.terms), witness.evaluation) for x in original.ranks]
     unproven = replace(
         result,
         problem=problem_of_design,
@@ -445,19 +369,13 @@ def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bo
         message="",
         error=partial(objective_error, problem_of_design, witness.evaluation),
         phasing=details,
-        ranks=_rank_values(result, witness),
+        ranks=tuple(
+            replace(rank, minimum=min(rank.minimum, value) if k == 0 else rank.minimum, final=value, price=math.nan)
+            for k, (rank, value) in enumerate(zip(result.ranks, values, strict=False))
+        ),
         nearest=None,
     )
     source, claim = "check by local search", bound
     if result.status is Status.INFEASIBLE:
         source, claim = "check by local search: a design meets the limits, although none was said to exist", math.inf
     return without_proof(unproven, BoundError(source, claim, witness.value))
-
-
-def _rank_values(result: Result, witness: EvaluatedPoint) -> tuple[RankValue, ...]:
-    problem = result.problem
-    values = [objective_value(replace(problem, objective=rank.terms), witness.evaluation) for rank in problem.ranks]
-    return tuple(
-        replace(rank, minimum=min(rank.minimum, value) if k == 0 else rank.minimum, final=value, price=math.nan)
-        for k, (rank, value) in enumerate(zip(result.ranks, values, strict=False))
-    )

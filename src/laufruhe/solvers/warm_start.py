@@ -11,7 +11,6 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine import Engine
-from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -50,10 +49,7 @@ def compares_stars(problem: Problem) -> bool:
 def solve_by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
     """Return the engine with optimal unbalances by one cone program; None if it has no solution.
 
-    Parameters
-    ----------
-    samples
-        Samples over the period of the loads; all of the model if None.
+    The program has a number of samples over the period of the loads; by default all of the model.
     """
     model = AffineModel(problem)
     x = solve_cones(model.at(samples or model.full_samples)).x
@@ -75,14 +71,13 @@ def first_search(problem: Problem) -> Result | None:
 def reoptimise(problem: Problem, neighbour: Result) -> Engine | None:
     """Return the best engine of searches from a known result; None if no search ends within the limits.
 
-    Parameters
-    ----------
-    neighbour
-        Result of a problem with the same decisions. It gives the start values and the stars to compare.
+    The known result is of a problem with the same decisions. It gives the start values and the stars to compare.
     """
     if compares_stars(problem):
         # the best star may differ from the best one of the neighbour
-        return _best_star(problem, first_search(problem.at(_coarse_fidelity(problem.fidelity))) or neighbour)
+        fidelity = problem.fidelity
+        coarse = replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
+        return _best_star(problem, first_search(problem.at(coarse)) or neighbour)
     engines = [_engine_from(problem, neighbour) if problem.phasing is None else _best_star(problem, neighbour)]
     if not _is_similar(problem, neighbour):
         with suppress(SolverError, ModelError):
@@ -122,10 +117,6 @@ def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
     return _moved_throws(phasing, stars[best], neighbour) or best
 
 
-def _coarse_fidelity(fidelity: Fidelity) -> Fidelity:
-    return replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
-
-
 def _moved_throws(phasing: Phasing, star: Candidate, neighbour: Result) -> Engine | None:
     problem = replace(phasing.realise(star), phasing=None)
     if problem.mount_decisions:
@@ -162,5 +153,4 @@ def _unproven(problem: Problem, starts: int, maximum: int) -> Search:
 
 
 def _engine(result: Result | None) -> Engine | None:
-    is_feasible = result is not None and result.status.has_design
-    return result.final.engine if result is not None and is_feasible else None
+    return result.final.engine if result is not None and result.status.has_design else None

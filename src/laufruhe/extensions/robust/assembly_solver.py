@@ -35,8 +35,7 @@ from laufruhe.prove.certificate import Proof, ProofStrength, make_certificate, u
 from laufruhe.prove.witness import Witness
 from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import objective_error
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
-from laufruhe.solvers.failed_proof import without_proof
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values, without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
 

@@ -22,9 +22,8 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import Multipliers, ProofStrength
 from laufruhe.solvers.boxes.box_designs import rebalance
-from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, witness_of
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, smallest_conflict, witness_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import (
     LocalProgram,

@@ -20,8 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, bisect_monotone
 from laufruhe.prove.branch_and_bound import BoxResult
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, witness_of
-from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, smallest_conflict, witness_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import (
     LocalProgram,

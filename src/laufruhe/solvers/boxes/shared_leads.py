@@ -21,7 +21,6 @@ from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     Design,
     ProofData,
-    better_design,
     build_result,
     evaluate_design,
     infeasible_result,
@@ -67,8 +66,6 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
         candidate = design(leads)
         return math.inf if candidate is None else candidate.value * (1.0 + 1e3 * max(candidate.violation, 0.0))
 
-    ends = (design(end) for end in search_from_grid(penalised, lower, upper, GRID, MAX_STARTS, MAX_STEPS))
-    best = design(np.array([d.real_start for d in problem.decisions]))
-    for end in ends:
-        best = best if end is None else better_design(end, best)
-    return best
+    start = np.array([d.real_start for d in problem.decisions])
+    ends = [*search_from_grid(penalised, lower, upper, GRID, MAX_STARTS, MAX_STEPS), start]
+    return min(filter(None, map(design, ends)), key=lambda design: design.rank, default=None)

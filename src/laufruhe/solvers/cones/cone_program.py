@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -104,11 +104,6 @@ class ConeRows:
         self.right.append(right)
         self.count += len(right)
 
-    def matrix(self) -> SparseMatrix:
-        """Return A, shape (rows, columns)."""
-        rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
-        return SparseMatrix.from_entries(rows, columns, values, (self.count, self.columns))
-
 
 @dataclass(frozen=True, eq=False)
 class RowBlock:
@@ -116,10 +111,6 @@ class RowBlock:
 
     Attributes
     ----------
-    norm
-        The norm.
-    cones
-        Cones that represent the norm.
     unit
         Unit of the rows [SI].
     first
@@ -149,14 +140,7 @@ class RowBlock:
 def build_program(
     problem: AffineProblem, equations: tuple[Array, Array] | None
 ) -> tuple[list[RowBlock], list[int], ConeRows, Array]:  # fmt: skip
-    """Assemble the cone program of a problem (P1).
-
-    Parameters
-    ----------
-    problem
-        Terms, limits and sets of the decisions.
-    equations
-        A, shape (m, n), and b, shape (m,), of additional equations A x = b.
+    """Assemble the cone program of a problem (P1), with additional equations A x = b, shapes (m, n) and (m,).
 
     Returns
     -------
@@ -200,18 +184,12 @@ def build_program(
             )
             rows.cones += [clarabel.SecondOrderConeT(3)] * len(square)
     starts = [_add_norm(rows, block, problem) for block in blocks]
-    return blocks, starts, rows, _add_cost(problem, blocks, rows)
-
-
-def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows) -> Array:
-    """Return the cost of every column; for the largest of several sums, add one epigraph variable above all sums."""
-    import clarabel
-
     sums = np.zeros((max(problem.groups, default=0) + 1, rows.columns))
     for k, ((weight, _), block) in enumerate(zip(problem.terms, blocks, strict=False)):
         sums[problem.groups[k] if problem.groups else 0, block.heads] = weight * block.cones.value
     if not problem.groups:
-        return np.asarray(sums[0])
+        return blocks, starts, rows, np.asarray(sums[0])
+    # one epigraph variable is above all sums, and is the cost
     group, column = np.nonzero(sums)
     indices = np.arange(len(sums))
     rows.add(
@@ -222,9 +200,7 @@ def _add_cost(problem: AffineProblem, blocks: Sequence[RowBlock], rows: ConeRows
     )
     rows.cones.append(clarabel.NonnegativeConeT(len(sums)))
     rows.columns += 1
-    cost = np.zeros(rows.columns)
-    cost[-1] = 1.0
-    return cost
+    return blocks, starts, rows, np.append(np.zeros(rows.columns - 1), 1.0)
 
 
 def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
@@ -277,18 +253,12 @@ def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadra
 
     Parameters
     ----------
-    rows
-        Rows A x + s = b with s in cones.
     cost
         Linear cost, shape (columns,).
     options
         Settings of Clarabel by name.
     quadratic
         Upper triangle of the quadratic cost, shape (columns, columns); zero if None.
-
-    Returns
-    -------
-    Solution object of Clarabel.
     """
     import clarabel
 
@@ -299,22 +269,16 @@ def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadra
     settings.time_limit = max(seconds_left(), MINIMUM_SECONDS)
     hessian = np.zeros((0, 0)) if quadratic is None else quadratic
     row, column = np.nonzero(hessian)
-    matrix = SparseMatrix.from_entries(row, column, hessian[row, column], (rows.columns, rows.columns))
-    right = np.concatenate(rows.right)
-    return clarabel.DefaultSolver(matrix, cost, rows.matrix(), right, rows.cones, settings).solve()
+    squares = SparseMatrix.from_entries(row, column, hessian[row, column], (rows.columns, rows.columns))
+    row, column, values = (np.concatenate([entry[k] for entry in rows.entries]) for k in range(3))
+    matrix = SparseMatrix.from_entries(row, column, values, (rows.count, rows.columns))
+    return clarabel.DefaultSolver(squares, cost, matrix, np.concatenate(rows.right), rows.cones, settings).solve()
 
 
 def read_solution(problem: AffineProblem, blocks: list[RowBlock], starts: list[int], solution: Any) -> ConicSolution:
     """Read decisions, projected on their sets, and dual rows [SI] from a solution of Clarabel.
 
-    Values that are not finite count as zero.
-
-    Parameters
-    ----------
-    problem, blocks, starts
-        Problem, blocks of its norms, and the first row of each block.
-    solution
-        Solution object of Clarabel.
+    Values that are not finite count as zero. See `build_program` for the blocks and the first row of each.
     """
     primal, duals = (
         np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0) for values in (solution.x, solution.z)

@@ -59,7 +59,8 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
     zero_equations = equations_of(problem, zero_limits)
     if zero_equations is not None:
         limit_indices = [k for k in limit_indices if k not in zero_limits]
-        equations = zero_equations.joined_with(equations)
+        matrix, right = equations or (np.zeros((0, problem.size)), np.zeros(0))
+        equations = np.concatenate([zero_equations.matrix, matrix]), np.concatenate([zero_equations.right, right])
     # weights in units of the largest weight, because the tolerances of the solver are absolute
     weight_unit = max((problem.terms[k][0] for k in term_indices), default=0.0) or 1.0
     scaled = replace(
@@ -128,19 +129,7 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
 
 
 def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Return the indices of rows whose length at x exceeds `share` times a limit.
-
-    Parameters
-    ----------
-    maximum
-        The limit [SI].
-    norm
-        The limited norm.
-    x
-        Decision vector, shape (n,).
-    share
-        Factor of the limit.
-    """
+    """Return the indices of rows of a norm whose length at x, shape (n,), exceeds `share` times a limit [SI]."""
     return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
 
 
@@ -187,8 +176,6 @@ def solve_quadratic(
 
     Parameters
     ----------
-    problem
-        Problem with the sets and limits.
     gradient, curvature, x
         Shapes (n,), (n, n) and (n,).
     damping

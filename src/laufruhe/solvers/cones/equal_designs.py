@@ -48,14 +48,7 @@ FREE = 0.2
 def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     """Return the range of every unbalance over all designs that keep the limits and stay optimal.
 
-    Empty unless all decisions are affine, and there are few.
-
-    Parameters
-    ----------
-    result
-        Optimum of the objective.
-    limit
-        Limit that keeps the objective at its optimum.
+    Empty unless all decisions are affine, and there are few. The limit keeps the objective at its optimum.
     """
     problem = result.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]
@@ -161,15 +154,7 @@ def _free_domains(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]
 
 
 def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
-    """Return the range of a decision's size over designs, and of its angle [rad], if these vary.
-
-    Parameters
-    ----------
-    domain
-        The decision and its columns.
-    designs
-        Decision vectors, shape (n,) each.
-    """
+    """Return the range of a decision's size over designs, shape (n,) each, and of its angle [rad], if these vary."""
     sizes = [_size(domain, design) for design in designs]
     smallest, largest = min(sizes), max(sizes)
     decision = domain.decision

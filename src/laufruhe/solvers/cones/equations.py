@@ -43,12 +43,6 @@ class Equations:
     dual: tuple[Array, ...]
     shapes: tuple[tuple[int, ...], ...]
 
-    def joined_with(self, equations: tuple[Array, Array] | None) -> tuple[Array, Array]:
-        """Return matrix and right side of these equations, followed by additional ones."""
-        if equations is None:
-            return self.matrix, self.right
-        return np.concatenate([self.matrix, equations[0]]), np.concatenate([self.right, equations[1]])
-
     def project(self, problem: AffineProblem, x: Array) -> Array:
         """Project x, shape (n,), on the equations and on the sets of the decisions, alternately."""
         for _ in range(MAX_PROJECTIONS):
@@ -91,22 +85,12 @@ def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | N
 
 
 def refine_multipliers(coarse: AffineProblem, fine: AffineProblem, multipliers: Multipliers) -> Multipliers:
-    """Replace dual rows of limits of zero by rows on a finer grid with the same slope in the decisions.
-
-    Parameters
-    ----------
-    coarse, fine
-        One problem at few and at many samples.
-    multipliers
-        Dual rows on the coarse grid.
-    """
+    """Replace dual rows of limits of zero on a coarse grid by rows on a fine one with the same slope."""
     zero_limits = [k for k, (maximum, _) in enumerate(coarse.limits) if maximum == 0.0]
     equations = equations_of(fine, zero_limits)
     if equations is None:
         return multipliers
     slope = sum((coarse.limits[k][1].pullback(multipliers.limits[k]) for k in zero_limits), np.zeros(coarse.size))
     rows = equations.dual_rows(equations.matrix @ (equations.units**2 * slope))
-    limits = list(multipliers.limits)
-    for k, z in zip(zero_limits, rows, strict=True):
-        limits[k] = z
-    return Multipliers(multipliers.terms, tuple(limits))
+    limits = dict(enumerate(multipliers.limits)) | dict(zip(zero_limits, rows, strict=True))
+    return Multipliers(multipliers.terms, tuple(limits.values()))

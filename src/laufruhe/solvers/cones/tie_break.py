@@ -20,17 +20,7 @@ NEGLIGIBLE = 1e-6
 
 
 def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
-    """Return the lightest design with the loads of x, shape (n,), negligible decisions set to zero.
-
-    Parameters
-    ----------
-    problem
-        The problem, whose rotors and measures define mass.
-    affine
-        Rows of the problem's loads and limits.
-    x
-        An optimal decision vector, shape (n,).
-    """
+    """Return the lightest design with the loads of an optimum x, shape (n,), negligible decisions set to zero."""
     directions = _free_directions(problem, affine)
     if directions.shape[1]:
         x = _minimise_mass(affine, x, directions)
@@ -94,17 +84,7 @@ def is_moved_along(norm: AffineNorm, directions: Array) -> bool:
 
 
 def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
-    """Return the distance of a decision from a target as an affine norm.
-
-    Parameters
-    ----------
-    domain
-        The decision and its columns.
-    target
-        Point in the columns of the decision, shape (width,).
-    columns
-        Length of the decision vector.
-    """
+    """Return the distance of a decision from a target, shape (width,), as an affine norm of all columns."""
     slope = np.zeros((1, domain.width, columns))
     slope[0, :, domain.columns] = np.eye(domain.width)
     return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))

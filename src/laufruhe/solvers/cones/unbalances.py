@@ -27,13 +27,13 @@ from laufruhe.solvers.conclusion import (
     evaluate_design,
     failed_result,
     infeasible_result,
+    smallest_conflicting,
     violated_limits,
 )
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.cones.newton_polish import Optimum, polish
 from laufruhe.solvers.cones.tie_break import break_ties
-from laufruhe.solvers.conflicts import smallest_conflicting
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
@@ -67,8 +67,6 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
 
     Parameters
     ----------
-    problem
-        The problem.
     polished
         True to narrow the gap of the cone program by Newton's method.
     angles
@@ -139,18 +137,7 @@ def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tu
 def _refine(problem: Problem, model: AffineModel, zero_level: float, start_samples: int) -> tuple[Optimum | None, int]:
     """Double the samples until the bound on a grid twice as fine closes the gap (P6).
 
-    Parameters
-    ----------
-    problem, model
-        The problem and its affine model.
-    zero_level
-        Objective that counts as zero [SI].
-    start_samples
-        Smallest number of samples per period of the first program.
-
-    Returns
-    -------
-    The optimum, or None if the limits contradict each other, and the last number of samples.
+    Return the optimum, or None if the limits contradict each other, and the last number of samples per period.
     """
     # with many rows, start at half the samples: the bound is computed at twice as many
     half = model.full_samples // 2
@@ -162,38 +149,29 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     for k in until_time_limit(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
-            if (
-                best is not None
-                and best.violation <= FEASIBILITY_TOL
-                and _keeps_limits_with_fine_sampling(problem, best)
-            ):
+            if _is_feasible(problem, best):
                 return best, samples
             # sample averages of means: at few samples, a mean may exceed its value over the whole cycle (P7)
             if is_infeasible(model.at(samples, averaged=True)):
                 return None, samples
             # a limit close to the smallest possible value is met within the tolerance of limits
             optimum = _attempt(problem, model, samples, zero_level, FEASIBLE - FEASIBILITY_TOL)
-            if (
-                optimum is not None
-                and optimum.violation <= FEASIBILITY_TOL
-                and _keeps_limits_with_fine_sampling(problem, optimum)
-            ):
-                best = optimum
-            samples *= 2
-            continue
-        best = optimum
-        rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
-        is_close = best.gap <= problem.tolerance or not problem.search.proves
-        is_allowed = best.violation <= (FEASIBLE if k < MAX_DOUBLINGS else FEASIBILITY_TOL)
-        is_fathomed = is_allowed and (is_close or k >= MAX_DOUBLINGS)
-        if rows > MAX_ROWS or (is_fathomed and _keeps_limits_with_fine_sampling(problem, optimum)):
-            break
+            best = optimum if _is_feasible(problem, optimum) else best
+        else:
+            best = optimum
+            rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
+            is_close = best.gap <= problem.tolerance or not problem.search.proves or k >= MAX_DOUBLINGS
+            maximum_violation = FEASIBLE if k < MAX_DOUBLINGS else FEASIBILITY_TOL
+            if rows > MAX_ROWS or (is_close and best.violation <= maximum_violation and _is_feasible(problem, best)):
+                break
         samples *= 2
     return best, samples
 
 
-def _keeps_limits_with_fine_sampling(problem: Problem, optimum: Optimum) -> bool:
+def _is_feasible(problem: Problem, optimum: Optimum | None) -> bool:
     # a mean at few samples may be smaller than over the cycle (P7)
+    if optimum is None or optimum.violation > FEASIBILITY_TOL:
+        return False
     if not any(limit.measure.is_load for limit in problem.load_limits):
         return True
     values = [domain.complex_value(optimum.x) for domain in optimum.problem.domains]
@@ -207,8 +185,6 @@ def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_lev
 
     Parameters
     ----------
-    problem, model
-        The problem and its affine model.
     samples
         Samples per period of the loads.
     zero_level
@@ -234,15 +210,8 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: flo
     bound = best_bound(relaxed, x, refine_multipliers(coarse, relaxed, solution.multipliers))
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
     peak_model = model.at(fine.samples, finer=True) if has_peaks else fine
-    return Optimum(
-        x,
-        bound,
-        fine,
-        gap_of(peak_model.objective(x), bound.value, zero_level),
-        peak_model.violation(x),
-        samples,
-        zero_level,
-    )
+    gap = gap_of(peak_model.objective(x), bound.value, zero_level)
+    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level)
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:
@@ -251,23 +220,12 @@ def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:
 
 
 def is_infeasible(affine: AffineProblem) -> bool:
-    """Return True if no design keeps the limits.
-
-    This is a proof if the rows are sample averages, which never overestimate a mean.
-    """
+    """Return True if no design keeps the limits: a proof if rows are sample averages, never above a mean."""
     return solve_cones(replace(affine, terms=())).x is None
 
 
 def smallest_conflict(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the names of a minimal set of limits that contradict each other.
-
-    Parameters
-    ----------
-    affine
-        Rows of the problem.
-    names
-        Name of every limit of the problem.
-    """
+    """Return the names of a minimal set of limits that contradict each other; `names` has the name of every limit."""
 
     def excluded(indices: Sequence[int]) -> bool:
         return is_infeasible(replace(affine, limits=tuple(affine.limits[k] for k in indices)))

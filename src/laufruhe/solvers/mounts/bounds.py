@@ -18,8 +18,7 @@ from laufruhe.prove.branch_and_bound import GAP_SAFETY, BoxResult
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of, make_certificate
 from laufruhe.prove.mounts.provers import Question, run_provers
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem, stiffness_bounds
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, values_of, witness_of
-from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, smallest_conflict, values_of, witness_of
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import sampling_overestimate

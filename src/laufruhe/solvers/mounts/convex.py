@@ -35,13 +35,11 @@ from laufruhe.prove.mounts.convex_functions import (
 )
 from laufruhe.solvers.conclusion import (
     ProofData,
-    better_design,
     build_result,
     evaluate_design,
     infeasible_result,
-    initial_design,
+    smallest_conflict,
 )
-from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.prices import Price, bounds_of
 from laufruhe.solvers.result import Result
 
@@ -152,7 +150,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
             for name, price in bounds_of(decision, np.array([value]), gradient[k : k + 1]).items()
         },
     )
-    design = better_design(evaluate_design(problem, [float(v) for v in x]), initial_design(problem, initial))
+    design = evaluate_design(problem, [float(v) for v in x])
     return build_result(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -47,7 +48,8 @@ class StaticCases:
         self, mounts: SymbolicMounts, mounting: ElasticMounting, root: Array, constraints: ConstraintCollector
     ) -> None:
         self._mounts, self._mounting, self._root, self._constraints = mounts, mounting, root, constraints
-        self._stops, self._cache = stops_of(mounting), dict[LoadCase, MountResponse]()
+        self._stops = stops_of(mounting)
+        self._response = cache(self._new_response)
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
         """Return a variable constrained to be at least every length of a measure, scaled by the initial one (E22)."""
@@ -55,7 +57,7 @@ class StaticCases:
         assert part is not None
         cases, weights = counted_cases(measure, engine), ca.DM(list(measure.direction_weights or (1.0, 1.0, 1.0)))
         initial = [np.linalg.norm(part(settled(self._mounting, case)), axis=1).max() for case in cases]
-        unit, signals = max(map(float, initial)) or 1.0, [part(self._symbols(case)) for case in cases]
+        unit, signals = max(map(float, initial)) or 1.0, [part(self._response(case)) for case in cases]
         squares = ca.vertcat(
             *(ca.sumsqr(weights * signal[3 * k : 3 * k + 3] / unit) for signal in signals for k in selected)
         )
@@ -65,12 +67,7 @@ class StaticCases:
         collector.hold(squares - largest * largest)
         return unit * largest
 
-    def _symbols(self, case: LoadCase) -> MountResponse:
-        if case not in self._cache:
-            self._cache[case] = self._solved(case)
-        return self._cache[case]
-
-    def _solved(self, case: LoadCase) -> MountResponse:
+    def _new_response(self, case: LoadCase) -> MountResponse:
         mounts, load = self._mounts, self._root @ case_wrench(self._mounting.block, case)
         y, _ = elimination()(mounts.stiffness, ca.MX(6, 6), ca.DM(load), ca.DM.zeros(6))
         stops = np.flatnonzero(self._stops.stiffness)

@@ -39,14 +39,9 @@ class ConstraintCollector:
     def add(
         self, expression: Any, lower: float, upper: float, name: str, minimum: Slope = None, maximum: Slope = None
     ) -> None:
-        """Add a scalar or column constraint.
+        """Constrain every entry of a scalar or column.
 
-        Parameters
-        ----------
-        lower, upper
-            Bounds of every entry of the expression.
-        minimum, maximum
-            Sides of limits whose shadow prices follow from the multipliers of the lower and upper bound.
+        Shadow prices of the sides `minimum` and `maximum` follow from multipliers of the lower and upper bound.
         """
         expression = ca.MX(expression)
         count = expression.numel()
@@ -69,19 +64,16 @@ class MeasureCollector:
     name: str
     symbol: Any
 
-    def head(self, value: Any) -> Any:
-        """Add epigraph variables for largest values, and return their symbols; `value` is the start (E22)."""
-        return self._added(value, 0.0)
-
-    def free(self, value: Any) -> Any:
-        """Add a row of variables without bounds, and return their symbols; `value` is the start."""
-        return self._added(value.T, -math.inf).T
-
-    def _added(self, value: Any, lower: float) -> Any:
+    def head(self, value: Any, lower: float = 0.0) -> Any:
+        """Add a column of epigraph variables for largest values, and return it; `value` is the start (E22)."""
         variable = self.symbol.sym(f"head{len(self.into.heads)}", value.numel())
         self.into.heads.append((variable, value))
         self.into.floors += [lower] * value.numel()
         return variable
+
+    def free(self, value: Any) -> Any:
+        """Add a row of variables without bounds, and return their symbols; `value` is the start."""
+        return self.head(value.T, -math.inf).T
 
     def hold(self, expression: Any) -> None:
         """Constrain every entry of an expression to at most zero."""

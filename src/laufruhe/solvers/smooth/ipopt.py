@@ -7,11 +7,12 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from laufruhe.load_models.simulated import Peaks
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, seconds_left, until_time_limit
 from laufruhe.numerics.progress import report_progress, with_progress
@@ -56,31 +57,13 @@ _ENDINGS = {
 }
 
 
-class ExternalModel(Protocol):
-    """Model outside CasADi; it can be pickled."""
-
-    def values(self, arguments: Array) -> Array:
-        """Return the values at the arguments, shape (values,); NaN if the evaluation fails."""
-
-    def slopes(self, arguments: Array) -> Array:
-        """Return the derivatives of the values by the arguments, shape (values, arguments)."""
-
-
-@dataclass(frozen=True, eq=False)
-class SerializedExternal:
-    """External model with its arguments as a serialized function of the variables.
-
-    The values of the model are the input r of the oracle.
-    """
-
-    arguments: str
-    model: ExternalModel
-    count: int
-
-
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Nonlinear program that can be pickled; its variables are scaled."""
+    """Nonlinear program that can be pickled; its variables are scaled.
+
+    The values of an external model are the input r of the oracle. Its arguments are a serialized function of the
+    variables.
+    """
 
     oracle: str
     lower: Array
@@ -93,7 +76,7 @@ class Task:
     max_iterations: int
     max_seconds: float
     expand: bool
-    external_model: SerializedExternal | None = None
+    external_model: tuple[str, Peaks] | None = None
     leading_variables: int | None = None
 
 
@@ -107,46 +90,12 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
     return [_from_start(task, program, k, point) for k, point in until_time_limit(with_progress("starts", points))]
 
 
-class _Clock(ca.Callback):
-    """Iteration callback that stops IPOPT at a deadline.
+class _Callback(ca.Callback):
+    """CasADi function in Python, from columns of these sizes to one dense matrix of this shape."""
 
-    The time limit of IPOPT itself would be fixed in the cached program.
-    """
-
-    def __init__(self, sizes: dict[str, int]) -> None:
+    def __init__(self, sizes: tuple[int, ...], shape: tuple[int, int] = (1, 1)) -> None:
         ca.Callback.__init__(self)
-        self._sizes, self._until = sizes, math.inf
-        self.construct("clock", {})
-
-    def start(self, seconds: float) -> None:
-        """Set the deadline to a number of seconds [s] from now."""
-        self._until = time.monotonic() + seconds
-
-    def get_n_in(self) -> int:
-        """Return the number of inputs, equal to the number of outputs of a CasADi NLP solver."""
-        return int(ca.nlpsol_n_out())
-
-    def get_n_out(self) -> int:
-        """Return 1: the single output ends the search if it is not zero."""
-        return 1
-
-    def get_sparsity_in(self, k: int) -> Any:
-        """Return the sparsity of an input: a dense column."""
-        return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(k)], 1)
-
-    def eval(self, _: Any) -> list[float]:
-        """Return 1.0 if time is over, else 0.0."""
-        return [float(time.monotonic() > self._until)]
-
-
-class _ExternalFunction(ca.Callback):
-    """CasADi function whose values and derivatives Python computes."""
-
-    def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
-        ca.Callback.__init__(self)
-        self._sizes, self._shape, self._answer, self._slopes = sizes, shape, answer, slopes
-        self._derivative: Any = None
-        self.construct(name, {})
+        self._sizes, self._shape = sizes, shape
 
     def get_n_in(self) -> int:
         """Return the number of input columns."""
@@ -163,6 +112,33 @@ class _ExternalFunction(ca.Callback):
     def get_sparsity_out(self, _: int) -> Any:
         """Return the sparsity of the output: a dense matrix."""
         return ca.Sparsity.dense(*self._shape)
+
+
+class _Clock(_Callback):
+    """Iteration callback that stops IPOPT at a deadline.
+
+    The time limit of IPOPT itself would be fixed in the cached program.
+    """
+
+    def __init__(self, sizes: dict[str, int]) -> None:
+        # the inputs are the outputs of a CasADi NLP solver
+        super().__init__(tuple(sizes[ca.nlpsol_out(k)] for k in range(ca.nlpsol_n_out())))
+        self.until = math.inf
+        self.construct("clock", {})
+
+    def eval(self, _: Any) -> list[float]:
+        """Return 1.0 if time is over, else 0.0."""
+        return [float(time.monotonic() > self.until)]
+
+
+class _ExternalFunction(_Callback):
+    """CasADi function whose values and derivatives Python computes."""
+
+    def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
+        super().__init__(sizes, shape)
+        self._answer, self._slopes = answer, slopes
+        self._derivative: Any = None
+        self.construct(name, {})
 
     def eval(self, external: Any) -> list[Any]:
         """Return the output at the first input; a derivative also receives the values, and ignores them."""
@@ -200,7 +176,7 @@ class _Program:
 
 @lru_cache(maxsize=_BUILT)
 def _compiled_program(
-    oracle: str, expand: bool, max_iterations: int, external_model: SerializedExternal | None, stay_near: bool = False
+    oracle: str, expand: bool, max_iterations: int, external_model: tuple[str, Peaks] | None, stay_near: bool = False
 ) -> _Program:
     """Return the compiled solver of a program, which takes as long as several starts; `stay_near`: small barrier."""
     function, external = ca.Function.deserialize(oracle), None
@@ -210,27 +186,18 @@ def _compiled_program(
             function = scalars
     solver = {**_OPTIONS, **(_NEAR if stay_near else {}), "max_iter": max_iterations}
     if external_model is not None:
-        function, external = _with_external_model(function, external_model)
+        arguments, model = ca.Function.deserialize(external_model[0]), external_model[1]
+        shape = sum(model.counts), 1
+        external = _ExternalFunction("told", (arguments.size1_out(0),), shape, model.values, model.slopes)
+        x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
+        outputs = function(x=x, p=p, r=external(arguments(x)))
+        function = ca.Function("oracle", {"x": x, "p": p, "f": outputs["f"], "g": outputs["g"]}, ["x", "p"], ["f", "g"])
         # an external model has first derivatives only
         solver |= {"hessian_approximation": "limited-memory", "tol": LOOSER}
     n, m = function.size1_in("x"), function.size1_out("g")
     clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
     options: dict[str, Any] = {**_QUIET, "ipopt": solver, "iteration_callback": clock}
     return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, external)
-
-
-def _with_external_model(function: Any, external_model: SerializedExternal) -> tuple[Any, _ExternalFunction]:
-    arguments_function, model, count = (
-        ca.Function.deserialize(external_model.arguments),
-        external_model.model,
-        external_model.count,
-    )
-    external = _ExternalFunction("told", (arguments_function.size1_out(0),), (count, 1), model.values, model.slopes)
-    x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
-    outputs = function(x=x, p=p, r=external(arguments_function(x)))
-    return ca.Function(
-        "oracle", {"x": x, "p": p, "f": outputs["f"], "g": outputs["g"]}, ["x", "p"], ["f", "g"]
-    ), external
 
 
 def _from_start(task: Task, program: _Program, k: int, point: Array) -> LocalOptimum:
@@ -247,11 +214,8 @@ def _from_start(task: Task, program: _Program, k: int, point: Array) -> LocalOpt
             retry = _run_stage(task, _compile_task(task, stay_near=True), y, stage)
             iterations += retry.iterations
             is_converged = retry.ending in (Ending.CONVERGED, Ending.ACCEPTABLE)
-            stage_end = (
-                retry
-                if is_converged and program.value(retry.y, stage) < program.value(stage_end.y, stage)
-                else stage_end
-            )
+            if is_converged and program.value(retry.y, stage) < program.value(stage_end.y, stage):
+                stage_end = retry
         y, m, b, ending = stage_end.y, stage_end.m, stage_end.b, stage_end.ending
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
@@ -294,7 +258,7 @@ def _compile_task(task: Task, stay_near: bool = False) -> _Program:
 
 def _run_stage(task: Task, program: _Program, y: Array, stage: Sequence[float]) -> _End:
     # run one stage from a point
-    program.clock.start(min(task.max_seconds, max(seconds_left(), SHORTEST)))
+    program.clock.until = time.monotonic() + min(task.max_seconds, max(seconds_left(), SHORTEST))
     solution = program.solver(
         x0=y, p=list(stage), lbx=task.lower, ubx=task.upper, lbg=task.constraint_lower, ubg=task.constraint_upper
     )

@@ -89,10 +89,6 @@ class LocalProgram:
         """Return the start point of a search from decision values of a box."""
         return self.shares(values)
 
-    def by_decision(self, values: Array) -> dict[str, Array]:
-        """Return the entries of a vector, shape (n,), by the name of their decision."""
-        return {domain.decision.name: values[domain.columns] for domain in self.domains}
-
     def slopes(self, shares: Array) -> Array:
         """Return derivatives of `numbers` by central differences within the bounds, shape (1 + limits, n)."""
         rows = []
@@ -120,15 +116,7 @@ def spread_starts(problem: Problem) -> list[Array]:
 
 
 def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) -> Array:
-    """Return the best point of local searches from the best start points.
-
-    Parameters
-    ----------
-    places
-        Start points as shares, shape (n,) each.
-    starts
-        Largest number of local searches.
-    """
+    """Return the best point of up to `starts` local searches from the best of these places, shape (n,) each."""
     ranked = sorted(until_time_limit(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, POINTS_PER_START))]:
@@ -212,14 +200,9 @@ class ProvenDesign:
 
 
 def prove_design(program: LocalProgram, best: Array, bounded: BoundByBoxes) -> ProvenDesign:
-    """Return a design with its bound; search again from the boxes with the smallest bound while a gap is open.
+    """Return a design, first at the shares `best`, with its bound by boxes.
 
-    Parameters
-    ----------
-    best
-        Best known point as shares, shape (n,).
-    bounded
-        Lower bound by boxes.
+    While a gap is open, local searches start from the boxes with the smallest bound.
     """
     problem = program.problem
     result = ProvenDesign(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
@@ -244,67 +227,47 @@ def prove_design(program: LocalProgram, best: Array, bounded: BoundByBoxes) -> P
 
 
 def proof_data(program: LocalProgram, design: Design, bound: float, strength: ProofStrength, method: str) -> ProofData:
-    """Return a lower bound with shadow prices of active limits and bounds, and the residual of their balance.
-
-    Parameters
-    ----------
-    bound
-        Lower bound of the objective.
-    strength
-        Kind of proof that the bound can give.
-    method
-        Text for the certificate.
-    """
+    """Return a lower bound with shadow prices of active limits and bounds, and the residual of their balance."""
     from scipy.optimize import nnls
 
     problem, best = program.problem, program.shares(design.values)
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
-    size = float(np.abs(slopes[0]).max()) or 1.0
+    largest = [float(np.abs(row).max()) or 1.0 for row in slopes]
     active_rooms = [k for k, room in enumerate(rooms) if room <= ACTIVE_MARGIN]
     low, high = best <= ACTIVE_MARGIN, best >= 1.0 - ACTIVE_MARGIN
-    columns = [-slopes[1 + k] / (float(np.abs(slopes[1 + k]).max()) or 1.0) for k in active_rooms]
+    columns = [-slopes[1 + k] / largest[1 + k] for k in active_rooms]
     columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
-    scale = max(size, design.value)
-    shares, residual = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else (np.zeros(0), size / scale)
+    scale = max(largest[0], design.value)
+    no_shares = np.zeros(0), largest[0] / scale
+    shares, residual = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else no_shares
     prices: dict[Side, Price] = {}
-    remainder, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
+    # gradient of the Lagrangian without the bounds of decisions
+    gradient, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
     for k, share in zip(active_rooms, shares, strict=False):
         if k >= len(problem.limits):
             # an edge of a set, which is priced as a bound of its decision
             continue
         limit = problem.limits[k]
-        largest = float(np.abs(slopes[1 + k]).max()) or 1.0
-        _, edge, side = limit.slack(design.evaluation.check_limit(limit).value)
+        _, edge, name = limit.slack(design.evaluation.check_limit(limit).value)
         # margins are relative to the limit
-        sides.append((k, (limit, side), abs(edge) or 1.0))
-        prices[limit, side] = Price.both(float(share) * scale / (largest * (abs(edge) or 1.0)))
-        remainder = remainder - float(share) * scale / largest * slopes[1 + k]
-    bounds = _two_sided_prices(program, best, slopes, remainder, sides, prices)
-    return ProofData(bound, strength, float(residual), method, prices, bounds)
-
-
-def _two_sided_prices(
-    program: LocalProgram, shares: Array, slopes: Array, remainder: Array, sides: Sequence[tuple[int, Side, float]],
-    prices: dict[Side, Price],
-) -> dict[str, Price]:  # fmt: skip
-    """Return prices of bounds, and update prices of limits for which relaxing and tightening differ."""
-    widths, columns = program.upper - program.lower, program.columns(shares)
-    remainders = program.by_decision(remainder / widths)
-    bound_prices, normals = dict[str, Price](), list[Array]()
+        unit = abs(edge) or 1.0
+        sides.append((k, (limit, name), unit))
+        prices[limit, name] = Price.both(float(share) * scale / (largest[1 + k] * unit))
+        gradient = gradient - float(share) * scale / largest[1 + k] * slopes[1 + k]
+    widths, values = program.upper - program.lower, program.columns(best)
+    bounds, normals = dict[str, Price](), list[Array]()
     for domain in program.domains:
-        column = columns[domain.columns]
-        bound_prices |= bounds_of(domain.decision, column, remainders[domain.decision.name])
+        column = values[domain.columns]
+        bounds |= bounds_of(domain.decision, column, (gradient / widths)[domain.columns])
         for normal in edges_at(domain.decision, column).values():
-            normals.append(np.zeros(len(shares)))
+            normals.append(np.zeros(len(best)))
             normals[-1][domain.columns] = normal
-    limit_slopes = [Slopes.smooth(-slopes[1 + k]) for k, *_ in sides]
-    prices_by_side = prices_of(
-        [Slopes.smooth(slopes[0])], limit_slopes, np.array(normals).reshape(-1, len(shares)) * widths
-    )
-    if prices_by_side is None:
-        return bound_prices
-    for (_, side, edge), price in zip(sides, prices_by_side, strict=False):
-        if not price.is_equal:
-            prices[side] = Price(price.relaxed / edge, price.tightened / edge)
-    return dict(zip(bound_prices, prices_by_side[len(sides) :], strict=True))
+    edges = np.array(normals).reshape(-1, len(best)) * widths
+    both_sides = prices_of([Slopes.smooth(slopes[0])], [Slopes.smooth(-slopes[1 + k]) for k, *_ in sides], edges)
+    if both_sides is not None:
+        for (_, side, unit), price in zip(sides, both_sides, strict=False):
+            if not price.is_equal:
+                prices[side] = Price(price.relaxed / unit, price.tightened / unit)
+        bounds = dict(zip(bounds, both_sides[len(sides) :], strict=True))
+    return ProofData(bound, strength, float(residual), method, prices, bounds)

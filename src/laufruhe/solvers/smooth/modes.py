@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
 from itertools import permutations
 from typing import Any
 
@@ -13,7 +12,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.problem import channels
-from laufruhe.problem.channels import Channel, motion_indices
+from laufruhe.problem.channels import motion_indices
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.constraint_collector import ConstraintCollector
@@ -66,14 +65,12 @@ class ModeVariables:
 
     def limit(self, limit: Limit) -> bool:
         """Add a limit on modes; return False for a limit on another measure."""
-        add_limit = self._limits.get(limit.measure.channel)
-        if add_limit is not None:
-            add_limit(limit)
-        return add_limit is not None
-
-    @property
-    def _limits(self) -> Mapping[Channel, Callable[[Limit], None]]:
-        return {channels.DECOUPLING: self._least_shares, channels.FREQUENCIES: self._frequencies}
+        limiters = ((channels.DECOUPLING, self._least_shares), (channels.FREQUENCIES, self._frequencies))
+        for channel, add_limit in limiters:
+            if limit.measure.channel == channel:
+                add_limit(limit)
+                return True
+        return False
 
     def _shares(self, measure: Measure) -> list[Any]:
         # E24: share of motion j in mode j; the columns start at their motions

@@ -30,6 +30,7 @@ from typing import Any, TypeAlias
 import casadi as ca
 import numpy as np
 
+from laufruhe.load_models.simulated import Peaks
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.processes import Processes
@@ -41,13 +42,15 @@ from laufruhe.numerics.workers import (
     unordered_map,
     worker_count,
 )
-from laufruhe.solvers.smooth.ipopt import ExternalModel, SerializedExternal, Task, run
+from laufruhe.solvers.smooth.ipopt import Task, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 StopWhen: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
 Share: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
 RunStarts: TypeAlias = Callable[[Share], list[LocalOptimum]]
 
+# number of starts for which arrays are expanded to scalars: evaluation is three times as fast for short arrays, and
+# compilation is slower
 WORTH_EXPANDING = 3
 # number of starts in one round
 ROUND = 6
@@ -61,7 +64,7 @@ class ExternalValues:
 
     symbols: Any
     arguments: Any
-    model: ExternalModel
+    model: Peaks
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,25 +75,16 @@ class NonlinearProgram:
     ----------
     x
         Column of variables, SX or MX, shape (n,).
-    objective
-        Scalar expression.
     lower, upper
         Bounds of the variables, shape (n,).
-    constraints
-        Column of expressions, shape (m,).
-    constraint_lower, constraint_upper
-        Bounds of the constraints, shape (m,); infinite if there is none.
-    constraint_names
-        Names for reports.
+    constraints, constraint_lower, constraint_upper
+        Column of expressions, shape (m,), and their bounds; infinite if there is none.
     scales
         Typical sizes of the variables, shape (n,); the width of their bounds if None.
     objective_scale
         Typical size of the objective; that of every constraint is one.
     parameters, stages
         Symbols and their values, one row for each stage (N4).
-    expand
-        True if arrays may be expanded to scalars when several starts share the cost. Evaluation is then three times
-        as fast for short arrays, and compilation is slower.
     external
         Values in the expressions that an external model computes.
     leading_variables
@@ -110,18 +104,8 @@ class NonlinearProgram:
     objective_scale: float = 1.0
     parameters: Any = None
     stages: tuple[tuple[float, ...], ...] = ((),)
-    expand: bool = False
     external: ExternalValues | None = None
     leading_variables: int | None = None
-
-    def __post_init__(self) -> None:
-        n, m = self.x.numel(), 0 if self.constraints is None else self.constraints.numel()
-        if len(self.lower) != n or len(self.upper) != n:
-            raise ValueError(f"{n} variables need as many bounds")
-        if len(self.constraint_lower) != m or len(self.constraint_upper) != m:
-            raise ValueError(f"{m} constraints need as many sides")
-        if np.any(self.lower > self.upper) or np.any(self.constraint_lower > self.constraint_upper):
-            raise ValueError("a lower side lies above its upper one")
 
     @property
     def variable_scales(self) -> Array:
@@ -149,8 +133,6 @@ def solve_nonlinear(
 
     Parameters
     ----------
-    program
-        Program to solve.
     starts
         Start points, shape (n,) each, projected into the bounds.
     workers
@@ -247,22 +229,17 @@ class _ReadyWorkers:
 def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
     """Return one optimum for each end point with its number of starts; unusable optima stay separate."""
     groups: list[LocalOptimum] = []
+    place_tolerance = SAME_PLACE * task.scales[: task.leading_variables]
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: (o.value, o.start)):
-        index = next((k for k, same in enumerate(groups) if _is_same(optimum, same, task)), None)
-        if index is None:
-            groups.append(optimum)
+        for k, same in enumerate(groups):
+            value_tolerance = SAME_END * max(abs(same.value), MIN_SCALE * task.objective_scale)
+            is_near = np.abs(optimum.x - same.x)[: task.leading_variables] <= place_tolerance
+            if optimum.value - same.value <= value_tolerance and is_near.all():
+                groups[k] = replace(same, start=min(same.start, optimum.start), starts=same.starts + optimum.starts)
+                break
         else:
-            same = groups[index]
-            groups[index] = replace(same, start=min(same.start, optimum.start), starts=same.starts + optimum.starts)
+            groups.append(optimum)
     return [*groups, *(o for o in optima if not o.usable)]
-
-
-def _is_same(optimum: LocalOptimum, other: LocalOptimum, task: Task) -> bool:
-    value_tolerance = SAME_END * max(abs(other.value), MIN_SCALE * task.objective_scale)
-    is_apart = (
-        np.abs(optimum.x - other.x)[: task.leading_variables] > SAME_PLACE * task.scales[: task.leading_variables]
-    )
-    return optimum.value - other.value <= value_tolerance and not is_apart.any()
 
 
 def _run_later_stages(task: Task, groups: Sequence[LocalOptimum], run_starts: RunStarts) -> list[LocalOptimum]:
@@ -304,12 +281,10 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, is
     inputs = {"x": y, "p": parameters}
     if external is not None:
         inputs["r"] = external.symbols
-        external_model = SerializedExternal(
-            ca.Function("asked", [y], [arguments]).serialize(), external.model, external.symbols.numel()
-        )
+        external_model = ca.Function("asked", [y], [arguments]).serialize(), external.model
     oracle = ca.Function("oracle", {**inputs, "f": f, "g": g}, list(inputs), ["f", "g"])
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower,
         program.constraint_upper, scales, program.objective_scale, program.stages,
-        max_iterations, max_seconds, program.expand and is_shared, external_model, program.leading_variables,
+        max_iterations, max_seconds, is_shared, external_model, program.leading_variables,
     )  # fmt: skip

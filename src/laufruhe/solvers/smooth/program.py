@@ -31,7 +31,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import Grid, softened_lengths
 from laufruhe.physics.modes import weight_wrench
-from laufruhe.physics.mount_numbers import AxisResidual, mass_root
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -84,8 +84,8 @@ class SmoothProgram:
         self, problem: Problem, unit: float, margin: float = 0.0, moves: ThrowMoves | None = None,
         slack: float = 0.0, softest: float = SOFTEST, coarser: int = COARSE_STEP,
     ) -> None:  # fmt: skip
-        self.problem, self._margin, self._slack, self.moves = problem, margin, slack, moves
-        self._softest = softest
+        self.problem, self.unit, self.moves = problem, unit, moves
+        self._margin, self._slack, self._softest = margin, slack, softest
         self.domains = domains_of(problem.unbalances)
         self._decisions = problem.mount_decisions
         self._count = len(self._decisions)
@@ -101,29 +101,33 @@ class SmoothProgram:
         ]
         self._mount_numbers = ca.vertcat(*numbers) if numbers else self._mount_variables
         self._throw_deviations = ca.MX.sym("throws", 0 if moves is None else moves.size)
-        self._loads = self._loads_of(moves)
+        self._loads: SymbolicLoads
+        if moves is None:
+            # the affine model gives loads and unbalances, which do not depend on the mounts
+            affine = AffineModel(off_resonance(problem))
+            self._loads = FixedCrankLoads(affine, self._unbalance_columns)
+        else:
+            self._loads = OpenCrankLoads(problem, moves, self._throw_deviations, self._unbalance_columns)
         self._softness = ca.MX.sym("softness")
         self._constraints = ConstraintCollector()
         self._modes = ModeVariables(problem, self._constraints)
         self._simulated = SimulatedVariables(
             problem, ca.vertcat(self._mount_numbers, self._unbalance_columns), self._constraints, coarser
         )
-        self.unit = unit
         self._points: list[PointResponse] = []
         if problem.uses_mounts:
             self._mounting = mounting_in(problem.engine)
             self._root = mass_root(self._mounting.block)
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._mount_numbers)
             self._cases = StaticCases(self._mounts, self._mounting, self._root, self._constraints)
-            self._points = self._responses()
+            wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
+            # E4
+            self._points = [
+                response(self._mounts, point, wrench)
+                for point, wrench in zip(problem.points, self._loads.wrenches(wrench_map), strict=True)
+            ]
             self._modes.hold(self._mounts.stiffness, self._root, self._mounting)
         self.program = self._build()
-
-    def _loads_of(self, moves: ThrowMoves | None) -> SymbolicLoads:
-        if moves is None:
-            # the affine model gives loads and unbalances, which do not depend on the mounts
-            return FixedCrankLoads(AffineModel(off_resonance(self.problem)), self._unbalance_columns)
-        return OpenCrankLoads(self.problem, moves, self._throw_deviations, self._unbalance_columns)
 
     def _build(self) -> NonlinearProgram:
         minimum = ca.MX(0.0)
@@ -138,6 +142,11 @@ class SmoothProgram:
                 self._constraints.add(row, self.moves.intervals.minimum, self.moves.intervals.maximum, name)
         largest = ca.vertcat(*(top for top, _ in self._constraints.heads)) if self._constraints.heads else ca.MX(0, 1)
         lower, upper = self._bounds()
+        width = upper - lower
+        scales = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
+        scales[self._throw_columns] = TURN
+        # N4: one stage if simulations are costly and no softened term is minimised
+        is_costly = self._simulated.external is not None and not self.problem.load_terms
         constraints = ca.densify(ca.vertcat(*self._constraints.expressions)) if self._constraints.expressions else None
         return NonlinearProgram(
             ca.vertcat(
@@ -150,20 +159,13 @@ class SmoothProgram:
             constraint_lower=np.array(self._constraints.lower),
             constraint_upper=np.array(self._constraints.upper),
             constraint_names=tuple(self._constraints.names),
-            scales=self._scales(lower, upper),
+            scales=scales,
             objective_scale=self.unit,
             parameters=self._softness,
-            stages=self._stages,
-            expand=True,
+            stages=tuple((share,) for share in (*(() if is_costly else SOFTNESS), self._softest)),
             external=self._simulated.external,
             leading_variables=self._throw_columns.stop,
         )
-
-    @property
-    def _stages(self) -> tuple[tuple[float, ...], ...]:
-        # N4: one stage if simulations are costly and no softened term is minimised
-        plain = self._simulated.external is not None and not self.problem.load_terms
-        return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
     def _bounds(self) -> tuple[Array, Array]:
         low = self._to_variables([d.lower for d in self._decisions]).tolist()
@@ -175,32 +177,14 @@ class SmoothProgram:
         if self.moves is not None:
             low += self.moves.lower.tolist()
             high += self.moves.upper.tolist()
-        modes = self._modes.symbols.numel()
-        free = np.full(modes + len(self._constraints.floors), np.inf)
-        free_lower = -free
-        free_lower[modes:] = self._constraints.floors
-        return np.concatenate([low, free_lower]), np.concatenate([high, free])
-
-    def _scales(self, lower: Array, upper: Array) -> Array:
-        width = upper - lower
-        scales = np.where(np.isfinite(width) & (width > 0.0), width, 1.0)
-        scales[self._throw_columns] = TURN
-        return scales
+        modes, floors = self._modes.symbols.numel(), self._constraints.floors
+        low += [*[-math.inf] * modes, *floors]
+        return np.array(low), np.array(high + [math.inf] * (modes + len(floors)))
 
     @property
     def _throw_columns(self) -> slice:
         first = self._count + self.columns
         return slice(first, first + self._throw_deviations.numel())
-
-    # loads
-
-    def _responses(self) -> list[PointResponse]:
-        # E4
-        wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
-        return [
-            response(self._mounts, point, wrench)
-            for point, wrench in zip(self.problem.points, self._loads.wrenches(wrench_map), strict=True)
-        ]
 
     def _rows(self, measure: Measure) -> tuple[Any, Grid]:
         if measure.on_mounts and self._points:
@@ -249,8 +233,6 @@ class SmoothProgram:
                     sign * (x * unbalance[1] - y * unbalance[0]) / domain.scale, 0.0, np.inf, domain.decision.name
                 )
 
-    # mounts and modes
-
     def _mounting_expression(self, quantity: Measure) -> Any:
         """Return the expression of a measure of mounts or modes."""
         mounts = self._mounts
@@ -260,7 +242,14 @@ class SmoothProgram:
             deflection, _ = elimination()(mounts.stiffness, ca.MX(6, 6), load, ca.DM.zeros(6))
             return ca.dot(load, deflection) / -weight[2]
         if quantity.channel.axis_residual is not None:
-            return self._residual(quantity.channel.axis_residual(self._mounting.block, quantity.frequency))
+            # residual of the torque-roll axis, relative to that of the initial mounts
+            axis = quantity.channel.axis_residual(self._mounting.block, quantity.frequency)
+            initial = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
+            unit = float(np.linalg.norm(initial)) or 1.0
+            answer, mass = ca.DM(axis.left) @ mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
+            best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.minimum)
+            residual = answer - (ca.fmin(best, axis.maximum) if axis.maximum < math.inf else best) * mass
+            return unit * softened_lengths(residual.T / unit, self._softness)
         if quantity.channel.case_vectors is not None:
             return self._cases.largest(quantity, self.problem.engine)
         if quantity.channel is channels.DECOUPLING_SHORTFALL:
@@ -280,15 +269,6 @@ class SmoothProgram:
             self._constraints.add(force / rigid - largest * largest, -np.inf, 0.0, quantity.name)
         return largest
 
-    def _residual(self, axis: AxisResidual) -> Any:
-        # residual of the torque-roll axis, relative to that of the initial mounts
-        initial = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
-        unit = float(np.linalg.norm(initial)) or 1.0
-        answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
-        best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.minimum)
-        rows = answer - (ca.fmin(best, axis.maximum) if axis.maximum < math.inf else best) * mass
-        return unit * softened_lengths(rows.T / unit, self._softness)
-
     def _limit_mounts(self, limit: Limit) -> None:
         quantity = limit.measure
         if self._modes.limit(limit):
@@ -304,8 +284,6 @@ class SmoothProgram:
             low, high = limit.minimum / unit, limit.maximum / unit
             slopes = (((limit, side), 1.0 / unit) for side in SIDES)
             self._constraints.add(self._mounting_expression(quantity) / unit, low, high, limit.name, *slopes)
-
-    # between variables and decisions
 
     def prices(self, optimum: LocalOptimum) -> dict[Side, Price]:
         """Return shadow prices by side of a limit, from the multipliers of an optimum."""
