@@ -38,7 +38,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.stars.cut_search import search_designs
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import solve_design
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (
@@ -158,11 +158,10 @@ def joint(n: int) -> tuple[str, ...]:
     model = StarModel(phasing, family.space, family.geometry)
     found = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)
     by_cuts = time.process_time() - start
-    owners = shaft_owners(model)
     start = time.process_time()
     some = family.stars[:60]
     for star in some.tolist():
-        solve_design(model, tuple(star), (), owners, problem.tolerance, floor)
+        solve_design(model, tuple(star), (), problem.tolerance, floor)
     every = (time.process_time() - start) * len(family.stars) / len(some)
     gap = (found.solved[0].value - found.lower_bound) / max(found.solved[0].value, floor)
     return (

@@ -89,15 +89,15 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
     weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
     problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
     model, stars = model_of(problem)
-    star, owners = tuple(map(int, stars[0])), shaft_owners(model)
-    found, _ = solve_design(model, star, built, owners, 1e-4, numerical_zero(problem))
+    star = tuple(map(int, stars[0]))
+    found, _ = solve_design(model, star, built, 1e-4, numerical_zero(problem))
     candidate = replace(
         model.phasing.star(star, model.space.phases, model.geometry), left_out=model.phasing.without(built)
     )
     alone = solve(replace(model.phasing.realise(candidate), phasing=None))
     assert alone.certificate.kind is Proof.GLOBAL
     assert found.value == pytest.approx(alone.objective.value, rel=2e-4)
-    assert coarse_value(model, star, built, owners) == pytest.approx(found.value, rel=0.02)
+    assert coarse_value(model, star, built) == pytest.approx(found.value, rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["mean", "maximum", "balance factor", "limited"])
@@ -120,7 +120,7 @@ def test_cuts_never_exceed_an_optimum(tmp_path, name):
     problem = engines.problem(tmp_path, 4, rest=CASES[name])
     model, stars = model_of(problem)
     owners = shaft_owners(model)
-    answers = [solve_design(model, tuple(star), (), owners, 1e-6) for star in stars.tolist()]
+    answers = [solve_design(model, tuple(star), (), 1e-6) for star in stars.tolist()]
     for _, cut in answers:
         bounds = cut.bounds(stars, [()], owners)[:, 0]
         assert np.all(bounds <= [s.value * (1.0 + 1e-9) for s, _ in answers])
@@ -134,7 +134,7 @@ def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
     problem = engines.problem(tmp_path, 5, rest=CASES["limited"] + couple)
     model, stars = model_of(problem)
     owners = shaft_owners(model)
-    answers = [solve_design(model, tuple(star), (), owners, 1e-4) for star in stars.tolist()]
+    answers = [solve_design(model, tuple(star), (), 1e-4) for star in stars.tolist()]
     without = np.array([solved is None for solved, _ in answers])
     assert without.sum() == 12
     excluded = np.array([cut.excludes(stars, [()], owners)[:, 0] for solved, cut in answers if solved is None])
@@ -266,9 +266,8 @@ def test_a_star_that_breaks_a_limit_which_nothing_open_moves_is_no_design(tmp_pa
     low, high = min(star_values.values()), max(star_values.values())
     assert low < 0.9 * high
     model, _ = model_of(engines.problem(tmp_path, 4, rest=rest + limit.format(0.5 * (low + high))))
-    owners = shaft_owners(model)
     for aim in (min, max):
         star = aim(star_values, key=star_values.__getitem__)
-        solved, cut = solve_design(model, star, (), owners, 1e-4)
+        solved, cut = solve_design(model, star, (), 1e-4)
         assert (solved is None) == (aim is max)
         assert solved is not None or cut is None

@@ -35,7 +35,7 @@ from laufruhe.solvers.stars.even_search import (
 )
 from laufruhe.solvers.stars.families import Family
 from laufruhe.solvers.stars.phasing_solver import solve_phasing
-from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import coarse_value, solve_design
 
 MIN_GAIN = 1e-6
 """Smallest relative gain of an exchange; coarse sampling blurs less."""
@@ -114,7 +114,7 @@ def _evaluate_stars(
         bound = max(bound, firing_bound(problem, design))
         is_proven = gap <= problem.tolerance
         complete = complete or is_proven
-        designs.append(EvenDesign.from_steps(phasing, family, steps, (), value, bound, is_proven))
+        designs.append(EvenDesign(phasing, family, steps, (), value, bound, is_proven))
     designs.sort(key=lambda design: design.value)
     method = "star without couples; its objective is common to all even stars"
     return EvenStarResult(tuple(designs), bound, complete, len(designs), method)
@@ -137,36 +137,30 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         is_simple = _amplitudes(phasing, family) is not None
         space = replace(family.space, mirror=is_simple, reflect=is_simple)
         model = family.model(phasing, space)
-        owners = shaft_owners(model)
         starts = [tuple(map(int, star)) for star in _with_least_couples(phasing, family)]
         engines = {star: phasing.realise(family.candidate(phasing, star)) for star in starts}
         values = {star: objective_value(star_problem, evaluate(star_problem)) for star, star_problem in engines.items()}
         first = min(starts, key=values.__getitem__, default=family.first)
-        built = min(phasing.shafts.allowed, key=lambda shafts: coarse_value(model, first, shafts, owners))
-        star = improved(model, first, built, owners)
-        design, cut = solve_design(model, star, built, owners, problem.tolerance, zero_level)
+        built = min(phasing.shafts.allowed, key=lambda shafts: coarse_value(model, first, shafts))
+        star = improved(model, first, built)
+        design, cut = solve_design(model, star, built, problem.tolerance, zero_level)
         if design is None or cut is None:
             answers.append(EvenStarResult((), 0.0, False, 1, "exchanges of throws"))
             continue
         bound = cut.minimum(space)
         done = gap_of(design.value, bound, zero_level) <= 2.0 * problem.tolerance
         method = f"exchanges of throws at {model.samples} angles"
-        best = EvenDesign.from_steps(phasing, family, design.star, design.built, design.value, design.bound, done)
+        best = EvenDesign(phasing, family, design.star, design.built, design.value, design.bound, done)
         answers.append(EvenStarResult((best,), bound, done, 1, method))
     return merge_results(answers, phasing.best)
 
 
-def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:
+def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> tuple[int, ...]:
     """Return the best star reached by exchanges, with all other decisions optimal at few samples (S44)."""
-    value = coarse_value(model, star, built, owners)
+    value = coarse_value(model, star, built)
     while not is_time_over():
-        minimum, best = min(
-            (
-                (coarse_value(model, neighbour, built, owners), neighbour)
-                for neighbour in until_time_limit(exchanges(star))
-            ),
-            default=(math.inf, star),
-        )
+        neighbours = ((coarse_value(model, x, built), x) for x in until_time_limit(exchanges(star)))
+        minimum, best = min(neighbours, default=(math.inf, star))
         if not minimum < value * (1.0 - MIN_GAIN):
             break
         value, star = minimum, best

@@ -7,6 +7,7 @@ bound. The search ends with a proof when this bound reaches the best objective. 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,12 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.prove.certificate import gap_tolerance_of
-from laufruhe.prove.throws.star_cuts import Cut
 from laufruhe.solvers.stars.star_program import SolvedStar, shaft_owners, solve_design
 
 _CHUNK = 1 << 17
@@ -54,12 +53,7 @@ class CutSearchResult:
 
 
 def search_designs(
-    model: StarModel,
-    stars: Stars,
-    count: int,
-    tolerance: float,
-    time_limit: float = float("inf"),
-    zero_level: float = 0.0,
+    model: StarModel, stars: Stars, count: int, tolerance: float, time_limit: float = math.inf, zero_level: float = 0.0
 ) -> CutSearchResult:
     """Return the best designs of stars and shafts, with a proof (S15).
 
@@ -91,22 +85,25 @@ def search_designs(
         open_bounds = np.where(is_open, bounds, np.inf)
         open_bound = float(open_bounds.min(initial=np.inf))
         lower_bound = min([open_bound, *(design.bound for design in solved)])
-        values = distinct_values(model.space, solved)
-        target = values[count - 1] if len(values) >= count else float("inf")
+        values = _distinct_values(model.space, solved)
+        target = values[count - 1] if len(values) >= count else math.inf
         if not is_open.any() or open_bound >= target - gap_tolerance_of(target, tolerance, zero_level):
             complete = True
             break
         has_result = bool(solved or infeasible)
         if time.perf_counter() - started > time_limit or (is_time_over() and has_result):
             break
-        best = min((design.value for design in solved), default=float("inf"))
+        best = min((design.value for design in solved), default=math.inf)
         report_progress("stars and sets of shafts", len(solved) + infeasible, bounds.size, best, lower_bound)
         row, column = divmod(int(np.argmin(open_bounds)), len(sets))
         star = tuple(int(p) for p in stars[row])
-        design, cut = solve_design(model, star, sets[column], owners, tolerance, zero_level)
+        design, cut = solve_design(model, star, sets[column], tolerance, zero_level)
         is_open[row, column] = False
         if cut is not None:
-            _raise_bounds(bounds, cut, design is None, stars, sets, owners)
+            for start in range(0, len(stars), _CHUNK):
+                part, designs = slice(start, start + _CHUNK), (stars[start : start + _CHUNK], sets, owners)
+                proven = np.where(cut.excludes(*designs), np.inf, 0.0) if design is None else cut.bounds(*designs)
+                np.maximum(bounds[part], proven, out=bounds[part])
             is_open &= np.isfinite(bounds)
         if design is None:
             infeasible += 1
@@ -116,26 +113,8 @@ def search_designs(
     return CutSearchResult(tuple(solved), lower_bound, open_bound, complete, bounds.size, infeasible)
 
 
-def _raise_bounds(
-    bounds: Array, cut: Cut, excludes: bool, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]
-) -> None:
-    for start in range(0, len(stars), _CHUNK):
-        part = slice(start, start + _CHUNK)
-        designs = stars[part], sets, owners
-        proven = np.where(cut.excludes(*designs), np.inf, 0.0) if excludes else cut.bounds(*designs)
-        np.maximum(bounds[part], proven, out=bounds[part])
-
-
-def distinct_values(space: StarSpace, solved: Sequence[SolvedStar]) -> list[float]:
-    """Return objectives of designs in ascending order [SI]; images of one star with equal objectives count once (S2).
-
-    Parameters
-    ----------
-    space
-        Space of the stars.
-    solved
-        Solved designs.
-    """
+def _distinct_values(space: StarSpace, solved: Sequence[SolvedStar]) -> list[float]:
+    """Return ascending objectives of designs [SI]; images of one star with equal objectives count once (S2)."""
     if not solved:
         return []
     images = replace(space, mirror=True, reflect=True)

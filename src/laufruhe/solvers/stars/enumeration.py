@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -50,27 +50,12 @@ class StarSearchResult:
     nodes: int
 
 
-@dataclass
 class BestStars:
-    """Best stars so far.
+    """Best `count` stars so far, best first: their steps, shape (n, throws), and objectives [SI], shape (n,)."""
 
-    Attributes
-    ----------
-    count
-        Largest number of stars.
-    throws
-        Number of throws of a star.
-    stars, values
-        Steps of the stars, shape (n, throws), and objectives [SI], shape (n,), best first.
-    """
-
-    count: int
-    throws: int
-    stars: Stars = field(init=False)
-    values: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.stars, self.values = np.zeros((0, self.throws), dtype=np.uint8), np.zeros(0)
+    def __init__(self, count: int, throws: int) -> None:
+        self.count, self.throws = count, throws
+        self.stars, self.values = np.zeros((0, throws), dtype=np.uint8), np.zeros(0)
 
     @property
     def cut(self) -> float:
@@ -78,13 +63,7 @@ class BestStars:
         return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
 
     def offer(self, stars: Stars, values: Array) -> None:
-        """Add stars that are among the best, without duplicates.
-
-        Parameters
-        ----------
-        stars, values
-            Steps of the stars, shape (n, throws), and objectives [SI], shape (n,).
-        """
+        """Add stars that are among the best, without duplicates."""
         if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
             return
         best = np.argsort(values, kind="stable")[: 4 * self.count]

@@ -30,14 +30,8 @@ def flywheel_measures(problem: Problem) -> list[Measure]:
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
     """Choose among even stars without the flywheel's measures, which are equal for all of them (S35).
 
-    All even stars of equal cylinders have the same dead centres, and so the same torque.
-
-    Parameters
-    ----------
-    problem, phasing
-        The problem and its open phasing.
-    solve
-        Solver of the problem without measures of the flywheel.
+    All even stars of equal cylinders have the same dead centres, and so the same torque. The problem without measures
+    of the flywheel is left to `solve`.
     """
     initial = evaluate(problem)
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]

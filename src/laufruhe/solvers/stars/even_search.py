@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -29,52 +30,31 @@ class EvenDesign:
 
     Attributes
     ----------
-    family
-        Family of the star.
-    steps
-        Steps of the throws.
-    built
-        Indices of the sets of optional shafts that are built.
-    candidate
-        Throws, geometry and shafts of the star.
+    steps, built
+        Steps of the throws, and indices of the sets of optional shafts that are built.
     value, bound
         Objective, and its lower bound over all designs of this star [SI].
     proven
         True if no design outside the result is better.
     """
 
+    phasing: Phasing
     family: Family
     steps: tuple[int, ...]
     built: tuple[int, ...]
-    candidate: Candidate
     value: float
     bound: float
     proven: bool
 
-    @classmethod
-    def from_steps(
-        cls, phasing: Phasing, family: Family, steps: tuple[int, ...], built: tuple[int, ...], value: float,
-        bound: float, proven: bool,
-    ) -> EvenDesign:  # fmt: skip
-        """Build the design of a family from the steps of its throws.
+    @cached_property
+    def candidate(self) -> Candidate:
+        """Throws, geometry and shafts of the star."""
+        return self.family.candidate(self.phasing, self.steps, self.phasing.without(self.built))
 
-        Parameters
-        ----------
-        phasing, family
-            Open phasing, and family of the star.
-        steps
-            Steps of the throws.
-        built
-            Indices of the sets of optional shafts that are built.
-        value, bound
-            Objective, and its lower bound over all designs of this star [SI].
-        proven
-            True if no design outside the result is better.
-        """
-        return cls(family, steps, built, family.candidate(phasing, steps, phasing.without(built)), value, bound, proven)
-
-    def ranking_entry(self, phasing: Phasing) -> RankedStar:
-        """Return the entry of the design in a ranking."""
+    @property
+    def ranking_entry(self) -> RankedStar:
+        """Entry of the design in a ranking."""
+        phasing = self.phasing
         if self.family.is_of_orders:
             phasing = replace(phasing, firing_order=self.candidate.firing_order)
         return ranked_star(phasing, self.candidate, self.steps, self.value, self.bound, self.proven)
@@ -134,12 +114,8 @@ def is_long(problem: Problem) -> bool:
 def refuse_long(problem: Problem) -> None:
     """Raise `ModelError` if the open even stars of a problem are too many to enumerate."""
     if is_long(problem):
-        raise _too_many()
-
-
-def _too_many() -> ModelError:
-    rule, remedy = missing_extension("long_cranks")
-    return ModelError(f"a crank of more than {MAX_LISTED} even stars {rule}; {remedy}")
+        rule, remedy = missing_extension("long_cranks")
+        raise ModelError(f"a crank of more than {MAX_LISTED} even stars {rule}; {remedy}")
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
@@ -147,16 +123,8 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
 
     The method is enumeration if the objective depends on single orders or on squares of loads, else cuts of cone
     programs.
-
-    Parameters
-    ----------
-    problem, phasing
-        The problem and its open phasing.
-    families
-        Families of even stars.
     """
-    if not can_list(problem, families):
-        raise _too_many()
+    refuse_long(problem)
     if _differ_by_squares(problem, families):
         (family,) = families
         if phasing.cylinders > MAX_SLOTS:
@@ -168,13 +136,11 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
         result = enumeration_result(phasing, family, search, "all firing orders evaluated by pairs of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)
-    family_objectives = [
-        (family, objective) for family in families if (objective := amplitudes(phasing, family)) is not None
-    ]
-    if len(family_objectives) < len(families):
-        return _search_by_cuts(problem, phasing, families)
     results = []
-    for family, objective in family_objectives:
+    for family in families:
+        objective = amplitudes(phasing, family)
+        if objective is None:
+            return _search_by_cuts(problem, phasing, families)
         search = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
         results.append(enumeration_result(phasing, family, search, "all stars evaluated"))
     return merge_results(results, phasing.best)
@@ -197,19 +163,9 @@ def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
 
 
 def enumeration_result(phasing: Phasing, family: Family, search: StarSearchResult, method: str) -> EvenStarResult:
-    """Convert the result of an enumeration of stars.
-
-    Parameters
-    ----------
-    phasing, family
-        Open phasing, and family of the stars.
-    search
-        Result of the enumeration.
-    method
-        Name of the method, for the certificate.
-    """
+    """Convert the result of an enumeration of stars; `method` is its name for the certificate."""
     designs = tuple(
-        EvenDesign.from_steps(phasing, family, tuple(map(int, star)), (), float(value), float(value), search.complete)
+        EvenDesign(phasing, family, tuple(map(int, star)), (), float(value), float(value), search.complete)
         for star, value in zip(search.stars, search.values, strict=True)
     )
     return EvenStarResult(designs, search.lower_bound, search.complete, search.nodes, method)
@@ -224,8 +180,7 @@ def _search_by_cuts(problem: Problem, phasing: Phasing, families: Sequence[Famil
         search = search_designs(model, family.stars, count, problem.tolerance, phasing.time_limit, zero_level)
         maximum = search.open_bound * (1.0 + problem.tolerance)
         designs = tuple(
-            EvenDesign.from_steps(phasing, family, s.star, s.built, s.value, s.bound, s.value <= maximum)
-            for s in search.solved
+            EvenDesign(phasing, family, s.star, s.built, s.value, s.bound, s.value <= maximum) for s in search.solved
         )
         method = f"cone programs of {len(search.solved)} of {search.designs} designs, dual cuts for the others"
         # the proof of the best design needs no proof of the whole ranking

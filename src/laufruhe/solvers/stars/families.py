@@ -60,17 +60,7 @@ class Family:
         return np.concatenate(list(self.space.blocks()))
 
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """Return the candidate of a star, with the first of its firing orders.
-
-        Parameters
-        ----------
-        phasing
-            Open phasing.
-        steps
-            Steps of the throws.
-        left_out
-            Names of optional shafts that are not built.
-        """
+        """Return the candidate of a star without the shafts `left_out`, with the first of its firing orders."""
         if self.is_of_orders:
             return phasing.fired(steps, self.geometry, left_out)
         return phasing.star(steps, self.space.phases, self.geometry, left_out)
@@ -84,12 +74,7 @@ class Family:
 def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
     """Return families of even stars for every geometry allowed, and the reason if there are none.
 
-    Parameters
-    ----------
-    phasing
-        Open phasing.
-    by_firing
-        True if loads depend on the firing order, so that every firing order is a design.
+    If loads depend on the firing order, `by_firing`, every firing order is a design.
     """
     families, reason = [], "no bank angle and split pin within the bounds allow even firing"
     lattice = firing_lattice(phasing.cycle, phasing.cylinders)

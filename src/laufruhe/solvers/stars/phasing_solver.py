@@ -27,7 +27,7 @@ from laufruhe.solvers.stars.even_irregularity import flywheel_measures, solve_al
 from laufruhe.solvers.stars.even_search import EvenDesign, EvenStarResult, search_even
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import ORDERS_LISTED, distinct_orders, ranked_orders, ranked_star, ranking_result
-from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
+from laufruhe.solvers.stars.star_program import solve_design
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
@@ -42,22 +42,8 @@ Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResul
 def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
     """Solve for open throws, firing orders, shafts and unbalances together.
 
-    Parameters
-    ----------
-    problem
-        Problem with open phasing.
-    search
-        Function that returns the best designs of families of even stars.
-
-    Returns
-    -------
-    Result with a ranking. Its certificate is `global` if the search ended with a proof,
-    `global within gap` if its time ended, and `local` if throws left the even steps.
-
-    Raises
-    ------
-    SolverError
-        If a solver stops without a result.
+    The result has a ranking. Its certificate is `global` if the search ended with a proof, `global within gap` if its
+    time ended, and `local` if throws left the even steps. `search` returns the best designs of families of even stars.
     """
     phasing = problem.phasing
     if phasing is None:
@@ -144,10 +130,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
 
 def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) -> Result:
     """Solve the problem of the best even star, and certify it with the bound of all designs (S17)."""
-    entries = [design.ranking_entry(phasing) for design in search_result.designs]
-    designs = [
-        (design, entry) for design, entry in zip(search_result.designs, entries, strict=True) if entry.firing_orders
-    ]
+    designs = [(design, entry) for design in search_result.designs if (entry := design.ranking_entry).firing_orders]
     if not designs:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
     remaining = iter(designs)
@@ -161,10 +144,9 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
     else:
         reason = f"each of the best {counted(len(designs), 'star')} violates a limit between the samples of the search"
         return no_star(problem, f"{reason}; raise phasing.best or fidelity.samples", Status.FAILED)
-    firing_value = (
-        firing_bound(problem, result.final) if result.objective and not any(phasing.is_geometry_open) else 0.0
-    )
-    bound, zero_level = max(search_result.bound, firing_value), numerical_zero(problem)
+    bound, zero_level = search_result.bound, numerical_zero(problem)
+    if result.objective and not any(phasing.is_geometry_open):
+        bound = max(bound, firing_bound(problem, result.final))
     result, doubt = refine_result(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
     certificate = make_certificate(
@@ -183,14 +165,11 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
     if not needed:
         return needed
     model = best.family.model(phasing)
-    owners = shaft_owners(model)
     zero_level, tolerance = numerical_zero(problem), 0.5 * problem.tolerance
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in needed if j != k)
-        candidate, _ = solve_design(model, best.steps, fewer, owners, tolerance, zero_level)
-        if candidate is not None and candidate.value <= best.value + gap_tolerance_of(
-            best.value, tolerance, zero_level
-        ):
+        design, _ = solve_design(model, best.steps, fewer, tolerance, zero_level)
+        if design is not None and design.value <= best.value + gap_tolerance_of(best.value, tolerance, zero_level):
             needed = fewer
     return needed
 
@@ -211,8 +190,6 @@ def solve_every_order(
 
     Parameters
     ----------
-    problem, phasing
-        The problem and its open phasing.
     stars
         Stars with their steps.
     decide
@@ -248,12 +225,11 @@ def solve_every_order(
     complete = len(results) == total
     solved = [design for design in results if design.is_feasible]
     if not solved:
-        is_proven = complete and all(design.is_infeasible for design in results)
-        reason = (
-            f"no firing order and no set of shafts that may be built {'keeps' if is_proven else 'was found that keeps'}"
-        )
-        status, names = Status.INFEASIBLE if is_proven else Status.FAILED, [limit.name for limit in problem.limits]
-        return no_star(problem, f"{reason} the limits", status, tuple(names) if is_proven else ())
+        what = "no firing order and no set of shafts that may be built"
+        if complete and all(design.is_infeasible for design in results):
+            names = tuple(limit.name for limit in problem.limits)
+            return no_star(problem, f"{what} keeps the limits", conflict=names)
+        return no_star(problem, f"{what} was found that keeps the limits", Status.FAILED)
     zero_level = numerical_zero(problem)
     best = solved[0]
     for design in solved[1:]:

@@ -214,16 +214,7 @@ def distinct_orders(
     """Return the firing orders of a star that have different loads, best first (S8).
 
     All orders are returned if a measure depends on the firing order, such as torsion (V6), or if gas acts and firing
-    is uneven. Otherwise, only the first is returned.
-
-    Parameters
-    ----------
-    problem, phasing
-        The problem and its open phasing.
-    candidate
-        Throws and geometry of the star.
-    steps
-        Steps of an even star; None for throws at any angle.
+    is uneven. Otherwise, only the first is returned. See `ranked_orders`.
     """
     orders = ranked_orders(phasing, candidate, steps)
     if problem.depends_on_firing_order:
@@ -231,41 +222,17 @@ def distinct_orders(
     return orders if problem.depends_on_gas and not all(order.is_even for order in orders) else orders[:1]
 
 
-def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Return |F_h| and |C_h| of every order h in `ORDERS`, for unit force per throw and unit throw spacing (S1).
-
-    Parameters
-    ----------
-    places
-        Axial positions of the throws [m].
-    throws
-        Throw angles [rad].
-    """
-    x = np.array(places)
-    spacing = float(np.abs(np.diff(x)).max()) if len(x) > 1 else 1.0
-    weights = np.stack([np.ones_like(x), x / spacing], axis=1)
-    sums = np.abs(star_sum(weights, [as_turn(angle) for angle in throws], np.array(ORDERS)))
-    return tuple(float(v) for v in sums[:, 0]), tuple(float(v) for v in sums[:, 1])
-
-
 def ranked_star(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
-    """Build the entry of a star in a ranking.
-
-    Parameters
-    ----------
-    phasing, candidate
-        Open phasing, and throws, geometry and shafts of the star.
-    steps
-        Steps of an even star; None for throws at any angle.
-    value, bound
-        Objective, and its lower bound over all designs of this star [SI].
-    proven
-        True if no design outside the ranking is better.
-    """
+    """Build the entry of a star in a ranking. See `RankedStar` and `ranked_orders`."""
     orders = ranked_orders(phasing, candidate, steps)
-    forces, couples = free_balance(phasing.layout_of(candidate).throw_positions, candidate.throws)
+    places = np.array(phasing.layout_of(candidate).throw_positions)
+    # unit force per throw, and unit throw spacing (S1)
+    spacing = float(np.abs(np.diff(places)).max()) if len(places) > 1 else 1.0
+    weights = np.stack([np.ones_like(places), places / spacing], axis=1)
+    sums = np.abs(star_sum(weights, [as_turn(angle) for angle in candidate.throws], np.array(ORDERS)))
+    forces, couples = (tuple(map(float, column)) for column in sums.T)
     return RankedStar(
         candidate.throws, candidate.bank_angle, candidate.split_pin, phasing.built(candidate), value, bound, proven,
         forces, couples, ORDERS, orders[:ORDERS_LISTED], len(orders), bool(orders) and orders[0].is_even,
@@ -287,20 +254,6 @@ def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int =
 def ranking_result(
     phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
 ) -> PhasingResult:
-    """Build the result of a search over stars.
-
-    Parameters
-    ----------
-    phasing, best
-        Open phasing, and candidate of the best design.
-    ranking
-        Entries of the ranking, best first.
-    designs
-        Number of stars times number of sets of shafts.
-    looked_at
-        Number of stars that the search evaluated.
-    method
-        Method in words.
-    """
+    """Build the result of a search over stars whose best design is `best`. See `PhasingResult`."""
     layout = phasing.layout_of(best)
     return PhasingResult(tuple(ranking), layout.throw_positions, layout.banks, designs, looked_at, method)

@@ -17,8 +17,6 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
 
     Parameters
     ----------
-    problem
-        Problem with optional shafts.
     limits
         Limits that depend on the choice of shafts alone.
     initial

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.load_models.affine import FEASIBLE, AffineProblem
+from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, check_dual, gap_of
@@ -16,9 +16,8 @@ from laufruhe.prove.throws.star_cuts import Cut, cut_of
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.cones.conic import solve_cones
 
-COARSE = 48
-FINER = 4
-"""Factor of samples to check a limit that is nearly violated."""
+# smallest number of samples, and factor of samples to check a limit that is nearly violated
+COARSE, FINER = 48, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,10 +26,8 @@ class SolvedStar:
 
     Attributes
     ----------
-    star
-        Steps of the throws.
-    built
-        Indices of the sets of optional shafts that are built.
+    star, built
+        Steps of the throws, and indices of the sets of optional shafts that are built.
     value, bound
         Objective of the design, and its lower bound over all designs of this star [SI].
     """
@@ -50,12 +47,7 @@ def shaft_owners(model: StarModel) -> tuple[int, ...]:
 
 
 def solve_design(
-    model: StarModel,
-    star: tuple[int, ...],
-    built: tuple[int, ...],
-    owners: Sequence[int],
-    tolerance: float,
-    zero_level: float = 0.0,
+    model: StarModel, star: tuple[int, ...], built: tuple[int, ...], tolerance: float, zero_level: float = 0.0
 ) -> tuple[SolvedStar | None, Cut | None]:
     """Find the optimum of one star with one set of shafts, and a cut that bounds all other stars.
 
@@ -63,12 +55,8 @@ def solve_design(
     ----------
     model
         Rows of every star.
-    star
-        Steps of the throws.
-    built
-        Indices of the sets of optional shafts that are built.
-    owners
-        Index of the set of optional shafts of every decision, -1 for none.
+    star, built
+        Steps of the throws, and indices of the sets of optional shafts that are built.
     tolerance
         Relative gap that counts as closed.
     zero_level
@@ -79,7 +67,7 @@ def solve_design(
     Design and cut. The design is None if this star has none; the cut then excludes other stars too (S45). The cut is
     None if nothing is proven about other stars.
     """
-    full, proves = model.samples, model.problem.search.proves
+    full, proves, owners = model.samples, model.problem.search.proves, shaft_owners(model)
     # a lower bound of sample averages is a lower bound of the means (P7)
     fine, relaxed = model.at(full), model.at(full, averaged=True)
     fine_rows, averaged = (_with_shafts(rows.at(star), owners, built) for rows in (fine, relaxed))
@@ -112,11 +100,8 @@ def solve_design(
             if samples < full:
                 continue
         bound = best_bound(_without_fixed_limits(averaged, fixed), solution.x, solution.multipliers)
-        value, violation = (
-            fine_rows.objective(solution.x),
-            _without_fixed_limits(fine_rows, fixed).violation(solution.x),
-        )
-        best = (SolvedStar(star, built, value, bound.value), bound, solution.x)
+        violation = _without_fixed_limits(fine_rows, fixed).violation(solution.x)
+        best = (SolvedStar(star, built, fine_rows.objective(solution.x), bound.value), bound, solution.x)
         # more samples cannot close the gap between averages and means; without a proof, few samples suffice
         is_close = gap_of(averaged.objective(solution.x), bound.value, zero_level) <= 0.25 * tolerance or not proves
         if is_close and violation <= FEASIBLE:
@@ -130,21 +115,9 @@ def solve_design(
     return design, cut
 
 
-def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
-    """Return the optimal objective of one star with one set of shafts at few samples [SI]; infinite if infeasible.
-
-    Parameters
-    ----------
-    model
-        Rows of every star.
-    star
-        Steps of the throws.
-    built
-        Indices of the sets of optional shafts that are built.
-    owners
-        Index of the set of optional shafts of every decision, -1 for none.
-    """
-    affine = _with_shafts(model.at(_sample_counts(model.samples)[0]).at(star), owners, built)
+def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> float:
+    """Return the optimal objective of one star at few samples [SI]; infinite if infeasible. See `solve_design`."""
+    affine = _with_shafts(model.at(_sample_counts(model.samples)[0]).at(star), shaft_owners(model), built)
     if not affine.size:
         return affine.objective(np.zeros(0))
     x = solve_cones(affine).x
@@ -153,15 +126,15 @@ def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]
 
 def _violates_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineProblem, fixed: Sequence[bool]) -> bool:
     # limits that no decision changes; check their means again at more samples
-    x = np.zeros(affine.size)
-    violated = [
-        k for k, (maximum, norm) in enumerate(affine.limits) if fixed[k] and norm.value(x) > maximum * (1.0 + FEASIBLE)
-    ]
+    def violates(limit: tuple[float, AffineNorm], tolerance: float) -> bool:
+        maximum, norm = limit
+        return norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + tolerance)
+
+    violated = [k for k, limit in enumerate(affine.limits) if fixed[k] and violates(limit, FEASIBLE)]
     if not violated:
         return False
     finer = model.at(FINER * model.samples, averaged=True).at(star).limits
-    return any(norm.value(np.zeros(norm.slope.shape[-1])) > maximum * (1.0 + FEASIBILITY_TOL) for maximum, norm in
-               (finer[k] for k in violated))  # fmt: skip
+    return any(violates(finer[k], FEASIBILITY_TOL) for k in violated)
 
 
 def _limit_cut(problem: StarProblem, multipliers: Multipliers, fixed: Sequence[bool]) -> Cut:

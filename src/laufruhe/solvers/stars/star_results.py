@@ -85,17 +85,14 @@ def with_star(
         The problem with open phasing, and its phasing.
     best, candidate
         Result of the best star, and its throws, firing order, geometry and shafts.
-    certificate
-        Certificate of the search; None without a design.
-    details
-        Ranking of the search.
+    certificate, details
+        Certificate of the search, None without a design; and its ranking.
     """
-    evaluation = evaluate(problem)
     is_proven = certificate is not None and certificate.kind is Proof.GLOBAL
     status = best.status
     if status.has_design:
         status = Status.OPTIMAL if is_proven else Status.FEASIBLE
-    initial = replace(evaluation, samples=best.final.samples)
+    initial = replace(evaluate(problem), samples=best.final.samples)
     value = best.objective.value if best.objective else objective_value(problem, best.final)
     return replace(
         best,
@@ -110,15 +107,7 @@ def with_star(
 
 
 def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) -> tuple[DecisionValue, ...]:
-    """Return throws, bank angle, split pin and shafts as decisions of the result.
-
-    Parameters
-    ----------
-    problem, phasing
-        The problem with open phasing, and its phasing.
-    candidate
-        Throws, geometry and shafts of the design.
-    """
+    """Return throws, bank angle, split pin and shafts of a design as decisions of the result."""
     parts, layout = problem.engine.slider_cranks, phasing.layout_of(candidate)
     decisions = []
     if phasing.throws is None:
@@ -152,19 +141,7 @@ def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) ->
 def no_star(
     problem: Problem, reason: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()
 ) -> Result:
-    """Return a result without a design.
-
-    Parameters
-    ----------
-    problem
-        The problem with open phasing.
-    reason
-        Reason in words.
-    status
-        Infeasible if that is proven, else failed.
-    conflict
-        Names of the limits that contradict each other.
-    """
+    """Return a result without a design, with the reason in words and the limits that contradict each other."""
     evaluation = evaluate(problem)
     return Result(
         problem=problem, status=status, initial=evaluation, final=evaluation, message=reason, conflict=conflict
