@@ -16,6 +16,7 @@ from laufruhe.problem.decision import AddressDrive, Decision
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Path, Phasing, Problem
 from laufruhe.problem.sets import Interval
+from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.conclusion import quote_names
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
@@ -29,15 +30,7 @@ CRANK, BANK, SPLIT = "crank", "bank angle", "split pin angle"
 
 @dataclass(frozen=True)
 class _MovedCrank:
-    """Function from angles of a crank to the drawing of its engine.
-
-    Attributes
-    ----------
-    phasing
-        Open phasing.
-    candidate
-        Crank with its start angles.
-    """
+    """Function from angles of a crank to the drawing of its engine; the candidate has the start angles."""
 
     phasing: Phasing
     candidate: Candidate
@@ -67,17 +60,13 @@ class _MovedCrank:
 def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Problem], Result]) -> Result:
     """Return the best local optimum from several start cranks, over throws and all other decisions together.
 
-    Parameters
-    ----------
-    problem, phasing
-        The problem and its open phasing.
-    search
-        Local search over the numbers of a problem.
+    `search` is a local search over the numbers of a problem.
     """
     starts = start_candidates(phasing, None, problem.depends_on_gas)[:MAX_STARTS]
     if not starts:
         return no_star(problem, why_none_fires(phasing)[0])
-    results: list[tuple[Candidate, Result]] = []
+    designs: list[tuple[float, Candidate, Result, Certificate]] = []
+    count = 0
     for start in until_time_limit(with_progress("cranks that throws leave", starts)):
         crank, realised = _MovedCrank(phasing, start), phasing.realise(start)
         angles = tuple(_angle_decisions(phasing, start))
@@ -95,20 +84,17 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
             decisions=tuple(entry for entry in result.decisions if entry.name not in names),
             problem=replace(result.problem, decisions=remaining, rebuild=realised.rebuild),
         )
-        results.append((crank.at(changes), result))
-    feasible = [
-        (objective.value, certificate, candidate, result)
-        for candidate, result in results
-        if result.status.has_design and (objective := result.objective) and (certificate := result.certificate)
-    ]
-    if not feasible:
+        count += 1
+        if result.status.has_design and result.objective and result.certificate:
+            designs.append((result.objective.value, crank.at(changes), result, result.certificate))
+    if not designs:
         limits = quote_names(limit.name for limit in problem.limits) or "the firing intervals"
         return no_star(problem, f"no crank was found that keeps {limits}, but none is excluded", Status.FAILED)
-    value, proof, candidate, best = min(feasible, key=lambda design: design[0])
-    method = f"{proof.method}; throws moved from {counted(len(results), 'crank')}"
+    value, candidate, best, proof = min(designs, key=lambda design: design[0])
+    method = f"{proof.method}; throws moved from {counted(count, 'crank')}"
     phasing_of_order = replace(phasing, firing_order=candidate.firing_order)
     ranking = [ranked_star(phasing_of_order, candidate, None, value, 0.0, False)]
-    details = ranking_result(phasing, candidate, ranking, len(results), len(feasible), method)
+    details = ranking_result(phasing, candidate, ranking, count, len(designs), method)
     return with_star(problem, phasing, best, candidate, replace(proof, method=method), details)
 
 
@@ -116,18 +102,18 @@ def _angle_decisions(phasing: Phasing, start: Candidate) -> Iterator[Decision]:
     """Yield throws, bank angle and split pin of a crank as decisions, if they are open."""
     even, allowed = phasing.even_interval, phasing.intervals
     freedom = min(max(even - allowed.minimum, allowed.maximum - even), math.pi)
-    angles: list[tuple[str, Path, float, float, float]] = []
-    for k, angle in enumerate(start.throws):
-        if phasing.throw_bounds is not None:
-            low, high = phasing.throw_bounds[k]
-        else:
-            # fix the first throw, because rotating the whole crank changes nothing
-            low, high = (angle, angle) if k == 0 else (angle - freedom, angle + freedom)
-        angles.append((f"throw {k + 1}", (CRANK, k), low, high, angle))
-    for name, bounds, value in ((BANK, phasing.bank, start.bank_angle), (SPLIT, phasing.split, start.split_pin)):
-        if bounds is not None and value is not None:
-            angles.append((name, (CRANK, name), *bounds, value))
-    for name, path, low, high, value in angles:
-        if low < high:
-            drives = (AddressDrive(path, ""),)
-            yield Decision(name, "rad", Interval(low, high), min(max(value, low), high), drives)
+    # fix the first throw, because rotating the whole crank changes nothing
+    bounds_of_throws = phasing.throw_bounds or [
+        (angle - freedom, angle + freedom) if k else (angle, angle) for k, angle in enumerate(start.throws)
+    ]
+    angles: list[tuple[str, Path, tuple[float, float] | None, float | None]] = [
+        (f"throw {k + 1}", (CRANK, k), bounds, angle)
+        for k, (bounds, angle) in enumerate(zip(bounds_of_throws, start.throws, strict=True))
+    ]
+    angles += [(BANK, (CRANK, BANK), phasing.bank, start.bank_angle)]
+    angles += [(SPLIT, (CRANK, SPLIT), phasing.split, start.split_pin)]
+    for name, path, bounds, value in angles:
+        if bounds is not None and value is not None and bounds[0] < bounds[1]:
+            yield Decision(
+                name, "rad", Interval(*bounds), min(max(value, bounds[0]), bounds[1]), (AddressDrive(path, ""),)
+            )

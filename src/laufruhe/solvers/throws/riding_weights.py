@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,38 +50,16 @@ class BoxColumns:
     shared: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class _Rider:
-    """Unbalance on a throw: U e^{i (theta - theta0)} times a gain, in two columns of the model.
-
-    Attributes
-    ----------
-    column
-        First of its columns of the model.
-    drive
-        Rotor that the decision drives, and its gain.
-    pin
-        Index of the throw.
-    """
+class _Rider(NamedTuple):
+    """Unbalance on throw `pin`: U e^{i (theta - theta0)} times a gain, in two columns of the model from `column`."""
 
     column: int
     drive: RotorDrive
     pin: int
 
 
-@dataclass(frozen=True)
-class _RiderGroup:
-    """A decision with riders.
-
-    Attributes
-    ----------
-    decision
-        The decision.
-    riders
-        Its unbalances on throws.
-    fixed
-        Columns of its unbalances on other rotors; None if it has no such rotors.
-    """
+class _RiderGroup(NamedTuple):
+    """A decision with riders; `fixed` are the columns of its unbalances on other rotors, if it has any."""
 
     decision: Decision
     riders: tuple[_Rider, ...]
@@ -120,14 +99,11 @@ class Riders:
                 continue
             fixed_drives = tuple(drive for drive in decision.rotor_drives if drive.rotor not in throw_of_rotor)
             if fixed_drives:
-                free_decisions.append(
-                    replace(decision, set=_shift_to_zero(decision.set), start=0.0, drives=fixed_drives)
-                )
+                values = _shift_to_zero(decision.set)
+                free_decisions.append(replace(decision, set=values, start=0.0, drives=fixed_drives))
             for drive in on_throws[decision.name]:
-                unit_drive = replace(drive, gain=1.0 + 0.0j, mirrored=False)
-                free_decisions.append(
-                    Decision(f"{decision.name} | {drive.rotor}", decision.unit, Sector(1.0), 0.0, (unit_drive,))
-                )
+                name, unit_drive = f"{decision.name} | {drive.rotor}", replace(drive, gain=1.0 + 0.0j, mirrored=False)
+                free_decisions.append(Decision(name, decision.unit, Sector(1.0), 0.0, (unit_drive,)))
         with_riders = [decision for decision in problem.unbalances if decision.name in on_throws]
         # reference value of every interval, so that the difference to it is not negative
         bases = [
@@ -138,27 +114,18 @@ class Riders:
         self.problem = replace(problem, engine=engine, decisions=tuple(free_decisions), limits=problem.load_limits)
         by_name = {domain.decision.name: domain for domain in domains_of(self.problem.unbalances)}
         self.size = sum(domain.width for domain in by_name.values())
+
+        def rider(decision: Decision, drive: RotorDrive) -> _Rider:
+            return _Rider(by_name[f"{decision.name} | {drive.rotor}"].start, drive, throw_of_rotor[drive.rotor])
+
         self._other_domains = [by_name[d.name] for d in problem.unbalances if d.name not in on_throws]
         self._groups = [
-            _RiderGroup(
-                d,
-                tuple(
-                    _Rider(by_name[f"{d.name} | {v.rotor}"].start, v, throw_of_rotor[v.rotor])
-                    for v in on_throws[d.name]
-                ),
-                by_name.get(d.name),
-            )
+            _RiderGroup(d, tuple(rider(d, drive) for drive in on_throws[d.name]), by_name.get(d.name))
             for d in with_riders
         ]
 
     def columns(self, lower: Array, upper: Array) -> BoxColumns:
-        """Return the columns of a box of throws.
-
-        Parameters
-        ----------
-        lower, upper
-            Bounds of the throws [rad], shape (throws,) each.
-        """
+        """Return the columns of a box of throws, from their bounds [rad], shape (throws,) each."""
         sets: list[Set] = []
         entries: dict[tuple[int, int], float] = {}
         couplings: list[tuple[float, list[tuple[int, float]]]] = []
@@ -223,16 +190,8 @@ class Riders:
     def spread(self, columns: BoxColumns, y: Array, middle: Array) -> list[tuple[int, int, float]]:
         """Return throw, column of the model and distance [kg m] of every weight that turns with a throw.
 
-        The distance is between its relaxed unbalance and its unbalance at the throw angles `middle`.
-
-        Parameters
-        ----------
-        columns
-            Columns of a box.
-        y
-            Values of the columns, shape (columns of the box,).
-        middle
-            Angles of the throws in the design [rad], shape (throws,).
+        The distance is between its relaxed unbalance, from the values `y` of the columns of a box, and its unbalance
+        at the throw angles `middle` [rad], shape (throws,).
         """
         x, distances = columns.matrix @ y, []
         for group, shared in zip(self._groups, columns.shared, strict=True):

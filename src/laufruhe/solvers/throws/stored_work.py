@@ -15,21 +15,8 @@ from laufruhe.physics.torque import turning_inertia
 from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.prove.throws.irregularity_bound import StoredWorkBound
-
-
-def with_problem(phasing: Phasing, change: Callable[[Problem], Problem]) -> Phasing:
-    """Return the phasing with a changed problem for every crank.
-
-    Parameters
-    ----------
-    phasing
-        Open phasing.
-    change
-        Function from the problem of a crank to the changed problem.
-    """
-    return replace(phasing, realise=lambda candidate: change(phasing.realise(candidate)))
 
 
 def with_work_for_search(problem: Problem) -> Problem:
@@ -52,14 +39,8 @@ def with_work_for_search(problem: Problem) -> Problem:
 def work_for_bounds(problem: Problem, value: float) -> Callable[[Problem], Problem]:
     """Return a function that replaces the degree of irregularity by work and never raises the objective.
 
-    The replacement is linear in the work. It is a lower bound of the degree (T11) for all designs better than `value`.
-
-    Parameters
-    ----------
-    problem
-        Problem with open throws.
-    value
-        Objective of the best design [SI]; infinite if there is none.
+    The replacement is linear in the work. It is a lower bound of the degree (T11) for all designs better than `value`,
+    the objective of the best design [SI].
     """
     if not _has_degree(problem):
         return lambda problem: problem
@@ -95,8 +76,6 @@ def _exchange(
 
     Parameters
     ----------
-    problem
-        The problem.
     size
         Size of a measure at an operating point; the point with the largest size represents the term.
     slope
@@ -109,18 +88,16 @@ def _exchange(
     for term in problem.objective:
         measure = term.measure
         if measure.channel.depends_on_torque:
-            sizes = {name: size(measure, name) for name in _points(problem, measure)}
-            name = max(sizes, key=sizes.__getitem__)
+            name = max(_points(problem, measure), key=lambda name, measure=measure: size(measure, name))  # type: ignore[misc]
             term = Term(_work(name), term.weight * slope(measure, name))
         terms.append(term)
     for limit in problem.limits:
         measure = limit.measure
-        if not measure.channel.depends_on_torque:
+        if measure.channel.depends_on_torque:
+            points = _points(problem, measure)
+            limits += [Limit(limit.name, _work(name), maximum(measure, name, limit.maximum)) for name in points]
+        else:
             limits.append(limit)
-            continue
-        limits += [
-            Limit(limit.name, _work(name), maximum(measure, name, limit.maximum)) for name in _points(problem, measure)
-        ]
     return replace(problem, objective=tuple(terms), limits=tuple(limits))
 
 

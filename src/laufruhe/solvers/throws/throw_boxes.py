@@ -104,23 +104,9 @@ class ThrowBox:
 
 
 class ThrowPrograms:
-    """Cone programs of boxes of throws.
+    """Cone programs of boxes of throws, with the names of limits that boxes without a design violate (`conflict`).
 
-    Parameters
-    ----------
-    waves
-        Waves of the loads.
-    riders
-        Open unbalances, with those on the throws.
-    firing
-        Bounds of firing intervals, throws and open angles.
-    samples
-        Samples over the period for norms that are no sums of squares.
-
-    Attributes
-    ----------
-    conflict
-        Names of limits that boxes without a design violate.
+    `samples` over the period are those of norms that are no sums of squares.
     """
 
     def __init__(self, waves: ThrowWaves, riders: Riders, firing: FiringBounds, samples: int) -> None:
@@ -164,10 +150,9 @@ class ThrowPrograms:
             return replace(program, window=window)
         intervals = self._intervals(window)
         rows = replace(program.rows, limits=(*program.rows.limits, (1.0, intervals)))
-        reduced_limits = replace(
-            program.reduced, limits=(*program.reduced.limits, (1.0, self._without_negligible_orders(intervals)))
-        )
-        return replace(program, window=window, rows=rows, reduced=reduced_limits, names=(*program.names, ""))
+        reduced_limits = (*program.reduced.limits, (1.0, self._without_negligible_orders(intervals)))
+        reduced = replace(program.reduced, limits=reduced_limits)
+        return replace(program, window=window, rows=rows, reduced=reduced, names=(*program.names, ""))
 
     def _with_laps(self, window: FiringWindow) -> ThrowProgram:
         """Return the norms of all firing orders with the same whole turns (laps), without limits on intervals."""
@@ -231,20 +216,13 @@ class ThrowPrograms:
         )  # fmt: skip
 
     def box(
-        self,
-        program: ThrowProgram,
-        lower: Array,
-        upper: Array,
-        floor: float,
-        cutoff: float,
+        self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float,
         reuse_multipliers: bool = False,
-    ) -> ThrowBox | FathomedPart:
+    ) -> ThrowBox | FathomedPart:  # fmt: skip
         """Shrink a box to the angles where a design may be better than `cutoff`, and bound it.
 
         Parameters
         ----------
-        program
-            Norms of the firing window.
         lower, upper
             Bounds of throws and shared angles [rad].
         floor
@@ -407,7 +385,12 @@ class Mixture:
         self._shared = np.array(shared).reshape(len(shared), shared_count)
         places = np.concatenate([[0], np.cumsum([len(shared) - 1, *(len(shared) * (n - 1) for n in steps[:throws])])])
         self._places, size = self.unbalances + places, int(self.unbalances + places[-1])
-        points = [self._wave_points(angles) for angles in self._angles]
+        shared_phases = (self._shared @ self._orders[:, 1:].T)[:, None]
+        points = []
+        for angles in self._angles:
+            phases = shared_phases + np.outer(angles, self._orders[:, 0])
+            theta = np.broadcast_to(angles[None, :, None], (*phases.shape[:2], 1))
+            points.append(np.concatenate([np.cos(phases), np.sin(phases), theta], axis=2))
         ties = []
         for maximum, norm in columns.limits:
             slope = np.zeros((*norm.constant.shape, size))
@@ -420,12 +403,6 @@ class Mixture:
         )
         domains = domains_of([*(domain.decision for domain in columns.domains), *shares])
         self.problem = AffineProblem(terms, (*limits, *ties, *self._share_limits(size)), domains, 1)
-
-    def _wave_points(self, angles: Array) -> Array:
-        phases = np.add.outer(self._shared @ self._orders[:, 1:].T, np.zeros(len(angles))).swapaxes(1, 2)
-        phases = phases + np.outer(angles, self._orders[:, 0])
-        theta = np.broadcast_to(angles[None, :, None], (*phases.shape[:2], 1))
-        return np.concatenate([np.cos(phases), np.sin(phases), theta], axis=2)
 
     def _through(self, norm: AffineNorm, matrix: Array, points: Sequence[Array]) -> AffineNorm:
         """Return a norm in columns of the box, from its rows in columns of the model."""
@@ -471,10 +448,7 @@ class Mixture:
     def middle(self, x: Array) -> tuple[Array, Array]:
         """Return the mean angle of every mixture [rad], and its weighted distance from the waves at that angle.
 
-        Parameters
-        ----------
-        x
-            Solution of the program, shape (columns,).
+        They are those of a solution `x` of the program, shape (columns,).
         """
         count, first = len(self._shared), self._places[0]
         shares = x[first : first + count - 1]

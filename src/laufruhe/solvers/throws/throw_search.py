@@ -36,7 +36,6 @@ from laufruhe.solvers.throws.throw_windows import (
     design_at,
     firing_bounds,
     has_same_unbalances,
-    middle_throws,
     nearest_throws,
     place_in,
     turns_freely,
@@ -89,15 +88,14 @@ class ThrowBound:
     what: str = "boxes of throws"
 
 
+@dataclass(frozen=True, eq=False)
 class Stage:
     """Programs at one number of samples over the period, linked to the stage with twice as many (S29).
 
-    Parameters
+    Attributes
     ----------
     build
         Function from the number of samples to the programs.
-    samples
-        Number of samples.
     loss
         Function from the number of samples to the error of means and peaks of the best design (P7) [SI].
     value
@@ -110,30 +108,30 @@ class Stage:
         Error relative to the objective at which samples suffice.
     """
 
-    def __init__(
-        self, build: Callable[[int], ThrowPrograms], samples: int, loss: Callable[[int], float], value: float,
-        truncation: Callable[[int], float], maximum: int = MAX_SAMPLES, target: float = STEPS_COST,
-    ) -> None:  # fmt: skip
-        self._build, self._samples, self._loss, self._value, self._truncation = build, samples, loss, value, truncation
-        self._maximum, self._target = maximum, target
+    build: Callable[[int], ThrowPrograms]
+    samples: int
+    loss: Callable[[int], float]
+    value: float
+    truncation: Callable[[int], float]
+    maximum: int = MAX_SAMPLES
+    target: float = STEPS_COST
 
     @cached_property
     def programs(self) -> ThrowPrograms:
         """Programs at this number of samples."""
-        return self._build(self._samples)
+        return self.build(self.samples)
 
     @cached_property
     def cost(self) -> float:
         """Error of bounds by sampling and truncation, relative to the best objective."""
-        return (self._loss(self._samples) + self._truncation(self._samples)) / self._value
+        return (self.loss(self.samples) + self.truncation(self.samples)) / self.value
 
     @cached_property
     def next(self) -> Stage | None:
         """Stage with twice as many samples; None if these suffice."""
-        samples = 2 * self._samples
-        if self._loss(self._samples) <= self._target * self._value or samples > self._maximum:
+        stage = replace(self, samples=2 * self.samples)
+        if self.loss(self.samples) <= self.target * self.value or stage.samples > self.maximum:
             return None
-        stage = Stage(self._build, samples, self._loss, self._value, self._truncation, self._maximum, self._target)
         # averages over short steps may truncate more of a pressure jump
         return stage if stage.cost < self.cost else None
 
@@ -152,30 +150,12 @@ class Stage:
         return self if self.next is None else self.next.last
 
     def is_exhausted(self, bound: float, value: float, box: ThrowBox) -> bool:
-        """Return True if more samples improve the bound of a box more than its division.
-
-        Parameters
-        ----------
-        bound, value
-            Lower bound in the box, and objective of the best design [SI].
-        box
-            The box.
-        """
+        """Return True if more samples improve the bound of a box [SI] more than its division."""
         return bound > value * (1.0 - _FINER_FACTOR * self.cost) or float(box.spread.sum()) < self.cost
 
 
 def peak_error(measure: Measure, best: Result, samples: int) -> float:
-    """Return an upper bound of the difference between a peak and its samples at any phase (F7) [SI].
-
-    Parameters
-    ----------
-    measure
-        Measure of the peak.
-    best
-        Result of the design.
-    samples
-        Number of samples over the period.
-    """
+    """Return an upper bound of the difference between a peak and its samples over the period at any phase (F7) [SI]."""
     signals = best.final.signals(measure.load)
     rebased = with_common_base(common_base([signal.repeat_order() for signal in signals]), signals)
     spectra = [narrow_signal(measure, signal, best.final.engine) for signal in rebased]
@@ -217,8 +197,6 @@ def search_throws(
 
     Parameters
     ----------
-    problem, phasing
-        The problem and its open phasing.
     best
         Best known design; None if there is none.
     floor
@@ -315,9 +293,17 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
         phasing = self._phasing
         candidate, realised = self._first_crank(windows, left_out)
-        throw_of_rotor = rotor_throws_of(phasing, candidate)
+        throw_of_rotor, layout = rotor_throws_of(phasing, candidate), phasing.layout_of(candidate)
         riders = Riders(realised, throw_of_rotor, candidate.throws)
-        waves = self._waves(riders.problem, candidate, throw_of_rotor)
+        if any(phasing.is_geometry_open):
+            if not has_same_unbalances(phasing, candidate):
+                raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
+            # if the phase of the crank has no effect, its first throw keeps its angle
+            is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, throw_of_rotor)
+            side = 0.0 if is_fixed else layout.side(0)
+            waves = ThrowWaves(riders.problem, layout, throw_of_rotor, phasing.is_geometry_open, side)
+        else:
+            waves = ThrowWaves(riders.problem, layout, throw_of_rotor)
 
         def truncation(samples: int) -> float:
             return sum(term.weight * waves.left_out(term.measure, samples) for term in realised.objective)
@@ -328,26 +314,13 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         # the model cannot evaluate a crank with nearly simultaneous firings
         first_windows = windows[:_MAX_REALISED]
         for k, window in enumerate(first_windows):
-            candidate = replace(self.candidate(window, middle_throws(window)), left_out=left_out)
+            candidate = replace(self.candidate(window, nearest_throws(window)), left_out=left_out)
             try:
                 return candidate, replace(self._phasing.realise(candidate), phasing=None)
             except ModelError:
                 if k + 1 == len(first_windows):
                     raise
         raise ModelError("the problem has no firing window")
-
-    def _waves(self, problem: Problem, candidate: Candidate, throw_of_rotor: dict[str, int]) -> ThrowWaves:
-        phasing = self._phasing
-        layout = phasing.layout_of(candidate)
-        if not any(phasing.is_geometry_open):
-            return ThrowWaves(problem, layout, throw_of_rotor)
-        if not has_same_unbalances(phasing, candidate):
-            raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
-        # if the phase of the crank has no effect, its first throw keeps its angle
-        is_fixed = phasing.throw_bounds is not None or turns_freely(phasing, candidate, throw_of_rotor)
-        return ThrowWaves(
-            problem, layout, throw_of_rotor, phasing.is_geometry_open, 0.0 if is_fixed else layout.side(0)
-        )
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """Return the candidate with these throws [rad] and the firing order of the window, or else their best order."""
@@ -357,13 +330,9 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         orders = ranked_orders(replace(self._phasing, intervals=Intervals(0.0, math.inf)), design)
         return replace(design, firing_order=orders[0].order if orders else None)
 
-    def cut(self, value: float) -> float:
-        """Return the objective that a design must be below, for the objective of the incumbent [SI]."""
-        return value * (1.0 - SHARE * self._problem.tolerance)
-
     def level(self, value: float) -> float:
         """Return the smallest objective that designs in cut-off boxes may have, for that of the incumbent [SI]."""
-        return self.cut(value)
+        return value * (1.0 - SHARE * self._problem.tolerance)
 
     def witness_of(self, incumbent: _Best) -> Witness | None:
         """Return the best design as a witness of bounds; None without a feasible design."""
@@ -391,24 +360,14 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return None
 
     def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, _Best | None]]:
-        """Yield the boxes of all windows for the root, else a box at more samples or its halves.
-
-        Parameters
-        ----------
-        part
-            The root or a box.
-        value
-            Objective of the incumbent [SI].
-        """
-        box, stage, cutoff = part.box, part.stage, self.cut(value)
+        """Yield the boxes of all windows for the root, else a box at more samples or its halves."""
+        box, stage, cutoff = part.box, part.stage, self.level(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
-                cutoff = self.cut(min(value, self._best.value))
-                programs = first.programs
+                programs, cutoff = first.programs, self.level(min(value, self._best.value))
                 root = programs.box(programs.program(window), *window.box, part.bound, cutoff, reuse_multipliers=True)
                 yield self._examine(first, root, left_out)
         elif stage.is_exhausted(part.bound, value, box) and stage.finer is not None:
-            # more samples improve the bound more than smaller boxes
             programs = stage.finer.programs
             finer = programs.box(programs.program(box.program.window), box.lower, box.upper, part.bound, cutoff)
             yield self._examine(stage.finer, finer, part.left_out)

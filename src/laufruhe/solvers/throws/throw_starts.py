@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
@@ -49,8 +48,6 @@ def start_candidates(phasing: Phasing, even_result: Result | None, with_gas: boo
 
     Parameters
     ----------
-    phasing
-        Open phasing.
     even_result
         Result of the even stars, with its ranking; None if there are none or throws have bounds.
     with_gas
@@ -122,11 +119,9 @@ def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
 
 
 def _best_cranks(phasing: Phasing, patterns: Sequence[FiringPattern]) -> list[Candidate]:
-    cranks: list[tuple[float, Candidate]] = []
     allowed = [pattern for pattern in patterns if pattern.broken <= _ROUNDING]
-    for number, pattern in enumerate(allowed):
-        # even patterns come first, and get the most cranks
-        cranks += _cranks_of_pattern(phasing, pattern, number + 1)
+    # even patterns come first, and get the most cranks
+    cranks = [crank for k, pattern in enumerate(allowed) for crank in _cranks_of_pattern(phasing, pattern, k + 1)]
     cranks.sort(key=lambda pair: pair[0])
     unit = max((value for value, _ in cranks), default=0.0) or 1.0
     # mirror images of a crank have equal objectives
@@ -146,7 +141,14 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     layout, count = phasing.layout(bank, split), len(pattern.members)
     zero_crank = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
     objective = amplitude_objective(replace(phasing.realise(zero_crank), limits=()), phasing, layout)
-    orders = _throw_orders(phasing, count, (_MAX_CRANKS if objective else _MAX_EVALUATED) // number**2)
+    maximum = max((_MAX_CRANKS if objective else _MAX_EVALUATED) // number**2, _FEWEST)
+    if phasing.firing_order is not None:
+        orders = np.arange(count)[None]
+    elif math.factorial(count) <= maximum:
+        orders = np.array(list(itertools.permutations(range(count))))
+    else:
+        rng = np.random.default_rng(1964)
+        orders = np.array([rng.permutation(count) for _ in range(maximum)])
     # a throw lags by the crank angle at which its first cylinder fires (C5)
     firsts = np.array([pattern.moments[members[0]] for members in pattern.members])[orders]
     throws = angle_of(layout.dead_centre_turn(0)) + firsts[:, :1] - firsts
@@ -175,16 +177,6 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
         if math.isfinite(value):
             cranks.append((value, crank))
     return cranks
-
-
-def _throw_orders(phasing: Phasing, count: int, maximum: int) -> NDArray[np.intp]:
-    if phasing.firing_order is not None:
-        return np.arange(count)[None]
-    maximum = max(maximum, _FEWEST)
-    if math.factorial(count) <= maximum:
-        return np.array(list(itertools.permutations(range(count))))
-    rng = np.random.default_rng(1964)
-    return np.array([rng.permutation(count) for _ in range(maximum)])
 
 
 def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:

@@ -78,15 +78,7 @@ def firing_bounds(phasing: Phasing) -> FiringBounds:
 
 
 def design_at(phasing: Phasing, angles: Array) -> Candidate:
-    """Return the candidate at angles of a box, without a firing order.
-
-    Parameters
-    ----------
-    phasing
-        Open phasing.
-    angles
-        Throws, then open bank and split pin angles [rad].
-    """
+    """Return the candidate at angles of a box: throws, then open bank and split pin angles [rad]; it has no order."""
     layout = phasing.layout(*phasing.minimum_geometry)
     count = len(layout.throw_positions)
     shared = iter(angles[count:])
@@ -101,21 +93,7 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
 
 
 def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Array | None:
-    """Return the angles of a design as in boxes of a window; None if the design is outside the window.
-
-    Parameters
-    ----------
-    phasing
-        Open phasing.
-    window
-        Firing window.
-    candidate
-        Throws, firing order and geometry of the design.
-
-    Returns
-    -------
-    Throws, then open bank and split pin angles [rad].
-    """
+    """Return the angles of a design as in boxes of a window, see `design_at`; None if it is outside the window."""
     if window.order and window.order != candidate.firing_order:
         return None
     layout = phasing.layout(*phasing.minimum_geometry)
@@ -147,12 +125,7 @@ def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
 def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[str, int]) -> bool:
     """Return True if all unbalances off the throws have free angles, so that the crank's phase has no effect.
 
-    Parameters
-    ----------
-    phasing, candidate
-        Open phasing, and a design.
-    throw_of_rotor
-        Index of the throw of every rotor that turns with one.
+    `throw_of_rotor` has the index of the throw of every rotor that turns with one.
     """
     problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
     free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in throw_of_rotor}
@@ -165,22 +138,14 @@ def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[st
     )
 
 
-def middle_throws(window: FiringWindow) -> Array:
-    """Return throws inside a window, each in the middle of the range that the previous throws leave [rad]."""
+def nearest_throws(window: FiringWindow, throws: Array | None = None) -> Array:
+    """Return throws inside a window, each as near to `throws` as the previous throws allow [rad], shape (throws,).
+
+    Without `throws`, each is in the middle of the range that the previous throws leave.
+    """
     low, high = window.box
-    for k in range(len(low)):
-        low, high = _fix(window, low, high, k, 0.5 * (low[k] + high[k]))
+    for k in range(len(low if throws is None else throws)):
+        angle = 0.5 * (low[k] + high[k]) if throws is None else np.clip(throws[k], low[k], high[k])
+        is_throw = np.arange(len(low)) == k
+        low, high = window.within(np.where(is_throw, angle, low), np.where(is_throw, angle, high)) or (low, high)
     return np.asarray(0.5 * (low + high))
-
-
-def nearest_throws(window: FiringWindow, throws: Array) -> Array:
-    """Return throws inside a window, each as near to `throws` as the previous throws allow [rad], shape (throws,)."""
-    low, high = window.box
-    for k, angle in enumerate(throws):
-        low, high = _fix(window, low, high, k, float(np.clip(angle, low[k], high[k])))
-    return np.asarray(0.5 * (low + high))
-
-
-def _fix(window: FiringWindow, low: Array, high: Array, throw: int, angle: float) -> tuple[Array, Array]:
-    is_throw = np.arange(len(low)) == throw
-    return window.within(np.where(is_throw, angle, low), np.where(is_throw, angle, high)) or (low, high)

@@ -7,7 +7,7 @@ linear in the angles. The exact model compares both, so the result is never wors
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -41,7 +41,7 @@ from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
-from laufruhe.solvers.throws.stored_work import with_problem, with_work_for_search, work_for_bounds
+from laufruhe.solvers.throws.stored_work import with_work_for_search, work_for_bounds
 from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
@@ -62,15 +62,7 @@ TRADE_STARTS = 3
 
 
 def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None) -> Result:
-    """Return the best local optimum from the even stars, with a lower bound over all throws.
-
-    Parameters
-    ----------
-    problem, phasing
-        The problem and its open phasing.
-    even_result
-        Result of the even stars, with its ranking; None if there are none or throws have bounds.
-    """
+    """Return the best local optimum from the even stars, with a lower bound over all throws. See `start_candidates`."""
     starts = start_candidates(phasing, even_result, problem.depends_on_gas)
     if not starts:
         reason, is_proven = why_none_fires(phasing)
@@ -93,9 +85,17 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
         if designs and len(shares) > 1:
             trade.append(_trade_point(problem, phasing, allowed, designs[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
+
+    def improve(candidate: Candidate, uses_search: bool) -> StarDesign | None:
+        if uses_search:
+            return local_optimum(phasing, candidate, phasing.intervals)
+        return evaluate_crank(phasing, candidate)
+
     box_bound = None
     if not designs or phasing.thorough:
-        box_bound = _search_boxes(problem, phasing, designs[0] if designs else None, floor)
+        with_work = work_for_bounds(problem, designs[0].value if designs else math.inf)
+        phasing_of_work = replace(phasing, realise=lambda candidate: with_work(phasing.realise(candidate)))
+        box_bound = search_throws(with_work(problem), phasing_of_work, designs[0] if designs else None, floor, improve)
     if box_bound is not None:
         floor, source = max(floor, box_bound.bound), f"{box_bound.boxes} {box_bound.what}"
         if box_bound.best is not None and box_bound.best not in designs:
@@ -110,31 +110,22 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
     result, doubt = refine_result(designs[0].result, floor, zero_level)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
-    # zero is a lower bound of every norm
     certificate = make_certificate(
         best.value, floor, zero_level, problem.tolerance, ProofStrength.PARTIAL, best.kkt_residual, method, doubt
     )
+    distinct_designs: list[StarDesign] = []
+    for design in designs:
+        if not any(_is_same_crank(design.candidate, known_design.candidate) for known_design in distinct_designs):
+            distinct_designs.append(design)
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
-        for d in _distinct(designs)
+        for d in distinct_designs
     ]
     count = even_result.phasing.designs if even_result is not None and even_result.phasing is not None else len(designs)
     details = ranking_result(phasing, best.candidate, ranking, count, len(designs), method)
     even_value = even_result.objective.value if even_result is not None and even_result.objective is not None else None
     details = replace(details, trade=tuple(trade), even_value=even_value)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
-
-
-def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> ThrowBound | None:
-    # None without a proof
-
-    def improve(candidate: Candidate, uses_search: bool) -> StarDesign | None:
-        if uses_search:
-            return local_optimum(phasing, candidate, phasing.intervals)
-        return evaluate_crank(phasing, candidate)
-
-    with_work = work_for_bounds(problem, first.value if first is not None else math.inf)
-    return search_throws(with_work(problem), with_problem(phasing, with_work), first, floor, improve)
 
 
 def evaluate_crank(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
@@ -190,16 +181,7 @@ def local_optimum(
 ) -> StarDesign | None:  # fmt: skip
     """Return the local optimum from a start star, or the star itself if nothing is better; None if neither is feasible.
 
-    Parameters
-    ----------
-    phasing
-        Open phasing.
-    start
-        Start star.
-    intervals
-        Limits of firing intervals.
-    with_perturbations
-        True to start from perturbed stars too, because a star may be a saddle point (S20).
+    `with_perturbations`, it starts from perturbed stars too, because a star may be a saddle point (S20).
     """
     best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
@@ -281,14 +263,6 @@ def _if_feasible(phasing: Phasing, intervals: Intervals, design: StarDesign | No
     if design.result.final.violation(design.result.problem.limits) > FEASIBLE:
         return None
     return design if intervals.holds(firing_intervals(phasing, design.candidate), 1e-7) else None
-
-
-def _distinct(designs: Sequence[StarDesign]) -> list[StarDesign]:
-    distinct: list[StarDesign] = []
-    for design in designs:
-        if not any(_is_same_crank(design.candidate, known_design.candidate) for known_design in distinct):
-            distinct.append(design)
-    return distinct
 
 
 def _is_same_crank(first: Candidate, second: Candidate) -> bool:
