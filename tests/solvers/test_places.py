@@ -293,7 +293,7 @@ def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Pat
     search = PlaceSearch(problem)
     lower, upper = search.bounds
     middle = np.array([0.03, -0.02])
-    box = _Box(lower, upper, 0.0, middle, np.where(np.arange(2) == side, 0.02, 0.01))
+    box = _Box(lower, upper, 0.0, False, middle, np.where(np.arange(2) == side, 0.02, 0.01))
     halves = list(search.parts(box, np.inf))
     (low, _), (high, _) = halves
     assert isinstance(low, _Box)

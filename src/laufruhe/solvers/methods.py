@@ -32,10 +32,9 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.boxes.flywheel import solve_flywheel
-from laufruhe.solvers.boxes.leads import solve_leads
+from laufruhe.solvers.boxes.leads import solve_leads, solve_shared_leads
 from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.boxes.places import solve_places, solve_places_with
-from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     ProofData,

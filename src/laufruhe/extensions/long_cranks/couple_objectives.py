@@ -149,10 +149,9 @@ class CoupleNorms:
             row[heavy] = np.array(chosen) / np.maximum(shares[heavy], 1e-300)
         constant_part = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
         unit = SMALL * max(constant_part, float(shares.max(initial=0.0)) * SHORT)
-        pieces = [term.plane(unit * row.view(float)) for row in touching_points for term in self.terms]
-        grouped = [pieces[k : k + len(self.terms)] for k in range(0, len(pieces), len(self.terms))]
-        constants = np.array([sum(constant for constant, _ in parts) for parts in grouped])
-        return constants, np.array([sum(slope for _, slope in parts) for parts in grouped])
+        planes = [[term.plane(unit * row.view(float)) for term in self.terms] for row in touching_points]
+        constants = np.array([sum(constant for constant, _ in parts) for parts in planes])
+        return constants, np.array([sum(slope for _, slope in parts) for parts in planes])
 
     def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars [SI]."""
@@ -272,7 +271,8 @@ class _Spread:
         for channel, by_design in signals.items():
             rest[channel], units[channel] = [], []
             for at in range(len(problem.points)):
-                star_loads = [_padded(signals_of[at], count) for signals_of in by_design]
+                coefficients = (signals_of[at].coefficients for signals_of in by_design)
+                star_loads = [np.pad(x, [(0, count - len(x)), *[(0, 0)] * (x.ndim - 1)]) for x in coefficients]
                 unit = (star_loads[1] - star_loads[0])[places] / (sums[1] - sums[0])[:, None, None]
                 shared = star_loads[0].copy()
                 shared[places] -= unit * sums[0][:, None, None]
@@ -321,9 +321,3 @@ class _Spread:
             signals = [signal.averaged(signal.period / samples) for signal in signals]
         rows = load_rows(measure, self.problem.points, signals, self.design.engine, samples, bends)
         return rows.vectors, rows.grid
-
-
-def _padded(signal: Spectrum, count: int) -> ComplexArray:
-    coefficients = np.zeros((count, *signal.coefficients.shape[1:]), dtype=complex)
-    coefficients[: len(signal.coefficients)] = signal.coefficients
-    return coefficients

@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -56,17 +56,13 @@ class CoupleObjective(Protocol):
 
 
 def search_stars(
-    space: StarSpace, objective: CoupleObjective, count: int = 1, time_limit: float = float("inf"),
+    space: StarSpace, objective: CoupleObjective, count: int = 1, time_limit: float = math.inf,
     known: Stars | None = None,
 ) -> StarSearchResult:  # fmt: skip
     """Return the best stars, proven if their halves are few enough to enumerate (S5).
 
     Parameters
     ----------
-    space
-        Stars allowed.
-    objective
-        Objective to minimise.
     count
         Number of distinct stars.
     time_limit
@@ -76,11 +72,10 @@ def search_stars(
     """
     with limit_time(time_limit):
         best = best_starts(space, objective, count, known)
-        search = _Search(space, objective, best)
-        search.run()
-    minimum = float(best.values[0]) if len(best.values) else float("inf")
-    bound = objective.lower_bound(space) if search.ended else minimum
-    return StarSearchResult(best.stars, best.values, bound, not search.ended, search.looked_at)
+        looked_at, complete = _search_pieces(space, objective, best)
+    minimum = float(best.values[0]) if len(best.values) else math.inf
+    bound = minimum if complete else objective.lower_bound(space)
+    return StarSearchResult(best.stars, best.values, bound, complete, looked_at)
 
 
 def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known: Stars | None = None) -> BestStars:
@@ -94,79 +89,57 @@ def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known:
     return best
 
 
-@dataclass(frozen=True, eq=False)
-class _Piece:
-    """Some divisions of a pattern between front and back half, with the best stars at the start."""
+def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars) -> tuple[int, bool]:
+    """Search all pieces in rounds, and improve the best stars; return the number of stars, and True if all are done.
 
-    space: StarSpace
-    objective: CoupleObjective
-    pattern: tuple[int, ...]
-    shares: Counts
-    best: BestStars
-
-
-class _Search:
-    """Search over all stars of a space in pieces."""
-
-    def __init__(self, space: StarSpace, objective: CoupleObjective, best: BestStars) -> None:
-        self.space, self.objective, self.best = space, objective, best
-        self.zero_level = NEGLIGIBLE * objective.upper_bound(space)
-        self.looked_at, self.ended = 0, False
-
-    def run(self) -> None:
-        """Search all pieces in rounds; each piece starts from the best stars of earlier rounds.
-
-        Pieces and rounds do not depend on the workers, so the result does not either.
-        """
-        if self.best.cut <= self.zero_level:
-            return
-        work = work_of(self.space)
-        self.ended = work > LARGEST_WORK
-        if self.ended:
-            return
-        pieces = [
-            (pattern, part)
-            for pattern in self.space.patterns
-            for part in np.array_split(shares_of(self.space, Free.from_pattern(pattern)), PIECES)
-            if len(part)
-        ]
-        with ExitStack() as stack:
-            is_parallel = work > WORTH_SHARING and worker_count() > 1
-            executor = stack.enter_context(executor_for()) if is_parallel else SERIAL
-            start, size = 0, 1
-            while start < len(pieces):
-                chosen = pieces[start : start + size]
-                batch = [_Piece(self.space, self.objective, *piece, self.best) for piece in chosen]
-                # the first pieces find values that spare the others most of their work
-                start, size = start + size, min(2 * size, MAX_AT_ONCE)
-                answers = sorted(
-                    unordered_map(_search_piece, batch, executor, patient=True), key=lambda answer: answer[0]
-                )
-                for _, (best, looked_at, ended) in answers:
-                    self.best.offer(best.stars, best.values)
-                    self.looked_at += looked_at
-                    self.ended = self.ended or ended
-                self.ended = self.ended or len(answers) < len(batch)
-                report_progress(
-                    "arrangements of halves", self.looked_at, work, float(self.best.values.min(initial=np.inf))
-                )
-                if self.ended:
-                    return
+    Each piece, some divisions of a pattern, starts from the best stars of earlier rounds. Pieces and rounds do not
+    depend on the workers, so the result does not either.
+    """
+    if best.cut <= NEGLIGIBLE * objective.upper_bound(space):
+        return 0, True
+    work = work_of(space)
+    if work > LARGEST_WORK:
+        return 0, False
+    pieces = [
+        (pattern, part)
+        for pattern in space.patterns
+        for part in np.array_split(shares_of(space, Free.from_pattern(pattern)), PIECES)
+        if len(part)
+    ]
+    looked_at, start, size = 0, 0, 1
+    with ExitStack() as stack:
+        is_parallel = work > WORTH_SHARING and worker_count() > 1
+        executor = stack.enter_context(executor_for()) if is_parallel else SERIAL
+        while start < len(pieces):
+            batch = pieces[start : start + size]
+            # the first pieces find values that spare the others most of their work
+            start, size = start + size, min(2 * size, MAX_AT_ONCE)
+            search = partial(_search_piece, space=space, objective=objective, known=best)
+            answers = sorted(unordered_map(search, batch, executor, patient=True), key=lambda answer: answer[0])
+            for _, (found_stars, number, _) in answers:
+                best.offer(found_stars.stars, found_stars.values)
+                looked_at += number
+            report_progress("arrangements of halves", looked_at, work, float(best.values.min(initial=np.inf)))
+            if len(answers) < len(batch) or not all(complete for _, (_, _, complete) in answers):
+                return looked_at, False
+    return looked_at, True
 
 
-def _search_piece(piece: _Piece) -> tuple[BestStars, int, bool]:
-    """Return the best stars of a piece, the number of evaluated stars, and True if time ran out."""
-    space, objective, free, looked_at = piece.space, piece.objective, Free.from_pattern(piece.pattern), 0
-    best = BestStars(piece.best.count, space.throws)
-    best.offer(piece.best.stars, piece.best.values)
+def _search_piece(
+    piece: tuple[tuple[int, ...], Counts], space: StarSpace, objective: CoupleObjective, known: BestStars
+) -> tuple[BestStars, int, bool]:
+    """Return the best stars of a pattern's divisions, the number of evaluated stars, and True if time sufficed."""
+    (pattern, shares), looked_at = piece, 0
+    free, best = Free.from_pattern(pattern), BestStars(known.count, space.throws)
+    best.offer(known.stars, known.values)
     window, cut = None, np.nan
-    for share in piece.shares:
+    for share in shares:
         if is_time_over():
-            return best, looked_at, True
+            return best, looked_at, False
         if best.cut != cut:
             # stars equal to the last of the best are left out: any of them will do
             cut = best.cut
-            window = objective.window(space, piece.pattern, cut * (1.0 - SLACK))
+            window = objective.window(space, pattern, cut * (1.0 - SLACK))
         if window is None:
             break
         looked_at += free.arrangements
@@ -174,21 +147,16 @@ def _search_piece(piece: _Piece) -> tuple[BestStars, int, bool]:
             stars = np.unique(space.canonical(block), axis=0)
             best.offer(stars, objective.values(space, stars, best.cut))
             looked_at += len(stars)
-    return best, looked_at, False
+    return best, looked_at, True
 
 
 def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:
     """Return stars that no swap of two throws improves; the best one is also improved by rearrangement."""
-    rng = np.random.default_rng(SEED)
-    candidates = [
-        star
-        for pattern in space.patterns
-        for star in (
-            *_mirror_stars(pattern, rng),
-            *_block_stars(space, pattern, objective, rng),
-            *_shuffled_stars(pattern, rng),
-        )
-    ]
+    rng, candidates = np.random.default_rng(SEED), list[Stars]()
+    for pattern in space.patterns:
+        candidates += [*_mirror_stars(pattern, rng), *_block_stars(space, pattern, objective, rng)]
+        steps = np.repeat(np.arange(len(pattern)), [pattern[0] - 1, *pattern[1:]])
+        candidates += [np.concatenate([[0], rng.permutation(steps)]).astype(np.uint8) for _ in range(STARTS)]
     improved = np.array([_improve_by_swaps(space, objective, star) for star in candidates])
     values = objective.values(space, improved)
     best = improved[np.argmin(values)]
@@ -233,12 +201,6 @@ def _rearrange(space: StarSpace, objective: CoupleObjective, star: Stars, throws
             if values[first] < value * (1.0 - SLACK):
                 star, value = block[first], float(values[first])
     return star
-
-
-def _shuffled_stars(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
-    steps = np.repeat(np.arange(len(pattern)), [pattern[0] - 1, *pattern[1:]])
-    for _ in range(STARTS):
-        yield np.concatenate([[0], rng.permutation(steps)]).astype(np.uint8)
 
 
 def _mirror_stars(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:

@@ -56,10 +56,7 @@ class SizeBoxes:
     is_whole
         True if no row was set to zero for a kink that passes it.
 
-    Parameters
-    ----------
-    ask
-        Function that proposes multipliers if unbalances are open.
+    The function `ask` proposes multipliers if unbalances are open.
 
     Raises
     ------
@@ -100,7 +97,7 @@ class SizeBoxes:
 
         def factors(x: Array) -> Array:
             engine = self.model.engine(x)
-            arrays = [array.ravel() for piece in pieces for array in self.model.factors(piece, measure, engine)]
+            arrays = [x.ravel() for piece in pieces for x in self.model.factors(piece.positions, measure, engine)]
             return np.concatenate(arrays) if arrays else np.zeros(1)
 
         if not self.model.moves_rod:
@@ -118,12 +115,11 @@ class SizeBoxes:
         monotonicity = np.zeros(len(lower))
         for start in (lower, upper):
             for k in range(len(lower)):
-                ends = [np.where(np.arange(len(lower)) == k, edge, start) for edge in (lower, upper)]
-                change = numbers(ends[1]) - numbers(ends[0])
-                rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
-                sign = float(rises) - float(falls)
-                if (rises and falls) or sign * monotonicity[k] < 0.0:
-                    raise ValueError(f"a measure is not monotonic in {self.model.problem.decisions[k].name}")
+                low, high = (np.where(np.arange(len(lower)) == k, edge, start) for edge in (lower, upper))
+                name = f"a measure is not monotonic in {self.model.problem.decisions[k].name}"
+                sign = _common_sign(numbers(high) - numbers(low), name)
+                if sign * monotonicity[k] < 0.0:
+                    raise ValueError(name)
                 monotonicity[k] = sign or monotonicity[k]
         return monotonicity
 
@@ -133,14 +129,9 @@ class SizeBoxes:
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):
             raise ValueError("a mass of the running gear passes zero")
-        monotonicity = np.zeros(corners.ndim - 1)
-        for k, decision in enumerate(self.model.sizes):
-            change = np.diff(np.abs(corners), axis=k)
-            rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
-            if rises and falls:
-                raise ValueError(f"masses are not monotonic in {decision.name}")
-            monotonicity[k] = float(rises) - float(falls)
-        return monotonicity
+        changes = (np.diff(np.abs(corners), axis=k) for k in range(corners.ndim - 1))
+        names = (f"masses are not monotonic in {decision.name}" for decision in self.model.sizes)
+        return np.array([_common_sign(*pair) for pair in zip(changes, names, strict=True)])
 
     def with_limits(self, limits: Sequence[Limit]) -> SizeBoxes:
         """Return the boxes with some of the limits alone, and no objective."""
@@ -174,7 +165,7 @@ class SizeBoxes:
         return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
     def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: SizeReach) -> float:
-        factors = self.model.factors(bundle.piece, measure, engine)
+        factors = self.model.factors(bundle.piece.positions, measure, engine)
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
             return ratio * bundle.minimum(reach)
@@ -264,6 +255,13 @@ class SizeBoxes:
             return self.objective(*part, multipliers) >= target or self.violates_limit(*part, k, 1.0)
 
         return lower, np.where(is_side, _end_of_empty_range(high_empty, upper[k], lower[k]), upper)
+
+
+def _common_sign(changes: Array, reason: str) -> float:
+    rises, falls = bool(np.any(changes > 0.0)), bool(np.any(changes < 0.0))
+    if rises and falls:
+        raise ValueError(reason)
+    return float(rises) - float(falls)
 
 
 def _end_of_empty_range(is_empty: Callable[[float], bool], start: float, end: float) -> float:

@@ -28,7 +28,7 @@ def _solve_sizes(problem: Problem) -> Result:
 
 
 def _solve_star_sizes(problem: Problem) -> Result:
-    from laufruhe.extensions.sizes.stars import solve_star_sizes
+    from laufruhe.extensions.sizes.solver import solve_star_sizes
 
     return solve_star_sizes(problem)
 

@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,11 +24,12 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Decision, Kind, column_bounds, decision_vector, domains_of
+from laufruhe.problem.decision import Kind, column_bounds, decision_vector, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
+T = TypeVar("T")
 MASSES, MAX_KEPT = 4, 4096
 FINE = 1440
 """Fewest samples at which the means of bounds are averaged."""
@@ -36,12 +38,7 @@ BETWEEN, MARGIN, SAME = 7, 0.02, 1e-9
 
 
 class SizeModel:
-    """Problem with open sizes.
-
-    Parameters
-    ----------
-    problem
-        Problem with open sizes and unbalances alone, at an even crank speed.
+    """Problem with open sizes and unbalances alone, at an even crank speed.
 
     Attributes
     ----------
@@ -97,32 +94,22 @@ class SizeModel:
 
     def engine(self, x: Array) -> Engine:
         """Return the engine with sizes `x`, shape (sizes,)."""
-        key = x.tobytes()
-        if key not in self._engines:
-            if len(self._engines) > MAX_KEPT:
-                self._engines.clear()
-            self._engines[key] = resized(self.problem.engine, self._sizes(x))
-        return self._engines[key]
+        return _cached(self._engines, x, lambda: resized(self.problem.engine, self._sizes(x)))
 
     def _sizes(self, x: Array) -> dict[Size, float]:
         return {**self._sizes_given, **dict(zip(self.names, x.tolist(), strict=True))}
 
     def masses(self, x: Array) -> Array:
         """Return the masses that the running gear adds for sizes `x`, shape (4,)."""
-        gear, key = self._moving.gear, x.tobytes()
+        gear = self._moving.gear
         if gear is None or gear.density is None:
             return np.zeros(MASSES)
-        if key not in self._masses:
-            if len(self._masses) > MAX_KEPT:
-                self._masses.clear()
-            resized_cylinder = self._one_cylinder.resized(self._sizes(x))
-            self._masses[key] = np.array(
-                [
-                    *(resized_cylinder.gear or gear).rod_masses(resized_cylinder.parts[0]),
-                    resized_cylinder.throw_unbalance,
-                ]
-            )
-        return self._masses[key]
+
+        def masses_of_gear() -> Array:
+            cylinder = self._one_cylinder.resized(self._sizes(x))
+            return np.array([*(cylinder.gear or gear).rod_masses(cylinder.parts[0]), cylinder.throw_unbalance])
+
+        return _cached(self._masses, x, masses_of_gear)
 
     def with_masses(self, masses: Array) -> Engine:
         """Return the initial engine with other masses of its running gear, shape (4,)."""
@@ -131,9 +118,19 @@ class SizeModel:
             replace(self.problem.engine, slider_cranks=weightless.parts, rotors=weightless.rotors), masses
         )
 
-    def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
-        """Return the factors of the rows of a piece for the sizes of an engine."""
-        return _factors(measure, engine, self.problem, piece.positions)
+    def factors(
+        self, positions: Sequence[tuple[int, int | None, int]], measure: Measure, engine: Engine
+    ) -> list[Array]:
+        """Return the factors at the positions of a piece, shape (places, 1 or d) each; [] without places."""
+        if not positions:
+            return []
+        chosen_places, rows = measure.places(measure.load.places(engine)), []
+        for k, place, _ in positions:
+            factors = measure.load.factors_of(engine, self.problem.points[k])
+            if factors is None:
+                return []
+            rows.append(factors[chosen_places] if place is None else factors[chosen_places][place : place + 1])
+        return rows
 
     def value(self, measure: Measure, x: Array, unbalances: Array | None = None) -> float:
         """Return the value of a measure [SI] for sizes `x`, with the initial unbalances or columns of unbalances."""
@@ -142,7 +139,7 @@ class SizeModel:
             return measure.channel.size_value(engine)
         columns = np.append(self.masses(x), self.start if unbalances is None else unbalances)
         pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
-        return max(piece.value(self.factors(piece, measure, engine), columns) for piece in pieces)
+        return max(piece.value(self.factors(piece.positions, measure, engine), columns) for piece in pieces)
 
     def _averages(self, measure: Measure) -> bool:
         return self.averaged and measure.norm.averages
@@ -224,21 +221,17 @@ class SizeModel:
         """Return evaluations without gear masses and unbalances, then with one unit of each column."""
         if length not in self._evaluations:
             problem, unbalances = self.problem, self.problem.unbalances
-            engine_at_length = problem.design([0.0] * len(unbalances), unbalances)
-            sizes = moving_gear(engine_at_length).sizes
-            engine_at_length = (
-                engine_at_length
-                if length == sizes[ROD_LENGTH]
-                else resized(engine_at_length, {**sizes, ROD_LENGTH: length})
-            )
-            bare_gear = moving_gear(engine_at_length).bare
-            weightless = replace(engine_at_length, slider_cranks=bare_gear.parts, rotors=bare_gear.rotors)
+            engine = problem.design([0.0] * len(unbalances), unbalances)
+            sizes = moving_gear(engine).sizes
+            if length != sizes[ROD_LENGTH]:
+                engine = resized(engine, {**sizes, ROD_LENGTH: length})
+            bare_gear = moving_gear(engine).bare
+            weightless = replace(engine, slider_cranks=bare_gear.parts, rotors=bare_gear.rotors)
             engines = [weightless, *(_with_masses(weightless, unit) for unit in np.eye(MASSES))]
-            engines += [
-                _with_unbalance(weightless, decision, direction)
-                for decision in unbalances
-                for direction in decision.set.directions
-            ]
+            for decision, direction in ((d, direction) for d in unbalances for direction in d.set.directions):
+                changes = {drive.rotor: drive.of(direction) for drive in decision.rotor_drives}
+                rotors = (replace(r, unbalance=r.unbalance + changes.get(r.name, 0.0)) for r in weightless.rotors)
+                engines.append(replace(weightless, rotors=tuple(rotors)))
             self._evaluations[length] = [evaluate(problem, engine) for engine in engines]
         return self._evaluations[length]
 
@@ -258,13 +251,11 @@ class SizeModel:
         if self._averages(measure):
             signals = [[signal.averaged(signal.period / steps) for signal in unit_signals] for unit_signals in signals]
         rows = [load_rows(measure, problem.points, signal, problem.engine, steps, kinks) for signal in signals]
-        affine_rows, count = _affine(rows), steps + len(kinks[0])
+        affine_rows, count, weightless = _affine(rows), steps + len(kinks[0]), evaluations[0].engine
         points = [k for k, share in enumerate(measure.shares(problem.points)) if share > 0.0]
         if not measure.norm.is_largest or len(affine_rows.constant) % (count * len(points)):
             all_points = tuple((k, None, count) for k in points)
-            return (
-                Piece(affine_rows, all_points, tuple(_factors(measure, evaluations[0].engine, problem, all_points))),
-            )
+            return (Piece(affine_rows, all_points, tuple(self.factors(all_points, measure, weightless))),)
         places = len(affine_rows.constant) // (count * len(points))
         pieces = []
         for n, (k, place) in enumerate(itertools.product(points, range(places))):
@@ -273,7 +264,7 @@ class SizeModel:
                 affine_rows, constant=affine_rows.constant[signal], slope=affine_rows.slope[signal], grid=plain(count)
             )
             position = ((k, place, count),)
-            piece = Piece(affine, position, tuple(_factors(measure, evaluations[0].engine, problem, position)))
+            piece = Piece(affine, position, tuple(self.factors(position, measure, weightless)))
             scalar = kinks_at is None and (not piece.initial_factors or piece.initial_factors[0].size == 1)
             if scalar:
                 ends = zip(self.mass_box, column_bounds(self.domains), strict=True)
@@ -315,27 +306,15 @@ def _with_masses(engine: Engine, masses: Array) -> Engine:
     return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
 
 
-def _with_unbalance(engine: Engine, decision: Decision, direction: complex) -> Engine:
-    changes = {drive.rotor: drive.of(direction) for drive in decision.rotor_drives}
-    rotors = (replace(rotor, unbalance=rotor.unbalance + changes.get(rotor.name, 0.0)) for rotor in engine.rotors)
-    return replace(engine, rotors=tuple(rotors))
-
-
 def _affine(rows: Sequence[Rows]) -> AffineNorm:
     slopes = [unit.vectors - rows[0].vectors for unit in rows[1:]]
     return AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
 
 
-def _factors(
-    measure: Measure, engine: Engine, problem: Problem, positions: Sequence[tuple[int, int | None, int]]
-) -> list[Array]:  # fmt: skip
-    """Return factors by operating point, shape (places, 1 or d) each; [] for a measure without places."""
-    if not positions:
-        return []
-    chosen_places, rows = measure.places(measure.load.places(engine)), []
-    for k, place, _ in positions:
-        factors = measure.load.factors_of(engine, problem.points[k])
-        if factors is None:
-            return []
-        rows.append(factors[chosen_places] if place is None else factors[chosen_places][place : place + 1])
-    return rows
+def _cached(cache: dict[bytes, T], x: Array, build: Callable[[], T]) -> T:
+    key = x.tobytes()
+    if key not in cache:
+        if len(cache) > MAX_KEPT:
+            cache.clear()
+        cache[key] = build()
+    return cache[key]

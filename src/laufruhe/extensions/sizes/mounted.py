@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import ProofStrength, gap_tolerance_of
 from laufruhe.prove.mounts.provers import Question, run_provers
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, evaluate_design
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, evaluate_design, values_of
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proof_data, spread_starts
@@ -67,26 +67,8 @@ def _starts(program: LocalProgram, without_mounts: Problem) -> list[Array]:
     )
     if not sizes_result.status.has_design:
         return [start]
-    values = dict(
-        zip((d.name for d in without_mounts.decisions), _decision_values(without_mounts, sizes_result), strict=True)
-    )
-    return [program.shares([values.get(d.name, d.start) for d in problem.decisions]), start]
-
-
-def _decision_values(without_mounts: Problem, result: Result) -> list[Value]:
-    """Return the values of the decisions of a problem in its order; affine ones from the unbalances of rotors."""
-    values = {entry.name: entry.value for entry in result.decisions}
-    rotors = {rotor.name: rotor.unbalance for rotor in result.final.engine.rotors}
-    unbalances = {rotor.name: rotor.unbalance for rotor in result.initial.engine.rotors}
-    values_of_decisions: list[Value] = []
-    for decision in without_mounts.decisions:
-        if not decision.is_affine:
-            values_of_decisions.append(values[decision.name])
-            continue
-        drive = decision.rotor_drives[0]
-        change = (rotors[drive.rotor] - unbalances[drive.rotor]) / drive.gain
-        values_of_decisions.append(decision.start + (change.conjugate() if drive.mirrored else change))
-    return values_of_decisions
+    # mounts keep their start values
+    return [program.shares(values_of(problem, sizes_result)), start]
 
 
 def _bound(problem: Problem, design: Design) -> float:
@@ -114,10 +96,9 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
     masses = model.masses(np.array([values_by_name[d.name].real for d in model.sizes])) - middle
     engine = model.with_masses(middle)
     gear = engine.extra(RunningGear)
-    directions = gear.throws if gear is not None else ()
     drives: list[tuple[Drive, ...]] = [
         *(tuple(NumberDrive(Kind.PISTON, (part.name, mass)) for part in engine.slider_cranks) for mass in MASSES),
-        tuple(RotorDrive(name, direction) for name, direction in directions),
+        tuple(RotorDrive(name, direction) for name, direction in (gear.throws if gear is not None else ())),
     ]
     open_masses = [k for k in range(len(half)) if half[k] > 0.0]
     mass_decisions = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in open_masses]

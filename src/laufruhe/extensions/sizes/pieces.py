@@ -33,11 +33,10 @@ class Piece:
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
         """Return the ratio of all factors to the initial ones, or None if the ratios differ."""
-        arrays = [
-            np.ones(1),
-            *(factor / initial for factor, initial in zip(factors, self.initial_factors, strict=True)),
-        ][bool(factors) :]
-        ratios = np.concatenate([array.ravel() for array in arrays])
+        if not factors:
+            return 1.0
+        pairs = zip(factors, self.initial_factors, strict=True)
+        ratios = np.concatenate([(factor / initial).ravel() for factor, initial in pairs])
         return float(ratios[0]) if np.all(ratios == ratios[0]) else None
 
     def scaled(self, factors: Sequence[Array]) -> AffineNorm:

@@ -51,25 +51,12 @@ class CombinedMultipliers:
 
 
 class SizePrograms:
-    """Cone programs of boxes.
-
-    Parameters
-    ----------
-    terms
-        Weights, and measures of loads and masses.
-    limits
-        Upper limits, and their measures.
-    ask
-        Function that proposes multipliers.
-    """
+    """Cone programs of boxes, with weights of measures (`terms`) and upper limits of measures (`limits`)."""
 
     def __init__(
-        self,
-        model: SizeModel,
-        terms: Sequence[tuple[float, SizeNumber]],
-        limits: Sequence[tuple[float, SizeNumber]],
+        self, model: SizeModel, terms: Sequence[tuple[float, SizeNumber]], limits: Sequence[tuple[float, SizeNumber]],
         ask: ProposeMultipliers,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._model, self._terms, self._limits, self._propose = model, tuple(terms), tuple(limits), ask
 
     def multipliers_of(
@@ -94,7 +81,11 @@ class SizePrograms:
         columns = [*open_masses, *range(MASSES, MASSES + len(self._model.start))]
 
         def norm(number: SizeNumber) -> AffineNorm:
-            rows = self._rows(number, self._engine(number, lower, upper), reach)
+            engine, rows = self._engine(number, lower, upper), []
+            for bundle in number.pieces:
+                factors = self._model.factors(bundle.piece.positions, number.measure, engine)
+                lengths = bundle.lengths.scaled(factors) if factors else bundle.lengths
+                rows.append(lengths.at_length(reach.middle[1]))
             constant, slope = (np.concatenate([getattr(row, part) for row in rows]) for part in ("constant", "slope"))
             grid = rows[0].grid if len(rows) == 1 else Grid(np.full(len(constant), 1.0 / len(constant)), len(constant))
             constant = constant + slope[..., :MASSES] @ reach.middle[0]
@@ -105,19 +96,10 @@ class SizePrograms:
         decisions = (*masses, *(domain.decision for domain in self._model.domains))
         return AffineProblem(terms, limits, domains_of(decisions), self._model.problem.fidelity.samples)
 
-    def _rows(self, number: SizeNumber, engine: Engine, reach: SizeReach) -> list[AffineNorm]:
-        rows = []
-        for bundle in number.pieces:
-            factors = self._model.factors(bundle.piece, number.measure, engine)
-            lengths = bundle.lengths.scaled(factors) if factors else bundle.lengths
-            rows.append(lengths.at_length(reach.middle[1]))
-        return rows
-
     def _engine(self, number: SizeNumber, lower: Array, upper: Array) -> Engine:
-        has_factors = np.any(number.monotonicity)
-        return (
-            self._model.engine(corner(number.monotonicity, lower, upper)) if has_factors else self._model.problem.engine
-        )
+        if not np.any(number.monotonicity):
+            return self._model.problem.engine
+        return self._model.engine(corner(number.monotonicity, lower, upper))
 
     def _combined(self, program: AffineProblem, rows: Multipliers) -> CombinedMultipliers:
         """Return the combined multipliers of a box's program, at the initial factors."""
@@ -144,7 +126,8 @@ class SizePrograms:
         for number, groups in multipliers.parts:
             engine = self._engine(number, lower, upper)
             for group in groups:
-                function, maximum = group.with_factors(self._model.factors(group.lengths.piece, number.measure, engine))
+                factors = self._model.factors(group.lengths.piece.positions, number.measure, engine)
+                function, maximum = group.with_factors(factors)
                 total = total + function
                 remainder = remainder + group.price * maximum * group.lengths.remainder
                 terms = group.lengths.terms(*reach.rod)

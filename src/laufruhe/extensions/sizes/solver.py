@@ -1,4 +1,7 @@
-"""Optimum of sizes of the running gear, and of unbalances with them: local programs propose, boxes prove (Z12, Z14)."""
+"""Optimum of sizes of the running gear, and of unbalances with them: local programs propose, boxes prove (Z12, Z14).
+
+Crank stars, firing orders and shafts with open sizes are a problem for each star.
+"""
 
 from __future__ import annotations
 
@@ -32,10 +35,15 @@ from laufruhe.solvers.smooth.local_programs import (
     prove_design,
     spread_starts,
 )
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
+from laufruhe.solvers.stars.star_results import no_star
+from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MAX_WITH_ROD, MAX_PROGRAMS = 300, 400
 """Most boxes if the rod length is open, which takes ten times as long, and if each box has cone programs."""
-STARTS = 3
+STARTS, MAX_STARS = 3, 60
+"""Local searches, and most stars that are solved one by one."""
 # fewest samples of the programs of boxes: rough, and for a small gap
 FEW_STEPS, MANY_STEPS = 180, 720
 # relative margin of local programs inside limits, below the feasibility tolerance
@@ -70,38 +78,30 @@ class SizeProgram(LocalProgram):
         return np.array([value, *margins, *self.edges(shares)])
 
     def place(self, values: Array) -> Array:
-        """Return the point with the best unbalances for sizes."""
-        return self.balanced(values)
-
-    def balanced(self, sizes: Array) -> Array:
         """Return the point with these sizes [m] and the best unbalances for them."""
-        problem, size_decisions = self.problem, self.model.sizes
+        problem, decisions = self.problem, self.model.sizes
         if not self.model.domains:
-            return self.shares(sizes)
-        start_sizes = [float(x) for x in sizes]
-        fixed = replace(problem, engine=problem.design(start_sizes, size_decisions), decisions=problem.unbalances)
-        values_by_name: dict[str, Value] = dict(zip((d.name for d in size_decisions), start_sizes, strict=True))
-        return self.shares(rebalance(problem, fixed, values_by_name).design.values)
+            return self.shares(values)
+        sizes: dict[str, Value] = {d.name: float(x) for d, x in zip(decisions, values, strict=True)}
+        engine = problem.design(list(sizes.values()), decisions)
+        fixed = replace(problem, engine=engine, decisions=problem.unbalances)
+        return self.shares(rebalance(problem, fixed, sizes).design.values)
 
 
 def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     """Return the optimal sizes and unbalances with their proof, or the limits that no sizes satisfy.
 
-    Parameters
-    ----------
-    known
-        Value of another design: if this problem has a feasible design, a bound above `known` is enough.
-
-    Raises
-    ------
-    ModelError
-        If no measure depends on an open size.
+    `known` is the value of another design: if this problem has a feasible design, a bound above it is enough.
     """
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
     check_acts(model)
     program = SizeProgram.from_model(model)
-    optimum = _proposed(program)
+    starts = [program.shares(problem.start), np.ones(len(program.lower)), *spread_starts(problem)]
+    if model.domains:
+        starts = [*(program.place(program.columns(start)[program.sized]) for start in starts[:2]), *starts]
+    optimum = best_local_optimum(program, starts, min(problem.search.starts, STARTS))
+    optimum = min(optimum, program.place(program.columns(optimum)[program.sized]), key=program.rank)
     boxes: SizeBoxes | None = None
     with suppress(ValueError):
         boxes = SizeBoxes(model, solve_cone_program)
@@ -137,17 +137,6 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
-def _proposed(program: SizeProgram) -> Array:
-    problem = program.problem
-    initial = program.shares(problem.start)
-    starts = [initial, np.ones(len(initial)), *spread_starts(problem)]
-    if program.model.domains:
-        sizes = [program.columns(start)[program.sized] for start in starts[:2]]
-        starts = [*(program.balanced(start_sizes) for start_sizes in sizes), *starts]
-    best = best_local_optimum(program, starts, min(problem.search.starts, STARTS))
-    return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
-
-
 def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
     """Return the optimum of a program or None, and multipliers, at few samples or `exactly` at many."""
     steps = MANY_STEPS if exactly else FEW_STEPS
@@ -179,3 +168,22 @@ def check_acts(model: SizeModel) -> None:
         ends = [np.where(np.arange(len(middle)) == k, edge, middle) for edge in (model.lower, model.upper)]
         if all(model.value(measure, ends[0]) == model.value(measure, ends[1]) for measure in measures):
             raise ModelError(f"{decision.name} is open, and nothing that is asked depends on it; fix it, or limit it")
+
+
+def solve_star_sizes(problem: Problem) -> Result:
+    """Return the best star with its optimal sizes and unbalances; the best value so far bounds the next search."""
+    phasing = problem.phasing
+    if phasing is None:
+        raise ValueError("nothing of the phasing is open")
+    started = time.perf_counter()
+    if phasing.continuous or phasing.throw_bounds is not None:
+        rule = "open sizes need even firing or fixed throws"
+        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
+    if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MAX_STARS:
+        many = f"more than {MAX_STARS} stars are open together with sizes"
+        raise ModelError(f"{many}; fix the firing order or the sizes")
+    stars = even_stars(phasing)
+    if not stars:
+        return no_star(problem, why_none_fires(phasing)[0])
+    result = solve_every_order(problem, phasing, stars, solve_sizes)
+    return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import Witness
-from laufruhe.solvers.boxes.search import BoxSearch, SearchBox, divide_boxes
+from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
 from laufruhe.solvers.conclusion import (
     Design,
     ProofData,
@@ -39,15 +39,7 @@ SHARE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class RebalancedDesign:
-    """A design, and the result of the problem that determined its unbalances.
-
-    Attributes
-    ----------
-    design
-        The design.
-    result
-        Result of the problem of the unbalances; None if no unbalance is open.
-    """
+    """A design, and the result of the problem that determined its unbalances, if any is open."""
 
     design: Design
     result: Result | None = None
@@ -63,16 +55,17 @@ class RebalancedDesign:
         return self.design.rank
 
 
-class BoundedBox(SearchBox, Protocol):
-    """A box with bounds of its numbers."""
+@dataclass(frozen=True, eq=False)
+class BoundedBox:
+    """A box with bounds of its numbers, shape (n,) each, and a lower bound of the objective in it [SI].
 
-    @property
-    def lower(self) -> Array:
-        """Lower bounds of the numbers, shape (n,)."""
+    A box is exact if splitting it cannot improve its bound by more than the tolerance.
+    """
 
-    @property
-    def upper(self) -> Array:
-        """Upper bounds of the numbers, shape (n,)."""
+    lower: Array
+    upper: Array
+    bound: float
+    is_exact: bool
 
 
 S = TypeVar("S", bound=BoundedBox)
@@ -115,18 +108,9 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     def solve(
         self, root: S | FathomedPart, first: RebalancedDesign | None, maximum: int, numbers: str, method: str
     ) -> Result:
-        """Return the best design of a branch and bound search, with its certificate.
+        """Return the best design of a branch and bound search over at most `maximum` boxes, with its certificate.
 
-        Parameters
-        ----------
-        root
-            Box of all open numbers, or the proof that no design is feasible.
-        first
-            First incumbent; None if there is none.
-        maximum
-            Largest number of boxes.
-        numbers, method
-            Names of the open numbers and of the bounding method, for reports.
+        `numbers` and `method` are the names of the open numbers and of the bounding method, for reports.
         """
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
@@ -155,8 +139,6 @@ def rebalance(problem: Problem, balance: Problem, fixed_values: dict[str, Value]
 
     Parameters
     ----------
-    problem
-        Problem with all decisions.
     balance
         Problem with the unbalances as its only decisions.
     fixed_values

@@ -1,4 +1,4 @@
-"""Solve for phase leads of geared shafts and coupled machines by branch and bound (P13, P14).
+"""Solve for phase leads by branch and bound: of geared shafts and coupled machines (P13, P14), and of shared gas (P15).
 
 A cone program at the middle of every box optimises the unbalances. Its dual rows bound the objective in the whole box.
 If only leads are open, simplex searches from the best points of a grid find the first design.
@@ -6,9 +6,12 @@ If only leads are open, simplex searches from the best points of a grid find the
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -16,31 +19,42 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineProblem
 from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import RotorDrive, real_bounds
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
-from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
-from laufruhe.prove.certificate import Multipliers, best_bound
+from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
+from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, bisect_box, halves
+from laufruhe.prove.certificate import Multipliers, ProofStrength, best_bound
 from laufruhe.prove.witness import thin_box
-from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
-from laufruhe.solvers.boxes.search import search_from_grid
-from laufruhe.solvers.conclusion import evaluate_design
+from laufruhe.solvers.boxes.box_designs import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
+from laufruhe.solvers.conclusion import (
+    FEASIBILITY_TOL,
+    Design,
+    ProofData,
+    build_result,
+    evaluate_design,
+    infeasible_result,
+    witness_of,
+)
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.result import Result
 
 MAX_BOXES, MAX_PROGRAMS = 20_000, 2_000
 """Largest number of boxes without and with cone programs."""
-GRID, MAX_STARTS, MAX_STEPS = 24, 600, 300
-"""Points of the start grid along a lead and in all, and iterations of a simplex search."""
+GRID, GRID_OF_SHARED_GAS, SEARCHES = (24, 600, 300), (48, 400, 80), 3
+"""Points of a start grid along a lead and in all, and iterations of a simplex search; simplex searches."""
 COARSE, NEAR = 4, 10.0
 """Factor of coarser sampling in cone programs, and the multiple of the tolerance within which programs use all samples.
 """
 PROBES, SAME = (0.0, 0.31, 0.67), 1e-6
 """Shares of the range at which a lead is tested for an effect, and the relative change that counts as none."""
-EXACT = 0.02
-"""Share of the tolerance by which splitting an exact box may still improve its bound."""
+EXACT, SHARE_OF_SHARED_GAS = 0.02, 0.5
+"""Shares of the tolerance: by which splitting an exact box may still improve its bound, and at which boxes of leads of
+shared gas end."""
 
 
 def solve_leads(problem: Problem) -> Result:
@@ -54,29 +68,19 @@ def solve_leads(problem: Problem) -> Result:
 
 
 @dataclass(frozen=True, eq=False)
-class _Box:
-    """Box of leads with lower bounds of the objective.
+class _Box(BoundedBox):
+    """Box of leads [rad].
 
     Attributes
     ----------
-    lower, upper
-        Bounds of the leads [rad], shape (leads,) each.
-    bound
-        Lower bound of the objective in the box [SI].
     at_middle
         Lower bound of the objective at the middle of the box [SI].
     side
         Index of the lead to split.
-    is_exact
-        True if splitting the box cannot improve its bound by more than the tolerance.
     """
 
-    lower: Array
-    upper: Array
-    bound: float
     at_middle: float
     side: int
-    is_exact: bool
 
 
 class LeadSearch(RebalancedSearch[_Box]):
@@ -97,20 +101,10 @@ class LeadSearch(RebalancedSearch[_Box]):
             yield half, self.rebalance_at(0.5 * (low + high)) if may_improve else None
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | FathomedPart:
-        """Bound the objective in a box; bounds close to `value` use all samples.
+        """Bound the objective in a box of leads [rad], at least by the known bound `floor` [SI].
 
-        Parameters
-        ----------
-        lower, upper
-            Bounds of the leads [rad], shape (leads,) each.
-        floor
-            Known lower bound of the objective in the box [SI].
-        value
-            Objective of the incumbent [SI].
-
-        Returns
-        -------
-        Box with its bound, or `INFEASIBLE_PART` if it has no feasible design.
+        Bounds close to the objective of the incumbent, `value` [SI], use all samples. A box without a feasible design
+        is an `INFEASIBLE_PART`.
         """
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         result = self._bound(middle, half, COARSE)
@@ -121,7 +115,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             return INFEASIBLE_PART
         side = int(np.argmax(result.pull + 1e-12 * half))
         bound, room = max(result.value, floor), EXACT * self.problem.tolerance * result.at_middle
-        return _Box(lower, upper, bound, result.at_middle, side, result.at_middle - bound <= room < math.inf)
+        return _Box(lower, upper, bound, result.at_middle - bound <= room < math.inf, result.at_middle, side)
 
     def _bound(self, middle: Array, half: Array, factor: int) -> LeadBound:
         fine, norms = self.model.at(middle, self.samples, averaged=True)
@@ -172,48 +166,40 @@ class LeadSearch(RebalancedSearch[_Box]):
         for k, decision in enumerate(self.model.leads if not self.model.domains else ()):
             is_lead = np.arange(len(lower)) == k
             points = [np.where(is_lead, lower + share * (upper - lower), self.model.start) for share in PROBES]
-            numbers = [self._numbers(point) for point in points]
+            numbers = []
+            for point in points:
+                program, _ = self.model.at(point, self.samples)
+                norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
+                numbers.append(np.array([*norms, *self.boxes.numbers(point)]))
             if np.ptp(numbers, axis=0).max() <= SAME * np.abs(numbers).max():
                 reason = "is open, but no objective or limit depends on it; fix it, or add a measure of coupled shafts"
                 raise ModelError(f"{decision.name} {reason}")
-
-    def _numbers(self, leads: Array) -> Array:
-        program, _ = self.model.at(leads, self.samples)
-        norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
-        return np.array([*norms, *self.boxes.numbers(leads)])
 
     def first(self) -> RebalancedDesign:
         """Return the best of the initial design, designs with optimal unbalances, and ends of simplex searches."""
         designs = [RebalancedDesign(evaluate_design(self.problem, self.problem.start))]
         if self.model.domains:
-            designs += [
-                self.rebalance_at(self.model.start),
-                self.rebalance_at(0.5 * (self.model.lower + self.model.upper)),
-            ]
+            middle = 0.5 * (self.model.lower + self.model.upper)
+            designs += [self.rebalance_at(self.model.start), self.rebalance_at(middle)]
         else:
-            ends = search_from_grid(self._penalised, self.model.lower, self.model.upper, GRID, MAX_STARTS, MAX_STEPS)
+            ends = _search_from_grid(self._penalised, self.model.lower, self.model.upper, *GRID)
             designs += [RebalancedDesign(evaluate_design(self.problem, end.tolist())) for end in ends]
         return min(designs, key=lambda design: design.rank)
 
     def rebalance_at(self, leads: Array) -> RebalancedDesign:
         """Return the best design with these leads [rad], shape (leads,)."""
         fixed_values: dict[str, Value] = {d.name: float(x) for d, x in zip(self.model.leads, leads, strict=True)}
-        return rebalance(self.problem, self._with_fixed_leads(leads), fixed_values)
-
-    def _with_fixed_leads(self, leads: Array) -> Problem:
-        """Return the problem of the unbalances, with gains turned by the leads of their shafts."""
         turns = dict(zip(self.model.names, leads - self.model.start, strict=True))
         shafts = {rotor.name: rotor.shaft for rotor in self.problem.engine.rotors}
 
-        def turn_drives(decision: Decision) -> Decision:
-            drives = []
-            for drive in decision.rotor_drives:
-                shaft = shafts[drive.rotor]
-                drives.append(replace(drive, gain=drive.gain * np.exp(1j * shaft.ratio * turns.get(shaft.name, 0.0))))
-            return replace(decision, drives=tuple(drives))
+        def turned(drive: RotorDrive) -> RotorDrive:
+            # the gain turns by the lead of its shaft
+            shaft = shafts[drive.rotor]
+            return replace(drive, gain=drive.gain * np.exp(1j * shaft.ratio * turns.get(shaft.name, 0.0)))
 
-        engine = self.problem.design([float(x) for x in leads], self.model.leads)
-        return replace(self.problem, engine=engine, decisions=tuple(turn_drives(d) for d in self.problem.unbalances))
+        unbalances = tuple(replace(d, drives=tuple(map(turned, d.rotor_drives))) for d in self.problem.unbalances)
+        engine = self.problem.design(list(fixed_values.values()), self.model.leads)
+        return rebalance(self.problem, replace(self.problem, engine=engine, decisions=unbalances), fixed_values)
 
     def _penalised(self, leads: Array) -> float:
         leads_in_bounds = np.clip(leads, self.model.lower, self.model.upper)
@@ -223,3 +209,59 @@ class LeadSearch(RebalancedSearch[_Box]):
         excess = sum(max(norm.value(x) / (maximum or 1.0) - 1.0, 0.0) for maximum, norm in program.limits)
         excess += sum(violations.values())
         return float(total * (1.0 + 1e3 * excess) + excess)
+
+
+def solve_shared_leads(problem: Problem) -> Result:
+    """Return the best leads between cranks that share gas chambers, with a lower bound by branch and bound (P15)."""
+    started, initial = time.perf_counter(), evaluate(problem)
+    lower, upper = real_bounds(problem.decisions)
+    boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
+    value, gap_tolerance, witness = math.inf, 0.0, None
+    if best is not None and best.violation <= FEASIBILITY_TOL:
+        value = best.value
+        gap_tolerance = SHARE_OF_SHARED_GAS * problem.tolerance * max(value, numerical_zero(problem))
+        witness = witness_of(best, np.array([float(x.real) for x in best.values]))
+    division = bisect_box(boxes, lower, upper, value, gap_tolerance, problem.search.boxes_or(MAX_BOXES), witness)
+    timing = {"solve": time.perf_counter() - started}
+    if best is None or (witness is None and math.isinf(division.bound)):
+        return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
+    method = f"local searches; lower bound on {division.boxes} box{'es' * (division.boxes > 1)} of leads"
+    return build_result(best, initial, ProofData(division.bound, ProofStrength.EXACT, math.inf, method), timing)
+
+
+def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
+    """Return the best of the initial design and the ends of simplex searches from a grid of leads."""
+
+    def design(leads: Array) -> Design | None:
+        try:
+            return evaluate_design(problem, [float(x) for x in np.clip(leads, lower, upper)])
+        except ModelError:
+            return None
+
+    def penalised(leads: Array) -> float:
+        candidate = design(leads)
+        return math.inf if candidate is None else candidate.value * (1.0 + 1e3 * max(candidate.violation, 0.0))
+
+    start = np.array([d.real_start for d in problem.decisions])
+    ends = [*_search_from_grid(penalised, lower, upper, *GRID_OF_SHARED_GAS), start]
+    return min(filter(None, map(design, ends)), key=lambda design: design.rank, default=None)
+
+
+def _search_from_grid(
+    penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
+) -> list[Array]:
+    """Return the ends of simplex searches from the best points of a grid, shape (n,) each. See `GRID`."""
+    from scipy.optimize import minimize
+
+    count = min(steps, max(int(maximum ** (1.0 / len(lower))), 2))
+    sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
+    points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
+    bounds: Any = list(zip(lower, upper, strict=True))
+    ends = []
+    for point in points[:SEARCHES]:
+        simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
+        tolerance = 1e-12 * max(penalised(point), 1e-300)
+        options: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": tolerance, "maxiter": most_steps}
+        end = minimize(penalised, point, method="Nelder-Mead", bounds=bounds, options=options).x
+        ends.append(np.clip(end, lower, upper))
+    return ends

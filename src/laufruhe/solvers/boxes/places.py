@@ -19,7 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.branch_and_bound import INFEASIBLE_PART, Box, FathomedPart, halves
 from laufruhe.prove.witness import thin_box
-from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
+from laufruhe.solvers.boxes.box_designs import SHARE, BoundedBox, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.boxes.search import divide_boxes
 from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
@@ -47,34 +47,22 @@ MAX_CORNERS = 16
 
 
 @dataclass(frozen=True, eq=False)
-class _Box:
-    """Box of positions, with its lower bound and the positions of its relaxation.
+class _Box(BoundedBox):
+    """Box of positions [m], and the positions of its relaxation.
 
     Attributes
     ----------
-    lower, upper
-        Bounds of the positions [m], shape (places,) each.
-    bound
-        Lower bound of the objective in the box [SI].
     middle
         Positions of the relaxed solution [m], shape (places,).
     spread
-        Distance by which the relaxation spreads the unbalances of each position [m], shape (places,); zero if exact.
+        Distance by which the relaxation spreads the unbalances of each position [m], shape (places,).
     start
         Values of all decisions from the relaxed solution, to start a local search.
     """
 
-    lower: Array
-    upper: Array
-    bound: float
     middle: Array
     spread: Array
     start: tuple[Value, ...] = ()
-
-    @property
-    def is_exact(self) -> bool:
-        """True if the relaxation is exact."""
-        return bool(self.spread.max() <= EXACT_SPREAD)
 
 
 def solve_places(problem: Problem) -> Result:
@@ -90,8 +78,6 @@ def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Prop
 
     Parameters
     ----------
-    problem
-        Problem with open positions.
     prove, method
         Solver for the problem without open positions, and its name.
     propose
@@ -138,24 +124,12 @@ class PlaceSearch(RebalancedSearch[_Box]):
         side = int(np.argmax(scores))
         for bounds in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
             half = self.box(*bounds, box.bound)
-            yield (
-                half,
-                None if isinstance(half, FathomedPart) or half.bound >= value else self.rebalance_at(half.middle),
-            )
+            yield half, self.rebalance_at(half.middle) if isinstance(half, _Box) and half.bound < value else None
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | FathomedPart:
-        """Solve the relaxation over a box.
+        """Solve the relaxation over a box of positions [m], which has at least the known bound `floor` [SI].
 
-        Parameters
-        ----------
-        lower, upper
-            Bounds of the positions [m], shape (places,) each.
-        floor
-            Known lower bound of the objective in the box [SI].
-
-        Returns
-        -------
-        Box with its bound and positions, or `INFEASIBLE_PART` if it has no feasible design.
+        A box without a feasible design is an `INFEASIBLE_PART`.
         """
         violated = self._violated(lower, upper)
         if violated:
@@ -173,8 +147,8 @@ class PlaceSearch(RebalancedSearch[_Box]):
         # the relaxation ignores limits on distances
         shift = upper - lower if feasible is None else np.abs(feasible - middle)
         spread, middle = np.maximum(spread, shift), middle if feasible is None else feasible
-        start = self.relaxation.values(relaxed, result, middle)
-        return _Box(lower, upper, max(bound, floor), middle, spread, start)
+        start, is_exact = self.relaxation.values(relaxed, result, middle), bool(spread.max() <= EXACT_SPREAD)
+        return _Box(lower, upper, max(bound, floor), is_exact, middle, spread, start)
 
     def place(self, design: RebalancedDesign) -> Array:
         """Return the positions of a design [m], shape (places,)."""

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.branch_and_bound import BoundedParts, BranchAndBound, FathomedPart, OpenNode
@@ -20,8 +18,6 @@ from laufruhe.prove.witness import Witness
 GAP_SAFETY = 0.99
 # boxes that workers compute ahead
 AHEAD = 32
-# best points of a grid from which simplex searches begin
-SEARCHES = 3
 
 
 class SearchBox(Protocol):
@@ -53,13 +49,7 @@ D = TypeVar("D", bound=BoxDesign)
 
 
 class BoxSearch(Generic[B, D]):
-    """Boxes and designs of a method.
-
-    Attributes
-    ----------
-    is_shared
-        True if worker processes may divide the boxes.
-    """
+    """Boxes and designs of a method; worker processes may divide the boxes of a shared search."""
 
     is_shared = False
 
@@ -69,16 +59,9 @@ class BoxSearch(Generic[B, D]):
         raise NotImplementedError
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
-        """Yield parts that cover a box, each with a design in it, or None.
+        """Yield parts that cover a box, each with a design in it, or None; `value` is that of the incumbent [SI].
 
         A part is a box, or the proof that no design in it has an objective below a level.
-
-        Parameters
-        ----------
-        box
-            The box to split.
-        value
-            Objective of the incumbent [SI].
         """
         raise NotImplementedError
 
@@ -185,35 +168,3 @@ def _split_box(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]],
     search, box, value = step
     parts = search.parts(box, value)
     return (list(parts) if search.is_shared else parts), search.conflict
-
-
-def search_from_grid(
-    penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
-) -> list[Array]:
-    """Return the ends of simplex searches from the best points of a grid, shape (n,) each.
-
-    Parameters
-    ----------
-    penalised
-        Objective with penalties on violated limits, a function of a point, shape (n,).
-    lower, upper
-        Bounds, shape (n,).
-    steps, maximum
-        Points of the grid along a side, and in all.
-    most_steps
-        Iterations of one search.
-    """
-    from scipy.optimize import minimize
-
-    count = min(steps, max(int(maximum ** (1.0 / len(lower))), 2))
-    sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
-    points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
-    bounds: Any = list(zip(lower, upper, strict=True))
-    ends = []
-    for point in points[:SEARCHES]:
-        simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
-        tolerance = 1e-12 * max(penalised(point), 1e-300)
-        options: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": tolerance, "maxiter": most_steps}
-        end = minimize(penalised, point, method="Nelder-Mead", bounds=bounds, options=options).x
-        ends.append(np.clip(end, lower, upper))
-    return ends
