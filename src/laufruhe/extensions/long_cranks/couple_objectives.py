@@ -204,12 +204,7 @@ class CoupleNorms:
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
     """Return the objective of even stars as a function of their couples; None if it depends on more.
 
-    Parameters
-    ----------
-    problem
-        Problem with nothing open but the phasing, and nothing limited.
-    stars
-        Problems of the stars of `three_stars`.
+    Nothing but the phasing of the problem may be open. `stars` are the problems of `three_stars`.
     """
     known = all(term.measure.is_load and not term.measure.is_inside for term in problem.objective)
     if not known or problem.fidelity.is_uneven or problem.limits or len(space.patterns) > 1:

@@ -27,15 +27,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Window:
-    """Rectangle of allowed couples of one order [unit of the places].
-
-    Attributes
-    ----------
-    order
-        h of C_h (S1).
-    low, high
-        Smallest and largest real and imaginary part.
-    """
+    """Rectangle of allowed couples C_h of one order h (S1), between two corners [unit of the places]."""
 
     order: int
     low: complex
@@ -44,15 +36,7 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Free:
-    """Throws of a star whose steps may be rearranged, in two halves.
-
-    Attributes
-    ----------
-    star
-        Steps of all throws, with the present order of the free ones.
-    front, back
-        Throws of the halves.
-    """
+    """Throws of a star whose steps may be rearranged, in two halves; the star has steps of all throws."""
 
     star: Stars
     front: tuple[int, ...]
@@ -115,12 +99,9 @@ def work_of(space: StarSpace) -> int:
 
 
 def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iterator[Stars]:
-    """Yield blocks of stars for one division whose couple lies in the window, shape (n, throws); some repeat.
+    """Yield blocks of stars whose couple lies in the window, shape (n, throws); some repeat.
 
-    Parameters
-    ----------
-    share
-        Throws of the front on every step, shape (P,).
+    The division `share` has the number of throws of the front on every step, shape (phases,).
     """
     front, back, places = list(free.front), list(free.back), np.array(space.places)
     rest = free.counts(space.phases) - share

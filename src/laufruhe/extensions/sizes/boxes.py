@@ -49,19 +49,10 @@ class SizeCut(NamedTuple):
 
 
 class SizeBoxes:
-    """Lower bounds of the objective over boxes of sizes.
+    """Lower bounds of the objective over boxes of sizes; whole if no row was set to zero for a kink that passes it.
 
-    Attributes
-    ----------
-    is_whole
-        True if no row was set to zero for a kink that passes it.
-
-    The function `ask` proposes multipliers if unbalances are open.
-
-    Raises
-    ------
-    ValueError
-        If a measure is not monotonic in a size, or a kink of a load moves with the rod length.
+    The function `ask` proposes multipliers if unbalances are open. A measure that is not monotonic in a size, or a kink
+    of a load that moves with the rod length, is a ValueError.
     """
 
     def __init__(self, model: SizeModel, ask: ProposeMultipliers | None = None) -> None:
@@ -153,7 +144,7 @@ class SizeBoxes:
         (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
-                for masses in (reach.low, middle) if bundle.count < maximum else ():
+                for masses in (reach.low, middle) if len(bundle.nodes) < maximum else ():
                     bundle.add_tangents(np.append(masses, unbalances), length)
 
     def minimum(self, number: SizeNumber, lower: Array, upper: Array, reach: SizeReach) -> float:
@@ -161,7 +152,7 @@ class SizeBoxes:
         vertex = corner(number.monotonicity, lower, upper)
         if not number.pieces:
             return number.sense * self.model.value(number.measure, vertex)
-        engine = self.model.engine(vertex) if np.any(number.monotonicity) else self.model.problem.engine
+        engine = self.model.engine_at(vertex, number.monotonicity)
         return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
     def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: SizeReach) -> float:
@@ -169,7 +160,7 @@ class SizeBoxes:
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
             return ratio * bundle.minimum(reach)
-        scaled, (masses, length) = bundle.scaled(factors), reach.middle
+        scaled, (masses, length) = Bundle(bundle.lengths.scaled(factors)), reach.middle
         scaled.add_tangents(np.append(masses, self.model.start), length)
         return scaled.minimum(reach)
 

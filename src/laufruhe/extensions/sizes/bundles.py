@@ -77,19 +77,10 @@ class Bundle:
         self.piece, self.lengths = lengths.piece, lengths
         self.nodes = np.zeros((0, len(lengths.constant), 1 + lengths.slope.shape[-1]))
 
-    @property
-    def count(self) -> int:
-        """Count of tangents."""
-        return len(self.nodes)
-
     def add_tangents(self, columns: Array, length: float) -> None:
         """Add the tangent of the norm at columns and a rod length [m]."""
         z = self.lengths.at_length(length).subgradient(columns)
         self.nodes = np.concatenate([self.nodes, self.lengths.pulled(z)[None]])
-
-    def scaled(self, factors: Sequence[Array]) -> Bundle:
-        """Return an empty bundle with other factors of the rows."""
-        return Bundle(self.lengths.scaled(factors))
 
     def minimum(self, reach: SizeReach) -> float:
         """Return a lower bound of the norm on a box."""

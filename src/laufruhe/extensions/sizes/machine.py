@@ -29,13 +29,7 @@ BIG_END, ROD_LENGTH, _ACROSS = "big end", ("rod", "length"), ("diameter", "width
 
 @dataclass(frozen=True)
 class Webs:
-    """Two webs of a rectangular section adjacent to each pin.
-
-    Attributes
-    ----------
-    width, thickness
-        Across the shaft and along it [m].
-    """
+    """Two webs of a rectangular section adjacent to each pin: width across the shaft, thickness along it [m]."""
 
     width: float
     thickness: float
@@ -53,13 +47,7 @@ class Webs:
 
 @dataclass(frozen=True)
 class Shank:
-    """Round shank of a rod, as long as the rod.
-
-    Attributes
-    ----------
-    diameter, bore
-        Outer and inner diameter [m].
-    """
+    """Round shank of a rod, as long as the rod: outer and inner diameter [m]."""
 
     diameter: float
     bore: float = 0.0
@@ -80,12 +68,10 @@ class Shank:
 
 @dataclass(frozen=True)
 class PistonPin:
-    """Floating pin, partly in the small end of the rod and partly in the two bosses of the piston.
+    """Floating pin, partly in the small end of the rod and partly in the two bosses of the piston [m].
 
     Attributes
     ----------
-    diameter, bore, length
-        Dimensions [m].
     in_bosses
         Share of the length in the bosses.
     given_span
@@ -114,15 +100,7 @@ class PistonPin:
 
 @dataclass(frozen=True)
 class Bolts:
-    """Bolts of the cap of a big end.
-
-    Attributes
-    ----------
-    count
-        Bolts of each big end.
-    diameter
-        Diameter at the root of the thread [m].
-    """
+    """Bolts of the cap of each big end, with the diameter at the root of the thread [m]."""
 
     count: int
     diameter: float
@@ -187,33 +165,13 @@ class RunningGear(Extra):
     def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
         """Return the masses that shank and piston pin add to a slider-crank (Z2).
 
-        Returns
-        -------
-        Reciprocating and rotating mass [kg], and the inertia deficit of a straight shank [kg m2].
+        These are the reciprocating and the rotating mass [kg], and the inertia deficit of a straight shank [kg m2].
         """
         density, length = self.density or 0.0, part.rod_length
         shank = 0.0 if self.rod is None or math.isinf(length) else density * self.rod.area * length
         pin = self.piston_pin
         ring = 0.0 if pin is None else density * ring_area(pin.diameter, pin.bore) * pin.length
         return 0.5 * shank + ring, 0.5 * shank, -shank * length**2 / 6.0 if shank else 0.0
-
-    def throw_unbalance(self, radius: float, big_end: tuple[float, float] | None, journal: float) -> float:
-        """Return the unbalance of a crank pin and both webs [kg m] (Z2).
-
-        Parameters
-        ----------
-        radius
-            Crank radius [m].
-        big_end
-            Diameter and width of the crank pin [m].
-        journal
-            Diameter of the main bearings [m]; the part of a web around the journal has no unbalance.
-        """
-        pin_diameter, width = big_end or (0.0, 0.0)
-        total = ring_area(pin_diameter, 0.0) * width * radius
-        if self.webs is not None:
-            total += self.webs.area * ((radius + 0.5 * pin_diameter) ** 2 - 0.25 * journal**2)
-        return (self.density or 0.0) * total
 
 
 @dataclass(frozen=True)
@@ -237,9 +195,19 @@ class MovingGear:
             else rotor
             for rotor in self.rotors
         )
-        return replace(
-            self, parts=tuple(_with_gear_masses(gear, part, sense) for part in self.parts), rotors=tuple(rotors)
-        )
+        parts = []
+        for part in self.parts:
+            reciprocating, rotating, deficit = (sense * mass for mass in gear.rod_masses(part))
+            # adding and removing a mass may leave a negative rounding error
+            parts.append(
+                replace(
+                    part,
+                    reciprocating_mass=max(part.reciprocating_mass + reciprocating, 0.0),
+                    rotating_mass=max(part.rotating_mass + rotating, 0.0),
+                    rod_inertia_deficit=part.rod_inertia_deficit + deficit,
+                )
+            )
+        return replace(self, parts=tuple(parts), rotors=tuple(rotors))
 
     @cached_property
     def bare(self) -> MovingGear:
@@ -251,9 +219,13 @@ class MovingGear:
         """Unbalance of pin and webs of one throw [kg m] (Z2)."""
         if self.gear is None or not self.parts:
             return 0.0
-        # the part of a web around the journal has no unbalance
-        journal = min((b.diameter for b in self.bearings if b.diameter is not None), default=0.0)
-        return self.gear.throw_unbalance(self.parts[0].crank_radius, self.parts[0].big_end, journal)
+        radius, (diameter, width) = self.parts[0].crank_radius, self.parts[0].big_end or (0.0, 0.0)
+        total = ring_area(diameter, 0.0) * width * radius
+        if self.gear.webs is not None:
+            # the part of a web around the journal has no unbalance
+            journal = smallest_journal(self.bearings)
+            total += self.gear.webs.area * ((radius + 0.5 * diameter) ** 2 - 0.25 * journal**2)
+        return (self.gear.density or 0.0) * total
 
     @property
     def sizes(self) -> dict[Size, float]:
@@ -308,15 +280,9 @@ def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
     return resized_engine if new_parts.gear is None else resized_engine.with_extra(new_parts.gear)
 
 
-def _with_gear_masses(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
-    reciprocating, rotating, deficit = (sense * mass for mass in gear.rod_masses(part))
-    return replace(
-        part,
-        # adding and removing a mass may leave a negative rounding error
-        reciprocating_mass=max(part.reciprocating_mass + reciprocating, 0.0),
-        rotating_mass=max(part.rotating_mass + rotating, 0.0),
-        rod_inertia_deficit=part.rod_inertia_deficit + deficit,
-    )
+def smallest_journal(bearings: Sequence[Bearing]) -> float:
+    """Return the smallest diameter of main bearings [m]; zero without diameters."""
+    return min((b.diameter for b in bearings if b.diameter is not None), default=0.0)
 
 
 def on(bearing: Bearing) -> str:

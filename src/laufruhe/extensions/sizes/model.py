@@ -96,6 +96,10 @@ class SizeModel:
         """Return the engine with sizes `x`, shape (sizes,)."""
         return _cached(self._engines, x, lambda: resized(self.problem.engine, self._sizes(x)))
 
+    def engine_at(self, x: Array, monotonicity: Array) -> Engine:
+        """Return the engine with sizes `x`, shape (sizes,), or the initial one if no size changes the factors."""
+        return self.engine(x) if np.any(monotonicity) else self.problem.engine
+
     def _sizes(self, x: Array) -> dict[Size, float]:
         return {**self._sizes_given, **dict(zip(self.names, x.tolist(), strict=True))}
 
@@ -159,13 +163,7 @@ class SizeModel:
         return lambda rod_length: self._new_pieces(measure, rod_length, kinks)
 
     def fixed_rows(self, measure: Measure) -> list[Mask]:
-        """Return masks of the rows of each piece whose samples no kink passes as the rod length changes.
-
-        Raises
-        ------
-        ValueError
-            If the count of kinks of a load changes with the length.
-        """
+        """Return masks of the rows of each piece whose samples no kink passes as the rod length changes."""
         pieces = self.pieces_over_length(measure)(self._sizes_given[ROD_LENGTH])
         if not measure.is_load:
             return [np.ones(len(piece.affine.constant), dtype=bool) for piece in pieces]

@@ -17,7 +17,6 @@ import numpy as np
 from laufruhe.extensions.sizes.bundles import GroupedRows, SizeNumber, SizeReach, corner, minimum_of
 from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.decision import Decision, domains_of
@@ -81,7 +80,7 @@ class SizePrograms:
         columns = [*open_masses, *range(MASSES, MASSES + len(self._model.start))]
 
         def norm(number: SizeNumber) -> AffineNorm:
-            engine, rows = self._engine(number, lower, upper), []
+            engine, rows = self._model.engine_at(corner(number.monotonicity, lower, upper), number.monotonicity), []
             for bundle in number.pieces:
                 factors = self._model.factors(bundle.piece.positions, number.measure, engine)
                 lengths = bundle.lengths.scaled(factors) if factors else bundle.lengths
@@ -95,11 +94,6 @@ class SizePrograms:
         limits = tuple((maximum, norm(number)) for maximum, number in self._limits)
         decisions = (*masses, *(domain.decision for domain in self._model.domains))
         return AffineProblem(terms, limits, domains_of(decisions), self._model.problem.fidelity.samples)
-
-    def _engine(self, number: SizeNumber, lower: Array, upper: Array) -> Engine:
-        if not np.any(number.monotonicity):
-            return self._model.problem.engine
-        return self._model.engine(corner(number.monotonicity, lower, upper))
 
     def _combined(self, program: AffineProblem, rows: Multipliers) -> CombinedMultipliers:
         """Return the combined multipliers of a box's program, at the initial factors."""
@@ -124,7 +118,7 @@ class SizePrograms:
             return 0.0
         total, remainder, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))
         for number, groups in multipliers.parts:
-            engine = self._engine(number, lower, upper)
+            engine = self._model.engine_at(corner(number.monotonicity, lower, upper), number.monotonicity)
             for group in groups:
                 factors = self._model.factors(group.lengths.piece.positions, number.measure, engine)
                 function, maximum = group.with_factors(factors)

@@ -97,8 +97,6 @@ def rod_series(
         Function from a length to the pieces with all their rows.
     start
         Initial length, whose factors all rows get.
-    low, high
-        Range of lengths [m].
     masks
         Rows of each piece that no kink passes; the other rows are set to zero, which keeps the bounds valid.
 

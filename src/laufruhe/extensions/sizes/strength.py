@@ -25,6 +25,7 @@ from laufruhe.extensions.sizes.machine import (
     ring_area,
     round_inertia,
     round_modulus,
+    smallest_journal,
 )
 from laufruhe.machine import CRANKSHAFT, Bearing, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array
@@ -46,35 +47,19 @@ SPREAD = 2.0 / 3.0
 
 
 def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the bending moment in the middle of each crank pin [N m], along its force, shape (n, cylinders, 3) (Z3).
-
-    Raises
-    ------
-    ModelError
-        If a pin lacks a main bearing on one side.
-    """
-    spans = [_span(engine, part) for part in engine.slider_cranks]
-    return _shared(engine, point, fidelity, [partial(_moment, part.x, *span) for part, span in zip(
-        engine.slider_cranks, spans, strict=True)])  # fmt: skip
+    """Return the bending moment amid each crank pin [N m], along its force, shape (n, cylinders, 3) (Z3)."""
+    moments = [partial(_moment, part.x, *_span(engine, part)) for part in engine.slider_cranks]
+    return _shared(engine, point, fidelity, moments)
 
 
 def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the forces of bearings next to each throw [N], from its piece of shaft, shape (n, 2 cylinders, 3) (Z4).
-
-    Raises
-    ------
-    ModelError
-        If a pin lacks a main bearing on one side, or two throws share one piece of shaft.
-    """
+    """Return the forces of bearings next to each throw [N], from its piece of shaft, shape (n, 2 cylinders, 3) (Z4)."""
     shares: list[Callable[[float], float]] = []
     for part in engine.slider_cranks:
         front, rear = _span(engine, part)
-        for neighbour in engine.slider_cranks:
-            if (
-                neighbour.shaft == part.shaft
-                and _within(neighbour.x, front, rear)
-                and not _on_one_throw(part, neighbour)
-            ):
+        width = part.big_end[1] if part.big_end else 0.0
+        for neighbour in (other for other in engine.slider_cranks if other.shaft == part.shaft):
+            if rear.x < neighbour.x < front.x and abs(part.x - neighbour.x) > 1.5 * width:
                 raise ModelError(
                     f"{part.name} and {neighbour.name} have no main bearing between them; "
                     "stresses of webs need one on either side"
@@ -143,21 +128,13 @@ def _span(engine: Engine, part: SliderCrank) -> tuple[Bearing, Bearing]:
     return min(front, key=lambda b: b.x), max(rear, key=lambda b: b.x)
 
 
-def _within(x: float, front: Bearing, rear: Bearing) -> bool:
-    return rear.x < x < front.x
-
-
-def _on_one_throw(part: SliderCrank, neighbour: SliderCrank) -> bool:
-    return abs(part.x - neighbour.x) <= 1.5 * (part.big_end[1] if part.big_end else 0.0)
-
-
 def _lever(loaded: float, unloaded: float, position: float) -> float:
     share = (unloaded - position) / (unloaded - loaded)
     return share if 0.0 <= share <= 1.0 else 0.0
 
 
 def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
-    if not _within(x, front, rear):
+    if not rear.x < x < front.x:
         return 0.0
     if x >= section:
         return (section - rear.x) * _lever(rear.x, front.x, x)
@@ -277,9 +254,9 @@ def gear_mass(engine: Engine) -> float:
     total = 0.0
     for part in pins.values():
         total += 0.0 if part.big_end is None else ring_area(part.big_end[0], 0.0) * part.big_end[1]
-    journal = min((b.diameter for b in engine.bearings if b.diameter is not None), default=0.0)
     for part in pins.values() if gear.webs else ():
-        reach = part.crank_radius + 0.5 * (part.big_end[0] if part.big_end else 0.0) + 0.5 * journal
+        diameter = part.big_end[0] if part.big_end else 0.0
+        reach = part.crank_radius + 0.5 * diameter + 0.5 * smallest_journal(engine.bearings)
         total += 2.0 * _part(engine, "webs", Webs).area * reach
     for part in engine.slider_cranks:
         if gear.rod is not None and not math.isinf(part.rod_length):

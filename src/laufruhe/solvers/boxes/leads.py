@@ -69,15 +69,7 @@ def solve_leads(problem: Problem) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class _Box(BoundedBox):
-    """Box of leads [rad].
-
-    Attributes
-    ----------
-    at_middle
-        Lower bound of the objective at the middle of the box [SI].
-    side
-        Index of the lead to split.
-    """
+    """Box of leads [rad], with a lower bound of the objective at its middle [SI], and the lead to split."""
 
     at_middle: float
     side: int

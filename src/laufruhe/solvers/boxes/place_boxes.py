@@ -41,15 +41,7 @@ UNUSED = 1e-6
 
 
 class Relaxation:
-    """Relaxations of a problem over boxes of positions.
-
-    Parameters
-    ----------
-    problem
-        Problem with open positions.
-    share
-        Share of the problem's tolerance for the relaxations.
-    """
+    """Relaxations of a problem over boxes of positions, with a share of the problem's tolerance."""
 
     def __init__(self, problem: Problem, share: float) -> None:
         self._tolerance = share * problem.tolerance
@@ -67,17 +59,13 @@ class Relaxation:
         for k, place in enumerate(self.places):
             for drive in place.place_drives:
                 self._placed.setdefault(drive.rotor, []).append(k)
-        self._kinks = [self._kinks_of(place) for place in self.places]
-
-    def _kinks_of(self, place: Decision) -> Array:
         # positions of inner bearings [m]
-        dependences = {dependence(measure.channel, Kind.PLACE, self.problem) for measure in self.problem.measures}
-        if Dependence.BENT not in dependences:
-            return np.zeros(0)
-        shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == AXIAL}
-        return np.unique([
-            x for shaft in shafts for x in sorted(b.x for b in self.problem.engine.bearings if b.shaft == shaft)[1:-1]
-        ])  # fmt: skip
+        self._kinks = [np.zeros(0) for _ in self.places]
+        if any(dependence(m.channel, Kind.PLACE, problem) is Dependence.BENT for m in problem.measures):
+            for k, place in enumerate(self.places):
+                shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == AXIAL}
+                bearings = (sorted(b.x for b in problem.engine.bearings if b.shaft == shaft) for shaft in shafts)
+                self._kinks[k] = np.unique([x for positions in bearings for x in positions[1:-1]])
 
     def _nodes(self, lower: Array, upper: Array) -> list[Array]:
         sides = zip(self._kinks, lower, upper, strict=True)
@@ -104,11 +92,15 @@ class Relaxation:
                     drives.append(replace(drive, rotor=rotor.name))
                 name = _vertex_name(decision, c)
                 decisions.append(Decision(name, decision.unit, _from_zero(decision.set), 0.0, tuple(drives)))
-            first = decision.rotor_drives[0]
             for rotor_name, copies in parts.items():
                 rotors += copies
                 names.setdefault(rotor_name, [rotor_name]).extend(rotor.name for rotor in copies)
-            limits.append(_limit_on_sum(decision, first, parts[first.rotor]))
+            # the sum over all vertices
+            first = decision.rotor_drives[0]
+            copies = parts[first.rotor]
+            maximum = _from_zero(decision.set).scale * abs(first.gain) / (copies[0].radius or 1.0)
+            sum_of_parts = Measure(ADDED_MASS, rotors=tuple(part.name for part in copies))
+            limits.append(Limit(decision.name, sum_of_parts, maximum))
         fixed_rotors = tuple(rotor for rotor in self._rotors.values() if rotor.name not in self._placed)
         problem = self.problem
         return replace(
@@ -160,15 +152,7 @@ class Relaxation:
         return placed if new_name == name else replace(placed, unbalance=0.0j, radius=rotor.radius or 1.0)
 
     def recover_places(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return the positions of the relaxed solution and the spread of its unbalances [m], shape (places,) each.
-
-        Parameters
-        ----------
-        relaxed, result
-            Relaxation over the box, and its result.
-        lower, upper
-            Bounds of the positions [m], shape (places,) each.
-        """
+        """Return the positions of a relaxed solution in a box and the spread of its unbalances [m], shape (places,)."""
         unbalances = dict(zip((d.name for d in relaxed.unbalances), unbalance_values(relaxed, result), strict=True))
         # unbalances and their coordinates along each position, a pair of arrays per decision
         moments: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
@@ -194,19 +178,12 @@ class Relaxation:
         return middle, spread
 
     def values(self, relaxed: Problem, result: Result, middle: Array) -> tuple[Value, ...]:
-        """Return values of all decisions of the problem from the relaxed solution.
-
-        Parameters
-        ----------
-        relaxed, result
-            Relaxation over a box, and its result.
-        middle
-            Positions [m], shape (places,). Unbalances are sums over the vertices.
-        """
+        """Return values of all decisions from a relaxed solution, with positions `middle` [m], shape (places,)."""
         relaxed_values = dict(zip((d.name for d in relaxed.decisions), values_of(relaxed, result), strict=True))
         values: dict[str, Value] = {place.name: float(x) for place, x in zip(self.places, middle, strict=True)}
         for decision in self.other_decisions:
             names = [_vertex_name(decision, c) for c in range(len(relaxed.decisions))] if self._axes(decision) else ()
+            # unbalances are sums over the vertices
             parts = [relaxed_values[name] for name in names if name in relaxed_values]
             values[decision.name] = sum(parts) if parts else relaxed_values[decision.name]
         return tuple(values[decision.name] for decision in self.problem.decisions)
@@ -256,12 +233,6 @@ def _from_zero(values: Set) -> Set:
         smallest = min(max(values.lower, 0.0), values.upper)
         return replace(values, lower=min(values.lower - smallest, 0.0), upper=max(values.upper - smallest, 0.0))
     return values
-
-
-def _limit_on_sum(decision: Decision, drive: RotorDrive, parts: Sequence[Rotor]) -> Limit:
-    radius = parts[0].radius or 1.0
-    maximum = _from_zero(decision.set).scale * abs(drive.gain) / radius
-    return Limit(decision.name, Measure(ADDED_MASS, rotors=tuple(part.name for part in parts)), maximum)
 
 
 def _renamed(measure: Measure, names: dict[str, list[str]]) -> Measure:

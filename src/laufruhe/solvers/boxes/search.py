@@ -137,18 +137,12 @@ def divide_boxes(
 
     Parameters
     ----------
-    search
-        Method that divides and bounds boxes.
     root, best
         Box of all open numbers, and the first incumbent.
-    zero_level
-        Objective that counts as zero [SI].
-    tolerance
-        Relative gap at which the search ends.
-    maximum
-        Largest number of boxes.
-    what
-        Name of the boxes in progress reports.
+    zero_level, tolerance
+        Objective that counts as zero [SI], and relative gap at which the search ends.
+    maximum, what
+        Largest number of boxes, and their name in progress reports.
 
     Returns
     -------

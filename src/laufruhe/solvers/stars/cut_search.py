@@ -32,16 +32,12 @@ class CutSearchResult:
     ----------
     solved
         Every solved design, best first.
-    lower_bound
-        Lower bound of the objective over all stars and sets of shafts [SI].
-    open_bound
-        Lower bound of the objective over designs not solved [SI]; infinite if all are solved or infeasible.
+    lower_bound, open_bound
+        Lower bounds of the objective over all designs, and over those not solved (infinite if there are none) [SI].
     complete
         True if the search ended with a proof, False if its time ended.
-    designs
-        Number of stars times number of sets of shafts.
-    infeasible
-        Number of solved stars and sets of shafts without a feasible design.
+    designs, infeasible
+        Number of stars times number of sets of shafts, and number of those solved without a feasible design.
     """
 
     solved: tuple[SolvedStar, ...]
@@ -55,22 +51,16 @@ class CutSearchResult:
 def search_designs(
     model: StarModel, stars: Stars, count: int, tolerance: float, time_limit: float = math.inf, zero_level: float = 0.0
 ) -> CutSearchResult:
-    """Return the best designs of stars and shafts, with a proof (S15).
+    """Return the best designs of stars and shafts, with a proof (S15). See `solve_design`.
 
     Parameters
     ----------
-    model
-        Rows of every star.
     stars
         Steps of every star allowed, shape (n, throws).
     count
         Number of best designs to prove.
-    tolerance
-        Relative gap that counts as closed.
     time_limit
         Largest time of the search [s].
-    zero_level
-        Objective that counts as zero [SI].
     """
     started = time.perf_counter()
     owners, shafts = shaft_owners(model), model.phasing.shafts

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
+from laufruhe.load_models.amplitudes import AmplitudeObjective
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over, limit_time
@@ -18,13 +18,6 @@ SLACK = 1e-9
 MAX_SLOTS = 13
 """Largest number of cylinders whose firing orders are enumerated; their number grows as the factorial."""
 _BLOCK = 1 << 17
-
-
-class StarObjective(Protocol):
-    """Objective as a function of even stars."""
-
-    def values(self, space: StarSpace, stars: Stars) -> Array:
-        """Return the objectives of stars, shape (n,), from their steps, shape (n, throws)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +70,7 @@ class BestStars:
         self.stars, self.values = all_stars[selected], all_values[selected]
 
 
-def enumerate_stars(space: StarSpace, objective: StarObjective, count: int = 1) -> StarSearchResult:
+def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarSearchResult:
     """Return the best `count` stars of a space, by evaluating all of them in blocks."""
     best, nodes = BestStars(count, space.throws), 0
     for block in space.blocks():
@@ -100,8 +93,6 @@ def enumerate_orders(
         Objective as a function of squares of loads, with tables of pairs of throws.
     cylinders
         Number of cylinders, each on its own throw.
-    count
-        Number of best firing orders.
     time_limit
         Time after which the search returns the best orders so far, without a proof [s].
     """

@@ -72,20 +72,16 @@ class EvenDesign:
 
 @dataclass(frozen=True, eq=False)
 class EvenStarResult:
-    """Best designs of a search over even stars, and the lower bound of all.
+    """Best designs of a search over even stars, best first, and the lower bound of all.
 
     Attributes
     ----------
-    designs
-        Best designs, best first.
     bound
         Lower bound of the objective over all designs [SI].
     complete
         True if the search ended with a proof, False if its time ended.
     looked_at
         Number of stars or partial stars that the search evaluated.
-    method
-        Name of the method, for the certificate.
     infeasible
         Number of stars without a feasible design.
     """

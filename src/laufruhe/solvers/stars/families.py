@@ -26,10 +26,6 @@ class Family:
     ----------
     geometry
         Bank angle and split pin angle [rad]; None if the layout has none.
-    layout
-        Layout with this geometry.
-    space
-        Space of the stars.
     fixed
         Steps of the only star if the firing order is fixed, else None.
     is_of_orders

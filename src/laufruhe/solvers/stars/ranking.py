@@ -137,8 +137,6 @@ class PhasingResult:
         Number of stars times number of sets of shafts.
     looked_at
         Number of partial and complete stars that the search evaluated, or of cone programs.
-    method
-        Method in words.
     trade
         Objective as a function of the largest deviation from even firing.
     even_value

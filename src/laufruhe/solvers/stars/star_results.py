@@ -26,8 +26,6 @@ class StarDesign:
     ----------
     candidate
         Throws, firing order, geometry and shafts.
-    result
-        Result of the problem with this star.
     steps
         Steps of the throws if it fires evenly, else None.
     kkt_residual

@@ -71,12 +71,8 @@ class Riders:
 
     Parameters
     ----------
-    problem
-        Problem with the throws of its engine.
-    throw_of_rotor
-        Index of the throw of every rotor that turns with one.
-    throws
-        Angles of these throws [rad].
+    throw_of_rotor, throws
+        Index of the throw of every rotor that turns with one, and angles of the throws of the engine [rad].
 
     Attributes
     ----------

@@ -49,8 +49,6 @@ class ThrowProgram:
 
     Attributes
     ----------
-    window
-        The firing window.
     rows
         Norms with all columns: unbalances; for every throw the cosines and sines of all waves, then theta; and the
         shared angles.
@@ -78,8 +76,6 @@ class ThrowBox:
 
     Attributes
     ----------
-    program
-        Norms of the firing window.
     lower, upper
         Bounds of throws, then of shared angles (open bank and split pin angle) [rad].
     bound

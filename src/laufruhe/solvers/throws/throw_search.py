@@ -73,12 +73,10 @@ class ThrowBound:
         Lower bound of the objective of all designs [SI]; infinite if no design is feasible.
     best
         Best design; None if no feasible design is known.
-    boxes
-        Number of boxes.
+    boxes, what
+        Number of boxes, and their name in words.
     conflict
         Names of limits that contradict each other, if no design is feasible.
-    what
-        Name of the boxes, in words.
     """
 
     bound: float
@@ -94,18 +92,13 @@ class Stage:
 
     Attributes
     ----------
-    build
-        Function from the number of samples to the programs.
-    loss
-        Function from the number of samples to the error of means and peaks of the best design (P7) [SI].
+    build, loss, truncation
+        Functions from the number of samples to the programs, to the error of means and peaks of the best design (P7)
+        [SI], and to the largest part of the objective in truncated orders [SI].
     value
         Objective of the best design [SI].
-    truncation
-        Function from the number of samples to the largest part of the objective in truncated orders [SI].
-    maximum
-        Largest number of samples.
-    target
-        Error relative to the objective at which samples suffice.
+    maximum, target
+        Largest number of samples, and the error relative to the objective at which samples suffice.
     """
 
     build: Callable[[int], ThrowPrograms]
