@@ -103,9 +103,8 @@ def _with_gear_masses(
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
     if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
         rule = "needs plain slider-cranks on one crankshaft"
-        raise Refused(
-            "running_gear.density", units.quantity_text(table.density, "kg/m^3"), rule, "give the masses in [engine]"
-        )
+        density = units.quantity_text(table.density, "kg/m^3")
+        raise Refused("running_gear.density", density, rule, "give the masses in [engine]")
     if any(part.master_bank is not None for part in parts):
         rule = "needs rods on the crank pin, and these are hinged to a master rod"
         raise Refused("running_gear", None, rule, "leave it out")
@@ -128,26 +127,20 @@ def _start(value: float | Open) -> float:
 def _piston_pin(table: PistonPinTable) -> PistonPin:
     bore, diameter = Open.from_value(table.bore), Open.from_value(table.diameter)
     if bore.upper >= diameter.lower:
-        value, rule = (
-            units.quantity_text(bore.upper, "m"),
-            f"does not fit into a pin of {units.quantity_text(diameter.lower, 'm')}",
-        )
-        raise Refused("running_gear.piston_pin.bore", value, rule, "make it smaller")
+        rule = f"does not fit into a pin of {units.quantity_text(diameter.lower, 'm')}"
+        raise Refused("running_gear.piston_pin.bore", units.quantity_text(bore.upper, "m"), rule, "make it smaller")
     return PistonPin(diameter.start, bore.start, _start(table.length), table.in_bosses, table.span)
 
 
 def _sizes_in_file(
-    table: RunningGearTable | None,
-    engine: EngineTable,
-    bearings: Sequence[MainBearingTable],
-    bearing_parts: Sequence[Bearing],
+    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[tuple[MainBearingTable, Bearing]]
 ) -> Iterator[tuple[str, Size, Any]]:
     """Yield the name, the key and the file's value of each size that may be open."""
     yield "engine.rod_length", ROD_LENGTH, engine.rod_length
     for key in ("diameter", "width"):
         if engine.big_end is not None:
             yield f"engine.big_end.{key}", (BIG_END, key), getattr(engine.big_end, key)
-        for row, bearing in zip(bearings, bearing_parts, strict=True):
+        for row, bearing in bearings:
             yield f"{bearing.name}.{key}", (on(bearing), key), getattr(row, key)
     for name in ("webs", "rod", "piston_pin", "bolts") if table else ():
         part = getattr(table, name)
@@ -157,9 +150,8 @@ def _sizes_in_file(
 
 def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionContext) -> Problem:
     engine, throws = problem.engine, [throw for throw in context.throws if throw.shaft == CRANKSHAFT]
-    decisions = _decisions(
-        table, context.engine, expand_bearings(context.file.main_bearings, context.throws), engine.bearings
-    )
+    bearings = zip(expand_bearings(context.file.main_bearings, context.throws), engine.bearings, strict=True)
+    decisions = _decisions(table, context.engine, list(bearings))
     if decisions and table is not None and table.density is not None:
         check_factors(context.file.counterweights, "counts masses that follow from sizes, which are open")
     gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)
@@ -169,22 +161,18 @@ def _read(table: RunningGearTable | None, problem: Problem, context: ExtensionCo
 
 
 def _decisions(
-    table: RunningGearTable | None,
-    engine: EngineTable,
-    bearings: Sequence[MainBearingTable],
-    bearing_parts: Sequence[Bearing],
+    table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[tuple[MainBearingTable, Bearing]]
 ) -> list[Decision]:
     decisions = list[Decision]()
-    for name, size, value in _sizes_in_file(table, engine, bearings, bearing_parts):
+    for name, size, value in _sizes_in_file(table, engine, bearings):
         decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] has a fixed length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in decisions):
         shortest = Open.from_value(engine.rod_length or math.inf).lower
         if engine.kind.is_free or engine.offset:
-            raise Refused(
-                "engine.rod_length", None, "can be open only in layouts without offset", "fix it, or use a layout"
-            )
+            rule = "can be open only in layouts without offset"
+            raise Refused("engine.rod_length", None, rule, "fix it, or use a layout")
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
             length = units.quantity_text(shortest, "m")
             raise Refused("engine.rod_length", length, "does not let the crank turn", "raise its lower bound")

@@ -15,7 +15,6 @@ import numpy as np
 from laufruhe.extensions.sizes.machine import RunningGear
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.extensions.sizes.solver import check_acts, solve_sizes
-from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision, Drive, Kind, NumberDrive, RotorDrive
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -38,41 +37,29 @@ MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
 def solve_mounted_sizes(problem: Problem) -> Result:
     """Return the best local optimum of a few searches, with a lower bound."""
     started = time.perf_counter()
-    initial, without_mounts = evaluate_start(problem), _without_mounts(problem)
-    check_acts(SizeModel(without_mounts))
-    program = LocalProgram.of(problem)
-    best = best_local_optimum(
-        program,
-        [*_starts(program, without_mounts), *spread_starts(problem)[:RANKED_STARTS]],
-        min(problem.search.starts, STARTS),
+    without_mounts = replace(
+        problem,
+        decisions=tuple(decision for decision in problem.decisions if decision not in problem.mount_decisions),
+        objective=tuple(term for term in problem.objective if not term.measure.is_mounting),
+        limits=tuple(limit for limit in problem.limits if not limit.measure.is_mounting),
     )
+    initial, model, program = evaluate_start(problem), SizeModel(without_mounts), LocalProgram.of(problem)
+    check_acts(model)
+    starts = [program.shares(problem.start), *spread_starts(problem)[:RANKED_STARTS]]
+    search = replace(without_mounts.search, boxes=1)
+    sizes_result = solve_sizes(replace(without_mounts, tolerance=ROUGH_TOLERANCE, search=search))
+    if sizes_result.status.has_design:
+        # mounts keep their start values
+        starts.insert(0, program.shares(values_of(problem, sizes_result)))
+    best = best_local_optimum(program, starts, min(problem.search.starts, STARTS))
     design = evaluate_design(problem, program.values(best))
-    bound = _bound(problem, design)
+    bound = _bound(problem, model, design)
     words = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
     proof = proof_data(program, design, bound, ProofStrength.RELAXED, words)
     return build_result(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
-def _without_mounts(problem: Problem) -> Problem:
-    decisions = tuple(decision for decision in problem.decisions if decision not in problem.mount_decisions)
-    terms = tuple(term for term in problem.objective if not term.measure.is_mounting)
-    limits = tuple(limit for limit in problem.limits if not limit.measure.is_mounting)
-    return replace(problem, decisions=decisions, objective=terms, limits=limits)
-
-
-def _starts(program: LocalProgram, without_mounts: Problem) -> list[Array]:
-    problem, start = program.problem, program.shares(program.problem.start)
-    sizes_result = solve_sizes(
-        replace(without_mounts, tolerance=ROUGH_TOLERANCE, search=replace(without_mounts.search, boxes=1))
-    )
-    if not sizes_result.status.has_design:
-        return [start]
-    # mounts keep their start values
-    return [program.shares(values_of(problem, sizes_result)), start]
-
-
-def _bound(problem: Problem, design: Design) -> float:
-    model = SizeModel(_without_mounts(problem))
+def _bound(problem: Problem, model: SizeModel, design: Design) -> float:
     depends_on_sizes = any(
         term.measure.channel.size_value is not None or _has_size_factors(term.measure) for term in problem.objective
     )
@@ -80,9 +67,8 @@ def _bound(problem: Problem, design: Design) -> float:
         return 0.0
     relaxed, reference = with_masses(problem, model, design.values)
     gap_tolerance = gap_tolerance_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
-    return max(
-        run_provers(Question(relaxed, design.value, gap_tolerance, reference)).bound, mounts_bound(relaxed, reference)
-    )
+    bound = run_provers(Question(relaxed, design.value, gap_tolerance, reference)).bound
+    return max(bound, mounts_bound(relaxed, reference))
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:

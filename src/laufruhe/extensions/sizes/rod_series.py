@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.extensions.sizes.pieces import Piece
+from laufruhe.extensions.sizes.model import Piece
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.arrays import Array, Mask
 
