@@ -32,8 +32,8 @@ MAX_BOXES = 3000
 SLACK, HALVINGS, ROUNDS, MAX_TANGENTS = 1e-9, 10, 3, 200
 # most tangents of a load if multipliers of the whole problem give better bounds
 FEW_TANGENTS = 4
-# sets of multipliers that a box inherits; smallest gain of a side to halve, as a share of the missing bound
-MAX_KNOWN, WORTH = 2, 0.1
+# sets of multipliers that a box inherits
+MAX_KNOWN = 2
 # relative gap below which programs have all samples
 NEAR = 2e-3
 
@@ -202,7 +202,8 @@ class SizeBoxes:
         bound = self.objective(lower, upper, multipliers)
         if bound >= target:
             return None
-        return SizeCut(lower, upper, bound, self._side(lower, upper, multipliers, bound, target), multipliers)
+        side = widest(lower, upper, self.model.upper - self.model.lower)
+        return SizeCut(lower, upper, bound, side, multipliers)
 
     def multipliers_of(
         self, lower: Array, upper: Array, target: float, multipliers: tuple[CombinedMultipliers, ...]
@@ -213,18 +214,6 @@ class SizeBoxes:
         is_near = bool(multipliers) and self.objective(lower, upper, multipliers) >= (1.0 - NEAR) * target
         rows = self._combined.multipliers_of(lower, upper, self.reach(lower, upper), is_near)
         return multipliers if rows is None else (rows, *multipliers[: MAX_KNOWN - 1])
-
-    def _side(
-        self, lower: Array, upper: Array, multipliers: Sequence[CombinedMultipliers], bound: float, target: float
-    ) -> int:
-        middle, gains = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, is_side in enumerate(np.eye(len(lower), dtype=bool) if multipliers and target < math.inf else ()):
-            first = self.objective(lower, np.where(is_side, middle, upper), multipliers)
-            second = self.objective(np.where(is_side, middle, lower), upper, multipliers)
-            gains[k] = min(first, target) + min(second, target) - 2.0 * bound
-        if gains.max() > WORTH * (target - bound):
-            return int(np.argmax(gains))
-        return widest(lower, upper, self.model.upper - self.model.lower)
 
     def _without_empty_ends(
         self, lower: Array, upper: Array, k: int, target: float, multipliers: Sequence[CombinedMultipliers]
