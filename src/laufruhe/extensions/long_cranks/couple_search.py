@@ -12,13 +12,14 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.long_cranks.throw_halves import Counts, Free, Window, meeting, shares_of, work_of
+from laufruhe.extensions.long_cranks.couple_objectives import CoupleNorms, StarAmplitudes
+from laufruhe.extensions.long_cranks.throw_halves import Counts, Free, meeting, shares_of, work_of
 from laufruhe.load_models.amplitudes import NEGLIGIBLE
-from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.arrays import Indices
 from laufruhe.numerics.budget import is_time_over, limit_time, until_time_limit
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
@@ -39,20 +40,8 @@ LONG = 16
 SEED = 1964
 
 
-class CoupleObjective(Protocol):
-    """Objective of stars that differ in their couples."""
-
-    def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); above `maximum` a lower bound instead of the value."""
-
-    def upper_bound(self, space: StarSpace) -> float:
-        """Return an upper bound over all stars [SI]."""
-
-    def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound over all stars and couples [SI]."""
-
-    def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of couples of all stars below a value; None if there is none."""
+CoupleObjective: TypeAlias = StarAmplitudes | CoupleNorms
+"""Objective of stars that differ in their couples."""
 
 
 def search_stars(

@@ -44,16 +44,7 @@ class _Coordinates:
     """Coordinates of boxes: the decisions, or the decisions with the rim's mass in place of its width.
 
     Mass, inertia and stress depend on diameter, height and mass alone. In these coordinates, fewer boxes cover designs
-    of equal mass.
-
-    Attributes
-    ----------
-    problem
-        Problem whose decisions are flywheel sizes.
-    initial
-        Flywheel of the initial design.
-    width
-        Index of the width among the decisions; None if the coordinates are the decisions themselves.
+    of equal mass. `width` is the index of the width among the decisions, or None if the coordinates are the decisions.
     """
 
     problem: Problem
@@ -97,16 +88,9 @@ class _Coordinates:
         return real_bounds(self.problem.decisions)
 
     def monotone_problem(self, initial: Evaluation, limits: Sequence[Limit]) -> MonotoneProblem:
-        """Return objective and limits as monotone functions of the coordinates.
+        """Return the objective and some limits as monotone functions of the coordinates.
 
-        At constant speed, the flywheel affects no quantity of the loads.
-
-        Parameters
-        ----------
-        initial
-            Evaluation of the initial design.
-        limits
-            Limits of the problem to include.
+        At constant speed, the flywheel affects no quantity of the loads, which are those of the initial design.
         """
         lower, upper = self.bounds
         width: list[tuple[float, Monotone]] = []
@@ -137,13 +121,7 @@ class _Coordinates:
 
 @dataclass(frozen=True, eq=False)
 class _WheelProgram(LocalProgram):
-    """Local program of the flywheel.
-
-    Attributes
-    ----------
-    functions
-        Objective and limits as monotone functions of the decisions.
-    """
+    """Local program of the flywheel, with objective and limits as monotone functions of the decisions."""
 
     functions: MonotoneProblem
 
