@@ -115,7 +115,7 @@ class SizeBoxes:
         return monotonicity
 
     def _mass_monotonicity(self) -> Monotonicity:
-        """Return 1 for each size if all masses rise with it, -1 if all fall; shape (sizes,)."""
+        # 1 for each size if all masses rise with it, -1 if all fall
         corners = self.model.mass_corners
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):
