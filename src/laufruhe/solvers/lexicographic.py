@@ -42,7 +42,12 @@ def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
     rank_limits: list[Limit] = []
     equal_by_rank: list[tuple[DecisionRange, ...]] = []
     for rank in problem.ranks:
-        result = _solve_stage(single.changed(objective=rank.terms), problem.limits, rank_limits, solve)
+        # relax the limits on earlier objectives until the solver finds a design
+        for slack in WIDER:
+            rank_limits = [replace(limit, maximum=limit.maximum * (1.0 + slack)) for limit in rank_limits]
+            result = solve(single.changed(objective=rank.terms, limits=(*problem.limits, *rank_limits)))
+            if result.status.has_design or not rank_limits:
+                break
         if not result.status.has_design or result.objective is None:
             if not stages:
                 return result
@@ -56,16 +61,6 @@ def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
         rank_limits.append(limit)
         equal_by_rank.append(equal_designs(result, limit) if len(rank.terms) == 1 else ())
     return _joint_result(problem, stages, rank_limits, equal_by_rank)
-
-
-def _solve_stage(stage: Problem, limits: tuple[Limit, ...], rank_limits: list[Limit], solve: Solve) -> Result:
-    # relax the limits on earlier objectives until the solver finds a design
-    for slack in WIDER:
-        rank_limits[:] = [replace(limit, maximum=limit.maximum * (1.0 + slack)) for limit in rank_limits]
-        result = solve(stage.changed(limits=(*limits, *rank_limits)))
-        if result.status.has_design or not rank_limits:
-            break
-    return result
 
 
 def _joint_result(

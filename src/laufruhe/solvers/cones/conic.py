@@ -85,7 +85,7 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
 
 
 def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
-    # triangle inequality
+    # the triangle inequality bounds the norm of every design
     largest = norm.norm.value(norm.grid, norm.constant)
     for column, scale in enumerate(problem.scales):
         if largest > maximum * (1.0 + FEASIBLE):

@@ -51,9 +51,9 @@ class ConstraintCollector:
         self.names += [name] * count
         self.slopes += [(minimum, maximum)] * count
 
-    def named(self, name: str, symbol: Any = ca.MX) -> MeasureCollector:
+    def named(self, name: str) -> MeasureCollector:
         """Return a collector to which a norm adds its variables and constraints, under the name of its measure."""
-        return MeasureCollector(self, name, symbol)
+        return MeasureCollector(self, name)
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,10 @@ class MeasureCollector:
 
     into: ConstraintCollector
     name: str
-    symbol: Any
 
     def head(self, value: Any, lower: float = 0.0) -> Any:
         """Add a column of epigraph variables for largest values, and return it; `value` is the start (E22)."""
-        variable = self.symbol.sym(f"head{len(self.into.heads)}", value.numel())
+        variable = ca.MX.sym(f"head{len(self.into.heads)}", value.numel())
         self.into.heads.append((variable, value))
         self.into.floors += [lower] * value.numel()
         return variable
