@@ -15,7 +15,7 @@ import numpy as np
 from pages import PAGES, processor_seconds, publish
 
 from laufruhe.cli.fidelity import traded
-from laufruhe.fidelity.knobs import NO_GAS, RIGID, TWO_ORDER
+from laufruhe.fidelity.automatic import NO_GAS, RIGID, TWO_ORDER
 from laufruhe.numerics.cores import processors
 from laufruhe.studies.trade import KEEPS
 from problem_files import READY

@@ -20,7 +20,7 @@ from fidelity.scenes import random_elastic_problem, random_problem
 from laufruhe.errors import InputError, ModelError
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import reference
-from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.fidelity.options import OPTIONS
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.reader import load
 from laufruhe.machine import OperatingPoint, SliderCrank
@@ -206,9 +206,9 @@ def test_no_orders_is_refused() -> None:
         Fidelity(orders=0)
 
 
-def test_every_choice_has_its_knob() -> None:
+def test_every_choice_has_its_option() -> None:
     """What a fidelity holds, a file may say, and one object answers for."""
-    keys = [knob.key for knob in KNOBS]
+    keys = [option.key for option in OPTIONS]
     assert sorted([*keys, "tolerance"]) == sorted(field.name for field in fields(Fidelity))
     assert set(FidelityTable.model_fields) == {*keys, "tolerance"}
     assert all(hasattr(Fidelity(), key) for key in keys)

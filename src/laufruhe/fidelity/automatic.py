@@ -1,20 +1,79 @@
-"""Choice of the cheapest fidelity that keeps the objective within a tolerance (F10)."""
+"""Choice of the cheapest fidelity that keeps the objective within a tolerance, with its explanation (F10)."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from laufruhe.errors import UncarriedLoadError, plural
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, signals
-from laufruhe.fidelity.knobs import KNOBS, OmittedPart
+from laufruhe.fidelity.options import has_gas
 from laufruhe.machine import Engine
-from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.mechanism import effects_of
+from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.problem.problem import Problem
 
 DEFAULT_TOLERANCE = 1e-3
+ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)
+SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
+GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
+PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
+"""Fractions of the tolerance for all omitted physics, for the samples of the gas, and for the omission of one part."""
 TRIED = (1e-2, 1e-3, 1e-4)
 """Tolerances at which a trade tries the automatic choice."""
+TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+"""Names of variants of a trade that reports mention."""
+GAS_ORDERS = 12
+"""Last order of the gas in the variant of a trade with fewer orders of gas."""
+TIME_ORDERS, TIME_SAMPLES = 12, 360
+"""Orders and samples of the variant of a trade in the time domain; more orders take minutes."""
+
+
+@dataclass(frozen=True)
+class OmittedPart:
+    """Part of the physics that is not computed.
+
+    Attributes
+    ----------
+    share
+        Upper bound of the relative change of the objective if the part is computed.
+    restored
+        Fidelity with this part; None if the part is exactly zero.
+    """
+
+    what: str
+    why: str
+    share: float = 0.0
+    restored: Fidelity | None = None
+
+
+@dataclass(frozen=True)
+class SwitchedPart:
+    """Part of the loads that is computed or not: `less` and `whole` are fields of the fidelity without and with it."""
+
+    key: str
+    what: str
+    less: Mapping[str, Any]
+    whole: Mapping[str, Any]
+    is_there: Callable[[Problem], bool]
+
+    def is_active(self, problem: Problem, fidelity: Fidelity) -> bool:
+        """Return True if the problem has this part and the fidelity computes it."""
+        return self.is_there(problem) and getattr(fidelity, self.key) == getattr(EXACT, self.key)
+
+
+ROD = SwitchedPart(
+    "rod", "inertia of the rods beyond two masses", {"rod": "mass-only"}, {"rod": "rigid"},
+    lambda problem: any(effects_of(part, EXACT)[1] for part in problem.engine.slider_cranks),
+)  # fmt: skip
+GAS = SwitchedPart(
+    "gas", "gas", {"gas": False, "gas_orders": None}, {"gas": True, "gas_samples": REFERENCE_SAMPLES}, has_gas
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,11 +112,8 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
     """Choose the cheapest fidelity as `choose` does, from error bounds relative to a known reference."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
-    fidelity = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
-    for knob in KNOBS:
-        fidelity = knob.chosen(scale, fidelity, allowed_error)
+    fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
     estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
-    left = [part for knob in KNOBS for part in knob.left_out(scale, fidelity)]
     pruned = full = 0
     for term in scale.terms:
         spectra = signals(term.measure, scale.best)
@@ -69,11 +125,137 @@ def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
         fidelity,
         # convert from an error relative to the reference to one relative to the computed value
         estimate / max(1.0 - estimate, 0.5),
-        tuple(text for knob in KNOBS for text in knob.describe(scale, fidelity)),
+        tuple(_description(scale, fidelity)),
         # parts that are exactly zero come first
-        tuple(sorted(left, key=lambda part: part.restored is not None)),
+        tuple(sorted(_omitted_parts(scale, fidelity), key=lambda part: part.restored is not None)),
         (pruned, full),
     )
+
+
+def _cheapest(scale: Scale, allowed_error: float, fidelity: Fidelity) -> Fidelity:
+    """Return the cheapest sufficient fidelity; the allowed error is relative, and from all options together (F10)."""
+    problem, loss = scale.problem, scale.relative_loss
+    # at an uneven speed, gas and inertia affect all loads
+    is_even = not fidelity.is_uneven
+    fidelity = replace(fidelity, gas_samples=REFERENCE_SAMPLES)
+    for part in (ROD, GAS):
+        if is_even and part.is_there(problem):
+            less = replace(fidelity, **part.less)
+            fidelity = less if loss(less) - loss(fidelity) <= PART_SHARE * allowed_error else fidelity
+    if GAS.is_active(problem, fidelity):
+        fidelity = _first(fidelity, "gas_samples", GAS_SAMPLES, lambda f: loss(f) <= GAS_SHARE * allowed_error)
+    else:
+        fidelity = replace(fidelity, gas_samples=None)
+    if is_even:
+        fidelity = _first(fidelity, "orders", (*ORDERS, None), lambda f: loss(f) <= PHYSICS_SHARE * allowed_error)
+    if scale.mounting is not None and not problem.mount_decisions:
+        rigid = replace(fidelity, mounts="rigid")
+        try:
+            is_sufficient = loss(rigid) <= loss(fidelity) + PART_SHARE * allowed_error
+        except UncarriedLoadError:
+            is_sufficient = False
+        fidelity = rigid if is_sufficient else _with_few_modes(scale, fidelity, PART_SHARE * allowed_error)
+    if is_even:
+        lost, steps = loss(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
+        sampling_error = scale.relative_sampling_error
+        fidelity = _first(fidelity, "samples", steps, lambda f: lost + sampling_error(f) <= allowed_error)
+    return fidelity
+
+
+def _first(
+    fidelity: Fidelity, key: str, values: Sequence[int | None], is_sufficient: Callable[[Fidelity], bool]
+) -> Fidelity:
+    """Return the fidelity with the first sufficient value of an option; with the last value if none is sufficient."""
+    candidate = fidelity
+    for value in values:
+        changed: dict[str, Any] = {key: value}
+        candidate = replace(fidelity, **changed)
+        if is_sufficient(candidate):
+            break
+    return candidate
+
+
+def _with_few_modes(scale: Scale, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
+    """Return the fidelity without modes of small response; modes that open rotors excite stay."""
+    maximum = scale.relative_loss(fidelity) + allowed_loss
+    result, modes = fidelity, scale.excited_modes
+    for mode in sorted(set(modes) - scale.open_rotor_modes, key=lambda mode: scale.mode_contributions[mode]):
+        modes = tuple(m for m in modes if m != mode)
+        candidate = replace(fidelity, modes=modes)
+        if scale.relative_loss(candidate) > maximum:
+            break
+        result = candidate
+    return result
+
+
+def _description(scale: Scale, fidelity: Fidelity) -> list[str]:
+    """Return descriptions of the physics that a fidelity computes."""
+    problem, mounting = scale.problem, scale.mounting
+    orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
+    lines = [f"exact kinematics, {orders} of pistons and rods"]
+    if ROD.is_active(problem, fidelity):
+        lines.append("inertia of the rods beyond that of two masses")
+    if GAS.is_active(problem, fidelity):
+        lines.append(f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {orders} of it")
+    if fidelity.is_uneven:
+        lines.append("crank speed that varies within the cycle")
+    if mounting and fidelity.mounts == "rigid":
+        lines.append("mounts as if they gave no way")
+    if mounting and fidelity.mounts == "frequency":
+        modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
+        note = "; modes are of the stiffness at rest, loads of that at each frequency" if mounting.dynamic else ""
+        lines.append(f"{mode_names(mounting, modes)} of the block on its mounts{note}")
+    return [*lines, f"{fidelity.samples} steps over the cycle"]
+
+
+def _omitted_parts(scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
+    """Return the parts that a fidelity omits, with upper bounds of their effect."""
+    parts = []
+
+    def omit(what: str, why: str, **restored: Any) -> None:
+        whole = replace(fidelity, **restored)
+        share = scale.relative_loss(fidelity, scale.evaluation(whole))
+        parts.append(OmittedPart(what, why if share > 0.0 else "the objective does not count them", share, whole))
+
+    for part in (ROD, GAS):
+        if not part.is_there(scale.problem):
+            parts.append(OmittedPart(part.what, "the problem describes none"))
+        elif not part.is_active(scale.problem, fidelity):
+            omit(part.what, "the objective hardly sees its roll moment", **part.whole)
+    wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.open_wrenches]
+    idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
+    if idle:
+        parts.append(OmittedPart("loads " + ", ".join(idle), "nothing drives them"))
+    last = min(float(fidelity.orders or 8), 12.0)
+    orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
+    silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.exciting_signals)]
+    if silent:
+        parts.append(OmittedPart("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
+    if fidelity.orders is not None:
+        omit(f"orders above {fidelity.orders}", "their forces are small", orders=None)
+    if scale.mounting is not None:
+        if fidelity.mounts == "rigid":
+            omit("motion of the block", "its mounts hardly give way at these orders", mounts="frequency")
+        still = [mode for mode in range(1, 7) if mode not in scale.excited_modes]
+        if still:
+            parts.append(OmittedPart(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+        if fidelity.modes is not None:
+            small = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
+            omit(f"{mode_names(scale.mounting, small)} of the block", "what they answer is small", modes=None)
+    if scale.repeats > 1:
+        repeated = f"{scale.repeats - 1} of {scale.repeats} parts of the cycle"
+        parts.append(OmittedPart(repeated, "the loads repeat after each"))
+    finer = replace(fidelity, samples=REFERENCE_SAMPLES, gas_samples=fidelity.gas_steps)
+    share = scale.relative_sampling_error(fidelity) + scale.relative_sampling_error(finer)
+    between = f"angles between {fidelity.samples} steps"
+    return [*parts, OmittedPart(between, "the force runs smoothly through them", share, finer)]
+
+
+def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
+    """Return the names of modes, 1 the lowest, with number, motion and natural frequency."""
+    shapes = mounting.modes
+    named = [f"{k} ({shapes.names[k - 1]}, {shapes.frequencies[k - 1]:.3g} Hz)" for k in modes]
+    return f"{plural('mode', len(named))} {', '.join(named)}"
 
 
 def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) -> Problem:
@@ -86,8 +268,40 @@ def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) ->
 
 def ladder(scale: Scale) -> list[tuple[str, Problem]]:
     """Return the fidelities that a trade compares: (name, problem at this fidelity) (F13)."""
-    problem = scale.problem
-    rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
+    problem, mounting = scale.problem, scale.mounting
+    has_gas = GAS.is_there(problem)
+    gas_samples = EXACT.samples if has_gas else None
+    variants = [
+        ("two-order, 48 steps", Fidelity("two-order", 48, gas_samples=gas_samples)),
+        (TWO_ORDER, Fidelity("two-order", 720)),
+    ]
+    if ROD.is_there(problem):
+        variants.append(("exact, rod of two masses, 720 steps", Fidelity(samples=720, **ROD.less)))
+    if has_gas:
+        variants.append((NO_GAS, Fidelity(samples=720, **GAS.less)))
+        variants.append((f"exact, gas to order {GAS_ORDERS}, 720 steps", Fidelity(samples=720, gas_orders=GAS_ORDERS)))
+    for orders, samples in ((4, 96), (8, 192), (24, 360)):
+        fidelity = Fidelity(samples=samples, orders=orders, gas_samples=gas_samples)
+        variants.append((f"orders to {orders}, {samples} steps", fidelity))
+    if any(term.measure.is_inside for term in scale.terms):
+        is_beam = problem.fidelity.crankshaft == "beam"
+        beam = "crankshaft as a beam", Fidelity(crankshaft="beam")
+        variants.append(("crankshaft cut", Fidelity()) if is_beam else beam)
+    if mounting is not None and scale.terms:
+        variants.append((RIGID, Fidelity(samples=720, mounts="rigid")))
+        cut, words = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
+        variants.append((f"{words}, {TIME_SAMPLES} steps", cut))
+        if mounting.dynamic.has_law:
+            variants.append((f"in time, {words}", replace(cut, mounts="time")))
+        # the one and the three modes of largest response
+        by_strength = sorted(scale.mode_contributions, key=lambda mode: -scale.mode_contributions[mode])
+        for count in (1, 3):
+            if count < len(by_strength):
+                modes = tuple(sorted(by_strength[:count]))
+                name = f"{plural('mode', len(modes))} {', '.join(map(str, modes))}, 720 steps"
+                variants.append((name, Fidelity(samples=720, modes=modes)))
+    variants += [(f"exact, {samples} steps", Fidelity(samples=samples)) for samples in (720, 1440, 2880)]
+    rungs = [(name, problem.at(fidelity)) for name, fidelity in variants]
     if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]
     return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance, scale)) for tolerance in TRIED]

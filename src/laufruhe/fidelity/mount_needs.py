@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.fidelity.automatic import Choice
-from laufruhe.fidelity.knobs import KNOBS, OmittedPart, mode_names
+from laufruhe.fidelity.automatic import GAS, ROD, Choice, OmittedPart, mode_names
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
@@ -70,8 +69,10 @@ def _moved(before: Array, after: Array) -> float:
 def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
     quick = tuple(replace(point, speed=MORE * point.speed) for point in problem.points)
     yield "crank speed", replace(problem, points=quick)
-    for knob in KNOBS:
-        yield from ((name, replace(problem, fidelity=fidelity)) for name, fidelity in knob.without_part(problem))
+    for part in (ROD, GAS):
+        if part.is_there(problem):
+            yield part.what, replace(problem, fidelity=replace(problem.fidelity, **part.less))
+    yield "orders above 2", replace(problem, fidelity=replace(problem.fidelity, orders=2))
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 from pydantic import Field
 
 from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE, automatic
-from laufruhe.fidelity.knobs import KNOBS
+from laufruhe.fidelity.options import OPTIONS
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Table
@@ -16,16 +16,16 @@ from laufruhe.physics.fidelity import EXACT, ChoiceError
 from laufruhe.problem.problem import Problem
 
 
-def _with_knobs(table: type[f.TableModel]) -> type[f.TableModel]:
+def _with_options(table: type[f.TableModel]) -> type[f.TableModel]:
     keys: dict[str, Any] = {}
-    for knob in KNOBS:
-        if knob.key not in table.model_fields:
-            kind = Annotated[knob.kind, f.Number(knob.unit, above=0.0)] if knob.unit else knob.kind
-            keys[knob.key] = (kind | None, Field(default=None, **knob.schema))
+    for option in OPTIONS:
+        if option.key not in table.model_fields:
+            kind = Annotated[option.kind, f.Number(option.unit, above=0.0)] if option.unit else option.kind
+            keys[option.key] = (kind | None, Field(default=None, **option.schema))
     return f.with_keys(table, keys)
 
 
-@_with_knobs
+@_with_options
 class FidelityTable(Table):
     """Fidelity of the physics; exact by default."""
 
@@ -48,19 +48,19 @@ def with_fidelity(problem: Problem, table: FidelityTable) -> Problem:
     if table.tolerance is not None and not is_auto:
         rule, remedy = 'is for kinematics = "auto" only', 'add kinematics = "auto"'
         raise Refused("fidelity.tolerance", table.tolerance, rule, remedy)
-    options: dict[str, Any] = {}
-    for knob in KNOBS:
-        value = getattr(table, knob.key)
+    values: dict[str, Any] = {}
+    for option in OPTIONS:
+        value = getattr(table, option.key)
         if value is None or value == "auto":
             continue
-        if is_auto and knob.is_decided:
-            raise Refused(f"fidelity.{knob.key}", value, 'is chosen by kinematics = "auto"', "leave it out")
-        refused = knob.refusal(problem, value)
+        if is_auto and option.is_decided:
+            raise Refused(f"fidelity.{option.key}", value, 'is chosen by kinematics = "auto"', "leave it out")
+        refused = option.refusal(problem, value)
         if refused is not None:
-            raise Refused(f"fidelity.{knob.key}", value, *refused)
-        options[knob.key] = tuple(value) if isinstance(value, list) else value
+            raise Refused(f"fidelity.{option.key}", value, *refused)
+        values[option.key] = tuple(value) if isinstance(value, list) else value
     try:
-        fidelity = replace(EXACT, **options)
+        fidelity = replace(EXACT, **values)
     except ChoiceError as error:
         raise Refused(f"fidelity.{error.key}", getattr(table, error.key), error.rule, error.remedy) from None
     problem = replace(problem, fidelity=fidelity)

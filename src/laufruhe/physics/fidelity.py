@@ -1,6 +1,6 @@
 """Physics options of a model, each independent of the others (F1).
 
-`fidelity.knobs` says of every field how a problem file tells it, what it costs and when it pays.
+`fidelity.options` says how a problem file sets each field, `fidelity.automatic` when it pays.
 """
 
 from __future__ import annotations

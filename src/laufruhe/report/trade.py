@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 
 from laufruhe.errors import counted
-from laufruhe.fidelity.knobs import NO_GAS, RIGID, TWO_ORDER
+from laufruhe.fidelity.automatic import NO_GAS, RIGID, TWO_ORDER
 from laufruhe.present.numbers import DASH, figure, fixed, number
 from laufruhe.present.static_load import static_sentence
 from laufruhe.present.tables import Table

@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.fidelity.automatic import ladder
+from laufruhe.fidelity.automatic import TIME_ORDERS, TIME_SAMPLES, ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference
-from laufruhe.fidelity.knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
