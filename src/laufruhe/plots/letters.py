@@ -22,7 +22,8 @@ _stand_ins: dict[str, str] = {}
 def prepare(texts: Iterable[str]) -> None:
     """Find fonts for all letters of the texts; warn about letters that no installed font has."""
     letters = {letter for text in texts if not text.isascii() for letter in text if letter.isprintable()}
-    new = sorted(letter for letter in letters - _stand_ins.keys() if ord(letter) not in _main_letters())
+    main_letters = _letters_in(fontManager.findfont(FONT)) if letters else frozenset()
+    new = sorted(letter for letter in letters - _stand_ins.keys() if ord(letter) not in main_letters)
     _stand_ins.update(
         (letter, next((name for name, has in _other_fonts() if ord(letter) in has), "")) for letter in new
     )
@@ -42,11 +43,6 @@ def families() -> list[str]:
 
 
 @cache
-def _main_letters() -> frozenset[int]:
-    return _letters_in(fontManager.findfont(FONT))
-
-
-@cache
 def _other_fonts() -> tuple[tuple[str, frozenset[int]], ...]:
     paths = {
         entry.name: entry.fname
@@ -57,6 +53,7 @@ def _other_fonts() -> tuple[tuple[str, frozenset[int]], ...]:
     return tuple(sorted(fonts, key=lambda font: ("sans" not in font[0].lower(), -len(font[1]), font[0])))
 
 
+@cache
 def _letters_in(path: str) -> frozenset[int]:
     try:
         font = FT2Font(path)

@@ -21,7 +21,6 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from PIL import Image
@@ -136,7 +135,13 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
                         linespacing=1.2)  # fmt: skip
             top -= len(text) * size * _LINE + 0.03
         if legend:
-            _legend(figure, legend, room, columns, (left, top / height))
+            drawn = figure.legend(
+                handles=list(legend), loc="upper left", bbox_to_anchor=(left, top / height), ncols=columns,
+                frameon=False, fontsize=SMALL, borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE,
+                columnspacing=_GAP, labelcolor=INK,
+            )  # fmt: skip
+            for entry_text in drawn.get_texts():
+                entry_text.set_text(fit_line(entry_text.get_text(), room - 2.6 * SMALL / 72.0))
         figure.text(left, EDGE / height, "\n".join(foot), size=SMALL, va="bottom", color=FAINT, linespacing=1.2)
 
 
@@ -158,18 +163,6 @@ def finish_page(
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
     heading(drawn.figure, title, lines, legend, source, problem.title)
     return drawn.figure
-
-
-def _legend(
-    figure: Figure, entries: Sequence[Artist], room: float, columns: int, corner: tuple[float, float]
-) -> Legend:
-    legend = figure.legend(
-        handles=list(entries), loc="upper left", bbox_to_anchor=corner, ncols=columns, frameon=False, fontsize=SMALL,
-        borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_GAP, labelcolor=INK,
-    )  # fmt: skip
-    for text in legend.get_texts():
-        text.set_text(fit_line(text.get_text(), room - 2.6 * SMALL / 72.0))
-    return legend
 
 
 def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:

@@ -24,8 +24,7 @@ from laufruhe.problem.evaluation import channel_samples, place_measures, with_co
 from laufruhe.problem.static_load import static_part
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.section import EXTENSION_SECTIONS
-from laufruhe.report.strict_json import strict
-from laufruhe.report.versions import versions
+from laufruhe.report.strict_json import strict, versions
 from laufruhe.report.wording import why_star
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import AttainableLimit, NearestDesign, ObjectiveValue

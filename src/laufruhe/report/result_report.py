@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.sections import tables_of
-from laufruhe.report.versions import versions
+from laufruhe.report.strict_json import versions
 from laufruhe.report.wording import details, explained, fidelity_of, headline
 from laufruhe.solvers.result import Result
 

@@ -1,4 +1,4 @@
-"""Strict JSON for scripts: no NaN, the maker first, one line feed at the end."""
+"""Strict JSON for scripts: no NaN, the maker first, one line feed at the end; and the versions of the maker."""
 
 from __future__ import annotations
 
@@ -11,10 +11,18 @@ from typing import Any
 
 import numpy as np
 
+import laufruhe
+from laufruhe.numerics.libraries import library_versions
+
 MADE_BY = {"made_by": "laufruhe"}
 _BEGIN = re.compile(rb'(\[\s*)?{\s*"made_by": "laufruhe"')
 LONGEST_BEGIN = 200
 """Number of bytes at the start of a file that must name its maker."""
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of everything that numbers depend on, by name."""
+    return {"laufruhe": laufruhe.__version__, **library_versions()}
 
 
 def is_ours(path: Path) -> bool:

@@ -10,7 +10,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.plots.style import BLUE, VERMILION, entry, finish_page, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN, in_thousands
@@ -38,24 +37,20 @@ def figure(result: Result) -> Figure:
     largest = {kind: max(_sizes(parts, kind), _sizes(initial, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
     for row, kind in enumerate(KINDS):
-        for column, (order, name) in enumerate(ORDERS.items()):
+        for column, (order, order_name) in enumerate(ORDERS.items()):
             axes = drawn.panels[3 * row + 1 + column]
             _circles(axes, *parts[kind, order], largest[kind], KINDS[kind][1])
-            axes.set_title(f"{name} {kind}", loc="left", size=9)
+            axes.set_title(f"{order_name} {kind}", loc="left", size=9)
     legend = [
         entry("turns with the crank", color=FORWARD, linewidth=1.4),
         entry("turns against it", color=BACKWARD, linewidth=1.4, linestyle=(0, (4, 1.6))),
         entry("sum", color=INK, linewidth=2.0),
     ]
-    lines = f"At {point_name(result, k)}, seen from the front{_crank(engine)}."
+    is_one_bank = len({part.bank for part in engine.slider_cranks}) == 1
+    name = name_of_crank([part.throw for part in engine.slider_cranks]) if is_one_bank else ""
+    lines = f"At {point_name(result, k)}, seen from the front{f'; crank {name}' if name else ''}."
     title = f"{firing_words(result)[0].capitalize()}, and forward and backward loads"
     return finish_page(drawn, result, title, lines, legend)
-
-
-def _crank(engine: Engine) -> str:
-    parts = engine.slider_cranks
-    name = name_of_crank([part.throw for part in parts]) if len({part.bank for part in parts}) == 1 else ""
-    return f"; crank {name}" if name else ""
 
 
 def _sizes(parts: Parts, kind: str) -> float:
