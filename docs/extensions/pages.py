@@ -246,8 +246,8 @@ def _asked(method: Any, every: bool) -> str:
 EQUATIONS = """\
 # Equations
 
-This table gives the page and the section of every label of the theory. A label is a letter for the subject and a number;
-comments in the code, messages and other pages cite equations and statements by it.
+This table gives the page and the section of every label of the theory. A label is a letter for the subject and a
+number; comments in the code, messages and other pages cite equations and statements by it.
 
 Sources are named where they are used. Hasselgruber is *Grundlagen der Landtechnik* 1964, whose equation numbers stand
 in parentheses. Roetscher is *Die Maschinenelemente*, chapter 14. The textbook and the worked diesel are named in the
