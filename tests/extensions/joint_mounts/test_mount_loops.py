@@ -12,9 +12,8 @@ import pytest
 import laufruhe
 from attack.families import problem as random_problem
 from lanes import first_fast
-from laufruhe.extensions.joint_mounts.bernstein import coefficients, corners_of, mixed
 from laufruhe.extensions.joint_mounts.mount_loops import is_looped, mount_loop
-from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits, coefficients, corners_of, mixed
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import TURNED
 from laufruhe.problem.mount_resonance import evaluate_start

@@ -20,11 +20,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.extensions.joint_mounts.bernstein import corners_of, mixed
 from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
 from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Pairing
 from laufruhe.extensions.joint_mounts.multipliers import best_at
-from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits, corners_of, mixed
 from laufruhe.load_models.affine import FEASIBLE, MAX_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import real_bounds

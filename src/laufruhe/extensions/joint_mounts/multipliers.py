@@ -59,7 +59,8 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
             ).limits
             return None, replace(best, multipliers=replace(best.multipliers, limits=limits))
         x, best = solution.x, best_bound(problem, solution.x, refine_multipliers(coarse, problem, solution.multipliers))
-        if factor > 1 and _depends_on_few_rows(problem):
+        limit_rows = sum(len(norm.grid.weights) for _, norm in problem.limits)
+        if factor > 1 and limit_rows <= ROWS[-1] and all(norm.norm.is_largest for _, norm in problem.terms):
             x, best = _solve_by_peaks(problem, x, best)
         if problem.objective(x) - best.value <= GAP * best.value:
             break
@@ -86,12 +87,6 @@ def _times(problem: AffineProblem) -> list[int]:
     divisors = [k for k in range(1, problem.samples // MIN_SAMPLES + 1) if problem.samples % k == 0] or [1]
     factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in ROWS}
     return sorted(factors, reverse=True)
-
-
-def _depends_on_few_rows(problem: AffineProblem) -> bool:
-    # terms are peaks, and limits have few rows
-    rows = sum(len(norm.grid.weights) for _, norm in problem.limits)
-    return all(norm.norm.is_largest for _, norm in problem.terms) and rows <= ROWS[-1]
 
 
 def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:

@@ -1,9 +1,10 @@
-"""Lower bounds of the largest force, travel and twist of runs over boxes of stiffness (E65)."""
+"""Simulation of runs: their peaks, and lower bounds of these over boxes of stiffness (E65)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -87,6 +88,22 @@ class RunBoxes:
         run_bounds = [_RunBounds(box_equations, run, maps, d).under() for run in self._runs]
         minima = [np.nan_to_num(run_bound.minimum, nan=-np.inf) for run_bound in run_bounds]
         return choose(run_bounds, np.argmax(minima, axis=0))
+
+
+def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, without_stops: bool) -> RunPeaks:
+    """Return the peaks of measures of run-ups; `without_stops` omits bump stops, which cost most of the time."""
+    if without_stops:
+        mounts = (
+            mount.mapped(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
+            for mount in problem.engine.mounts
+        )
+        problem = replace(problem, engine=replace(problem.engine, mounts=tuple(mounts)))
+    return RunPeaks(problem, measures, coarser)
+
+
+def boxes(model: BoxModel, measures: Sequence[Measure]) -> RunBoxes | None:
+    """Return the bounds over boxes of stiffness, or None if boxes cannot bound the run-ups."""
+    return RunBoxes(model, measures) if bounds_runs(model.problem) else None
 
 
 def bounds_runs(problem: Problem) -> bool:

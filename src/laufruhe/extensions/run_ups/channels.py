@@ -32,7 +32,7 @@ class RunChannel(NumberChannel):
 
     needs: Need = RUN
     depends_on_loads: bool = False
-    simulation: str = "laufruhe.extensions.run_ups.simulation"
+    simulation: str = "laufruhe.extensions.run_ups.boxes"
     peak_error: Callable[[Engine], float] = _peak_error
     part: str = field(kw_only=True)
 

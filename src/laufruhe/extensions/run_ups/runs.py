@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.run_ups.linear_run import RunResponse, Sweep
+from laufruhe.extensions.run_ups.linear_run import Sweep
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.stopped_run import responses_to
 from laufruhe.machine import Engine, OperatingPoint
@@ -88,7 +88,11 @@ def _cached_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run:
         if sweep is not None:
             (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, engine_alone, point, fidelity)])
             if response is not None:
-                return _envelope(response, first, last)
+                signals = (response.force, response.travel, response.twist)
+                edges = np.arange(0, sweep.count + 1, sweep.count // STRETCHES)
+                sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
+                maximum = [np.array([size[a : b + 1].max() for a, b in pairwise(edges)]) for size in sizes]
+                return RunUp(first + (last - first) * edges[1:] / edges[-1], *maximum)
         # modes that vibrate too often for an explicit method need a stiff integrator
         is_stiff = seconds * mounting.modes.frequencies[-1] > MAX_SWINGS
         integrator: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if is_stiff else ("DOP853", RESOLVED)
@@ -130,15 +134,6 @@ _loads = lru_cache(maxsize=8)(run_loads)
 def _wrenches(sweep: Sweep, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Array:
     parts = [part for part in _loads(engine, point, fidelity) if part is not None]
     return sweep.wrenches([(part.orders, part.coefficients) for part in parts])
-
-
-def _envelope(response: RunResponse, first: float, last: float) -> RunUp:
-    signals = (response.force, response.travel, response.twist)
-    edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
-    sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
-    maximum = [np.array([size[a : b + 1].max() for a, b in pairwise(edges)]) for size in sizes]
-    speeds = first + (last - first) * edges[1:] / edges[-1]
-    return RunUp(speeds, *maximum)
 
 
 def run_through(
