@@ -88,11 +88,8 @@ class RunPeaks:
         resolved = [run_signals for run_signals in designs if run_signals is not None]
         if not resolved or len(resolved) < len(points):
             return None
-        pairs = [
-            dict(zip(self.measures, zip(run_signals[::2], run_signals[1::2], strict=True), strict=True))
-            for run_signals in resolved
-        ]
-        return [{measure: np.concatenate(runs) for measure, runs in pair.items()} for pair in pairs]
+        triples = (zip(self.measures, signals[::2], signals[1::2], strict=True) for signals in resolved)
+        return [{measure: np.concatenate(runs) for measure, *runs in each_measure} for each_measure in triples]
 
     @cached_property
     def has_stops(self) -> bool:
@@ -120,15 +117,10 @@ class RunPeaks:
         if base is None or any(shifted_signals is None for shifted_signals in shifted):
             return self._unknown, np.full((sum(self.counts), len(point)), np.nan)
         peak_steps, interpolates = [steps_of_part for _, steps_of_part in _tops(base)], self._coarser > 1
-        rows = [
-            np.concatenate(
-                [
-                    _lengths(_squares(part), steps_of_part, interpolates)
-                    for part, steps_of_part in zip(shifted_signals or [], peak_steps, strict=True)
-                ]
-            )
-            for shifted_signals in shifted
-        ]
+        rows = []
+        for signals in shifted:
+            parts = zip(signals or [], peak_steps, strict=True)
+            rows.append(np.concatenate([_lengths(_squares(part), steps, interpolates) for part, steps in parts]))
         pairs = zip(rows[::2], rows[1::2], widths, strict=True)
         return _peaks(base, interpolates), np.column_stack([(high - low) / width for low, high, width in pairs])
 

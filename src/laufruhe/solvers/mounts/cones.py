@@ -34,14 +34,14 @@ def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
     If Clarabel fails with all settings, minimise the violation of the limits instead, which is always feasible. If that
     fails too, return the middle of the box.
     """
-    exact = _Program(program)
-    if exact.solve():
-        return exact.x, exact.duals
-    relaxation = _Program(replace(program, terms=()), relaxed=True)
-    if not relaxation.solve():
+    solution = _Program(program).solve()
+    if solution is not None:
+        return solution
+    relaxed = _Program(replace(program, terms=()), relaxed=True).solve()
+    if relaxed is None:
         return 0.5 * (program.lower + program.upper), ConvexDuals.none(program)
-    is_infeasible = excludes(program, relaxation.x, relaxation.duals)
-    return None if is_infeasible else (relaxation.x, ConvexDuals.none(program))
+    x, duals = relaxed
+    return None if excludes(program, x, duals) else (x, ConvexDuals.none(program))
 
 
 class _Program:
@@ -73,8 +73,8 @@ class _Program:
         self._limits = [self._limited(limit.function, limit.maximum, violation) for limit in program.limits]
         self._problem = cp.Problem(cp.Minimize(sum(terms) + violation if terms or relaxed else 0), self._constraints)
 
-    def solve(self) -> bool:
-        """Solve with several settings; return True at the first success."""
+    def solve(self) -> tuple[Array, ConvexDuals] | None:
+        """Return stiffnesses within their bounds [N/m], shape (n,), and duals, by the first settings that succeed."""
         for settings in (TIGHT, *ATTEMPTS):
             with warnings.catch_warnings():
                 # the certificate measures the accuracy
@@ -82,20 +82,11 @@ class _Program:
                 with suppress(cp.error.SolverError):
                     self._problem.solve(solver=cp.CLARABEL, **settings)
             if self._problem.status == cp.OPTIMAL:
-                return True
-        return False
-
-    @property
-    def x(self) -> Array:
-        """Stiffnesses within their bounds [N/m], shape (n,)."""
-        return np.asarray(np.clip(np.asarray(self.y.value) * self.scale, self.program.lower, self.program.upper))
-
-    @property
-    def duals(self) -> ConvexDuals:
-        """Duals in the units of the program."""
-        limits = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
-        vectors = tuple(_vector(cone) for cone in self._cones)
-        return ConvexDuals(vectors, tuple(price for price, _ in limits), tuple(dual for _, dual in limits))
+                x = np.clip(np.asarray(self.y.value) * self.scale, self.program.lower, self.program.upper)
+                limits = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
+                prices, duals = tuple(price for price, _ in limits), tuple(dual for _, dual in limits)
+                return np.asarray(x), ConvexDuals(tuple(_vector(cone) for cone in self._cones), prices, duals)
+        return None
 
     def _epigraph(self, function: ConvexFunction) -> tuple[Any, Any]:
         # expression of the function, and the cone of its dual vector
