@@ -16,7 +16,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import worker_pool
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -118,12 +118,31 @@ def _search_and_bound(
         best = search.best_or_initial
         timing = {"model": model_time - started, "solve": time.perf_counter() - model_time}
         if best is None or best.design.violation > FEASIBILITY_TOL:
-            return _without_design(problem, search, initial, division, timing), search.turns
+            conflict = _proven_conflict(problem)
+            if not conflict and division.bound == math.inf:
+                conflict = minimal_conflict(problem)
+            result = infeasible_result(problem, initial, conflict, timing)
+            return result if conflict else failed_search(search, result), search.turns
         if rebalanced is None or first_best is None or first_best.design.values != best.design.values:
             # a prover has found a better design
             rebalanced = _rebalanced(best)
-    best, gap = rebalanced
-    return _result(search, initial, best, gap, division, timing, defer_bounds), search.turns
+    best, balance_gap = rebalanced
+    design, optimum, bound = best.design, best.optimum, division.bound
+    zero_level = numerical_zero(problem, design.evaluation.engine)
+    # the bound is not valid for moved throws
+    if moves is None and problem.search.proves and gap_of(design.value, bound, zero_level) > problem.tolerance:
+        bound = max(bound, mounts_bound(problem, () if defer_bounds else design.values))
+    proof = ProofData(
+        bound=bound,
+        strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
+        kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
+        method=_method(search.optima, max(design.value, zero_level), balance_gap, division),
+        prices=best.joint.prices(optimum) if optimum is not None else {},
+    )
+    if moves is not None:
+        # prices of limits refer to the problem with open throws
+        design = replace(design, problem=replace(design.problem, phasing=moves.phasing))
+    return build_result(design, initial, proof, timing), search.turns
 
 
 def _rebalanced(best: SearchResult) -> tuple[SearchResult, float | None]:
@@ -211,34 +230,6 @@ def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
     return total + sum(result.certificate.lower_bound for result in results if result.certificate is not None)
 
 
-def _result(
-    search: MountSearch,
-    initial: Evaluation,
-    best: SearchResult,
-    balance_gap: float | None,
-    division: BoxResult,
-    timing: dict[str, float],
-    defer_bounds: bool,
-) -> Result:
-    problem, design, optimum = search.problem, best.design, best.optimum
-    zero_level = numerical_zero(problem, design.evaluation.engine)
-    bound = division.bound
-    # the bound is not valid for moved throws
-    if search.moves is None and problem.search.proves and gap_of(design.value, bound, zero_level) > problem.tolerance:
-        bound = max(bound, mounts_bound(problem, () if defer_bounds else design.values))
-    proof = ProofData(
-        bound=bound,
-        strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
-        kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
-        method=_method(search.optima, max(design.value, zero_level), balance_gap, division),
-        prices=best.joint.prices(optimum) if optimum is not None else {},
-    )
-    if search.moves is not None:
-        # prices of limits refer to the problem with open throws
-        design = replace(design, problem=replace(design.problem, phasing=search.moves.phasing))
-    return build_result(design, initial, proof, timing)
-
-
 def _method(optima: Sequence[LocalOptimum], scale: float, balance_gap: float | None, division: BoxResult) -> str:
     ends = distinct_optima(optima, scale)
     text = describe_starts(optima, len(ends))
@@ -247,16 +238,6 @@ def _method(optima: Sequence[LocalOptimum], scale: float, balance_gap: float | N
     if balance_gap is not None:
         text += f"; balance on these mounts proven within {balance_gap:.0e}"
     return f"{text}; bounds of mounts from {counted(division.boxes, 'box')}" if division.boxes else text
-
-
-def _without_design(
-    problem: Problem, search: MountSearch, initial: Evaluation, division: BoxResult, timing: dict[str, float]
-) -> Result:
-    conflict = _proven_conflict(problem)
-    if not conflict and division.bound == math.inf:
-        conflict = minimal_conflict(problem)
-    result = infeasible_result(problem, initial, conflict, timing)
-    return result if conflict else failed_search(search, result)
 
 
 def failed_search(search: MountSearch, result: Result) -> Result:
