@@ -319,17 +319,18 @@ def bisect_box(
     witness
         Known design that checks the bounds, or None.
     """
-    return next(bisect_in_stages(bounder, lower, upper, value, gap_tolerance, [max_boxes], witness))
+    return next(bisect_in_stages(bounder, lower, upper, value, gap_tolerance, max_boxes, (1.0,), witness))
 
 
 def bisect_in_stages(
-    bounder: BoxBounds, lower: Array, upper: Array, value: float, gap_tolerance: float, max_boxes: Sequence[int],
-    witness: Witness | None = None,
+    bounder: BoxBounds, lower: Array, upper: Array, value: float, gap_tolerance: float, max_boxes: int,
+    shares: Sequence[float], witness: Witness | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield the result of `bisect_box` after each of these increasing numbers of boxes, in one continued search."""
+    """Yield the result of `bisect_box` after each of these increasing shares of its boxes; nothing if it has none."""
     bisection = BatchBisection(bounder, value, gap_tolerance, witness)
-    for k, count in enumerate(max_boxes):
-        result = bisection.run(None if k else bisection.bound_boxes([(lower, upper)])[0], count)
+    for k, share in enumerate(shares if max_boxes else ()):
+        root = None if k else bisection.bound_boxes([(lower, upper)])[0]
+        result = bisection.run(root, math.ceil(share * max_boxes))
         if witness is not None and not k:
             bisection.check_near(lower, upper, witness)
         yield result

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -94,10 +95,8 @@ def load_bounds(
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return
     boxes = LoadBoxes(problem, OMITTED_SHARE * gap_tolerance, throws)
-    maximum = boxes.max_boxes
-    if maximum and boxes.is_sampled_fully:
-        counts = [math.ceil(share * maximum) for share in shares]
-        yield from bisect_in_stages(boxes, boxes.lower, boxes.upper, value, gap_tolerance, counts, witness)
+    ends = boxes.lower, boxes.upper
+    yield from bisect_in_stages(boxes, *ends, value, gap_tolerance, boxes.max_boxes, shares, witness)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
@@ -147,7 +146,7 @@ class LoadBoxes:
         if not budgets or self._ratios:
             return {}
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            box = _Boxes(self.loads, self._orders, self._numbers, self.lower[None], self.upper[None], self._ratios)
+            box = _Boxes(self.loads, self._orders, self._numbers, self.lower[None], self.upper[None])
             size = np.array([np.nan_to_num(box.response(measure).maximum[0], nan=np.inf) for measure in budgets])
             share = np.max(size / np.array([*budgets.values()])[:, None], axis=0)
         order = np.argsort(share, kind="stable")
@@ -155,11 +154,6 @@ class LoadBoxes:
         self._orders = self._orders.subset(np.setdiff1d(np.arange(len(share)), small))
         # a peak to peak is at most twice the largest length
         return {m: (2.0 if m.norm.is_diameter else 1.0) * float(size[k, small].sum()) for k, m in enumerate(budgets)}
-
-    @property
-    def is_sampled_fully(self) -> bool:
-        """True if sums of squares over orders equal those over samples, as remainders assume."""
-        return self._orders.is_full
 
     @property
     def _cost(self) -> float:
@@ -181,12 +175,13 @@ class LoadBoxes:
     @property
     def max_boxes(self) -> int:
         """Box budget: as requested, or for some seconds."""
-        return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)))
+        # remainders suppose that sums of squares over orders equal those over samples
+        return 0 if not self._orders.is_full else self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)))
 
     @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Return lower bounds of boxes of shape (boxes, n), infinite without a feasible design, and sides to halve."""
-        box = _Boxes(self.loads, self._orders, self._numbers, lower, upper, self._ratios)
+        box = _Boxes(self.loads, self._orders, self._numbers, lower, upper)
         points = self._nearest(box)
         lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
         scores, size = np.zeros_like(lower), np.zeros(len(lower))
@@ -263,9 +258,10 @@ class _Boxes:
     """
 
     def __init__(
-        self, loads: MountedLoads, orders: LoadedOrders, numbers: int, lower: Array, upper: Array, ratios: bool
-    ) -> None:
+        self, loads: MountedLoads, orders: LoadedOrders, numbers: int, lower: Array, upper: Array
+    ) -> None:  # fmt: skip
         self._loads, self._numbers, self.lower, self.upper = loads, numbers, lower, upper
+        self._omegas = orders.omegas
         self.columns = lower.shape[1] - numbers
         self.count = lower.shape[1] + numbers * self.columns
         centres, self._halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
@@ -284,16 +280,20 @@ class _Boxes:
         self._columns: ComplexArray = np.concatenate(
             [fixed, column_loads, 1j * slope * throw_loads, remainder * throw_loads], axis=2
         )
-        sides = list(zip(lower[:, :numbers], upper[:, :numbers], strict=True))
-        self._running = self._expanded([mount_loop(loads.problem, orders.omegas, *box) for box in sides])
-        zero_speeds = np.zeros_like(orders.omegas)
-        self._static = (
-            self._expanded([mount_loop(loads.problem, zero_speeds, *box) for box in sides]) if ratios else None
-        )
         self._cache: dict[tuple[bool, tuple[int, ...], tuple[float, ...], bool], LinearResponse] = {}
 
-    def _expanded(self, loops: list[Loop]) -> tuple[list[Loop], list[Expansion]]:
-        """Return the loops, and one expansion for the fixed loads and for each column."""
+    @cached_property
+    def _running(self) -> tuple[list[Loop], list[Expansion]]:
+        return self._expanded(self._omegas)
+
+    @cached_property
+    def _resting(self) -> tuple[list[Loop], list[Expansion]]:
+        return self._expanded(np.zeros_like(self._omegas))
+
+    def _expanded(self, omegas: Array) -> tuple[list[Loop], list[Expansion]]:
+        """Return the loops of all boxes, and one expansion for the fixed loads and for each column."""
+        boxes = zip(self.lower[:, : self._numbers], self.upper[:, : self._numbers], strict=True)
+        loops = [mount_loop(self._loads.problem, omegas, *box) for box in boxes]
         gain, inputs = np.array([loop.gain for loop in loops]), np.array([loop.inputs for loop in loops])
         balance, balanced_gain, maximum = balanced(gain)
         numbers = loops[0].numbers
@@ -316,7 +316,7 @@ class _Boxes:
         rows, factors = counted_rows(self._loads.problem, measure)
         key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), at_rest)
         if key not in self._cache:
-            loops, expansions = self._static if at_rest and self._static is not None else self._running
+            loops, expansions = self._resting if at_rest else self._running
             parts = ((loop.travels if key[0] else loop.forces) for loop in loops)
             value, slope_maps = (
                 np.array(matrices)[:, :, rows] * factors[:, None] for matrices in zip(*parts, strict=True)

@@ -67,17 +67,10 @@ def stiffness_bounds(
     witness
         Incumbent by its stiffnesses, to check bounds; None without one.
     """
-    search = StiffnessBoxes(
-        problem,
-        LEFT_OUT * gap_tolerance,
-        value - GAP_SAFETY * gap_tolerance if value < math.inf else math.inf,
-    )
-    maximum = search.max_boxes
-    if maximum and search.is_sampled_fully:
-        counts = [math.ceil(share * maximum) for share in shares]
-        yield from bisect_in_stages(
-            search, search.model.lower, search.model.upper, value, gap_tolerance, counts, witness
-        )
+    cutoff = value - GAP_SAFETY * gap_tolerance if value < math.inf else math.inf
+    search = StiffnessBoxes(problem, LEFT_OUT * gap_tolerance, cutoff)
+    ends = search.model.lower, search.model.upper
+    yield from bisect_in_stages(search, *ends, value, gap_tolerance, search.max_boxes, shares, witness)
 
 
 class SimulatedBoxes(Protocol):
@@ -168,6 +161,8 @@ class StiffnessBoxes:
     @property
     def max_boxes(self) -> int:
         """Box budget: as requested, or for a few seconds."""
+        if not self.is_sampled_fully:
+            return 0
         is_tractable = len(self.problem.mount_decisions) <= MAX_OPEN
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MAX_BOXES)) if is_tractable else 0)
 
