@@ -243,14 +243,9 @@ def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound
         Its dual rows, on its own grid.
     """
     interpolated = interpolate_duals(problem, solution)
-    aligned = Multipliers(
-        tuple(
-            norm.norm.aligned_dual(norm.grid, norm.rows(x), z)
-            for (_, norm), z in zip(problem.terms, interpolated.terms, strict=True)
-        ),
-        interpolated.limits,
-    )
-    proposals = (lower_bound(problem, rows) for rows in (interpolated, aligned))
+    pairs = zip(problem.terms, interpolated.terms, strict=True)
+    aligned = tuple(norm.norm.aligned_dual(norm.grid, norm.rows(x), z) for (_, norm), z in pairs)
+    proposals = (lower_bound(problem, rows) for rows in (interpolated, replace(interpolated, terms=aligned)))
     best, value = max(proposals, key=lambda bound: bound.value), problem.objective(x)
     for _ in range(CORRECTIONS):
         if value - best.value > WORTHWHILE_GAP * best.value:

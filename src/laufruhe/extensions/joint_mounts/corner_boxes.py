@@ -163,23 +163,19 @@ class DesignBoxes:
         if any(corner.min() > 0.0 for corner in violations):
             return math.inf, 0
         balanced_loop = self.balanced_loop(lower, upper)
+        widths = (upper - lower) / (self.upper - self.lower)
         if not (balanced_loop.maximum[self._counted] < WORTH).all():
             # halve until the series of all orders converge
-            return 0.0, int(
-                np.argmax(balanced_loop.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower))
-            )
+            return 0.0, int(np.argmax(balanced_loop.scores(self._counted) + EVEN * widths))
         places = [np.where(vertex < 0.0, lower, upper) for vertex in corners_of(len(lower))]
         known_corners = [self._corners.get(tuple(place.tolist())) for place in places]
         rough_result, is_budget_spent = None, len(self._corners) >= self.max_corners
         if is_budget_spent and not any(known_corners):
-            return 0.0, int(np.argmax((upper - lower) / (self.upper - self.lower)))
+            return 0.0, int(np.argmax(widths))
         if any(known_corners) and not all(known_corners):
             # multipliers of adjacent vertices suffice if all designs of the box are worse by far
-            rough_result = self._mixed(
-                balanced_loop,
-                violations,
-                [corner or _adjacent(places, known_corners, k) for k, corner in enumerate(known_corners)],
-            )
+            near_corners = [corner or _adjacent(places, known_corners, k) for k, corner in enumerate(known_corners)]
+            rough_result = self._mixed(balanced_loop, violations, near_corners)
             if rough_result[0] >= self.value or is_budget_spent:
                 return rough_result
         bound, side = self._mixed(balanced_loop, violations, [self.corner(place) for place in places])
@@ -191,9 +187,8 @@ class DesignBoxes:
         loaded_loop = self.loaded(loop, centre)
         ends = np.array([domain.ends for domain in self.loads.domains for _ in range(domain.width)]).reshape(-1, 2)
         reach = np.append(1.0, np.abs(ends - centre[:, None]).max(axis=1))
-        quadratics, rests = zip(
-            *(self.expanded(corner.pairing, loaded_loop, centre) for corner in corners), strict=True
-        )
+        expansions = (self.expanded(corner.pairing, loaded_loop, centre) for corner in corners)
+        quadratics, rests = zip(*expansions, strict=True)
         remainder = np.array(rests) @ reach
         if not (np.isfinite(remainder).all() and np.isfinite(quadratics).all()):
             return 0.0, int(np.argmax(loop.scores(np.ones_like(self._counted))))
@@ -201,9 +196,8 @@ class DesignBoxes:
         minimum = np.array([line[0] + self.minimum(line[1:], centre) for line in mixes])
         # weights of vertices add up to one, so the remainder is at most that of the worst vertex
         minimum = priced(minimum, violations) - remainder.sum(axis=1).max()
-        scores = (
-            _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ remainder[remainder.sum(axis=1).argmax()]
-        )
+        worst = remainder[remainder.sum(axis=1).argmax()]
+        scores = _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ worst
         return max(float(minimum.min()), 0.0), int(np.argmax(scores))
 
     def balanced_loop(self, lower: Array, upper: Array) -> _BalancedLoop:

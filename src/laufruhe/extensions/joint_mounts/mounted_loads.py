@@ -98,11 +98,9 @@ class MountedLoads:
         problem = self.problem
         measures = [*(t.measure for t in problem.load_terms), *(limit.measure for limit in problem.load_limits)]
         places = [mount.name for mount in problem.engine.mounts]
-        return sum(
-            self.samples * len(measure.places(places)) * int(np.count_nonzero(measure.shares(problem.points)))
-            for measure in measures
-            if measure.on_mounts
-        )
+        measures = [measure for measure in measures if measure.on_mounts]
+        counts = (len(m.places(places)) * int(np.count_nonzero(m.shares(problem.points))) for m in measures)
+        return self.samples * sum(counts)
 
     def at(self, mounts: Array) -> AffineProblem:
         """Return norms as functions of the unbalances, for mounts of shape (n,); infinite on an undamped resonance."""

@@ -122,11 +122,7 @@ class _Steps:
     def problem(self) -> Problem:
         """Problem with rows of these steps; limits without such steps are omitted."""
         rows_of_steps = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
-        limits = (
-            limit
-            for limit in self._problem.limits
-            if not limit.measure.channel.simulation or limit.measure in rows_of_steps
-        )
+        limits = [x for x in self._problem.limits if not x.measure.channel.simulation or x.measure in rows_of_steps]
         return replace(self._problem, known_rows=rows_of_steps, limits=tuple(limits))
 
     def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:

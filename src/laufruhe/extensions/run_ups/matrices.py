@@ -36,11 +36,8 @@ class RunMatrices:
         """Stiffness, loss and damping of E25 and E26."""
         drag = self.base.damping.copy()
         drag[:6, :6] = self._lowest("damping")
-        return LinearMaps(
-            Linear(self.base.stiffness, self._square("stiffness").slopes),
-            self._square("loss"),
-            Linear(drag, self._square("damping").slopes),
-        )
+        position = Linear(self.base.stiffness, self._square("stiffness").slopes)
+        return LinearMaps(position, self._square("loss"), Linear(drag, self._square("damping").slopes))
 
     @cached_property
     def loss_factor(self) -> float:

@@ -15,11 +15,10 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult
-from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import is_stiffness_problem
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL, ProofData, build_result, infeasible_result
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, build_result, infeasible_result
 from laufruhe.solvers.mounts.bounds import bound_search, minimal_conflict
-from laufruhe.solvers.mounts.nonlinear import failed_search
+from laufruhe.solvers.mounts.nonlinear import failed_search, search_proof
 from laufruhe.solvers.mounts.search import NEAR, MountSearch
 from laufruhe.solvers.mounts.starts import start_of_result
 from laufruhe.solvers.result import Result
@@ -59,14 +58,8 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
         return result if conflict else failed_search(search, result)
     certificate = None if relaxed is None else relaxed.certificate
     relaxed_bound = 0.0 if certificate is None else certificate.lower_bound
-    optimum = best.optimum
-    proof = ProofData(
-        bound=max(relaxed_bound, box_result.bound),
-        strength=ProofStrength.PARTIAL if box_result.boxes else ProofStrength.RELAXED,
-        kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
-        method=_method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, box_result),
-        prices={} if optimum is None else best.joint.prices(optimum),
-    )
+    method = _method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, box_result)
+    proof = search_proof(best, box_result, max(relaxed_bound, box_result.bound), method)
     return build_result(replace(best.design, problem=problem), initial, proof, timing)
 
 

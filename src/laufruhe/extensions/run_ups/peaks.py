@@ -141,15 +141,11 @@ class RunPeaks:
 
     def _signals(self, points: Sequence[Array]) -> list[list[Array] | None]:
         """Return the signals of measures in both runs for each point; None if steps fail."""
-        models = [self._model(point[: len(self._decisions)]) for point in points]
-        wrenches = [
-            [
-                sum((u * loads for u, loads in zip(point[len(self._decisions) :], column_wrenches, strict=True)), base)
-                for point in points
-            ]
-            for base, column_wrenches in self._wrenches
-        ]
-        runs = [responses_to(models, sweep, loads) for sweep, loads in zip(self.sweeps, wrenches, strict=True)]
+        count, runs = len(self._decisions), []
+        models = [self._model(point[:count]) for point in points]
+        for sweep, (base, columns) in zip(self.sweeps, self._wrenches, strict=True):
+            pairs = (zip(point[count:], columns, strict=True) for point in points)
+            runs.append(responses_to(models, sweep, [sum((u * loads for u, loads in each), base) for each in pairs]))
         return [
             None if any(response is None for response in responses) else [
                 signal_of(measure, response)

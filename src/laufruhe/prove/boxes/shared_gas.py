@@ -241,12 +241,9 @@ class SharedGasBoxes:
             return math.sqrt(
                 sum(w * float(np.mean(k**2)) * s for w, k, s in zip(shares, gains, squares, strict=True) if w)
             )
-        tops = [
-            math.sqrt(2.0 * len(measure.orders) * square)
-            if measure.orders is not None
-            # a change less its mean is at most its largest value and its mean together
-            else float(change.max() + measure.alternating * change.mean())
-            for change, square in zip(changes, squares, strict=True)
-        ]
+        # a change less its mean is at most its largest value and its mean together
+        tops = [float(change.max() + measure.alternating * change.mean()) for change in changes]
+        if measure.orders is not None:
+            tops = [math.sqrt(2.0 * len(measure.orders) * square) for square in squares]
         twice = norm.value(Grid(np.ones(2), 2), np.array([[1.0], [-1.0]]))
         return twice * max((float(k.max()) * t for w, k, t in zip(shares, gains, tops, strict=True) if w), default=0.0)

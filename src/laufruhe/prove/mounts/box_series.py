@@ -71,11 +71,9 @@ class Sides:
 
     def sum_by_number(self, values: Any) -> Any:
         """Sum over the columns of each number, (..., m) to (..., n)."""
-        return (
-            values
-            if len(self.number_of_column) == self.count
-            else values @ (self.number_of_column[:, None] == np.arange(self.count))
-        )
+        if len(self.number_of_column) == self.count:
+            return values
+        return values @ (self.number_of_column[:, None] == np.arange(self.count))
 
 
 def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:

@@ -117,15 +117,8 @@ class StiffnessBoxes:
         self.constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
         self._terms = [(term.weight, term.measure, *_relevant_lines(self.model, term.measure, share)) for term in terms]
-        self._limits = [
-            (
-                limit.maximum * (1.0 + SLACK),
-                limit.measure,
-                *_relevant_lines(self.model, limit.measure, SLACK * limit.maximum),
-            )
-            for limit in problem.limits
-            if limit.measure.on_mounts
-        ]
+        limits = [(limit.maximum, limit.measure) for limit in problem.limits if limit.measure.on_mounts]
+        self._limits = [(x * (1.0 + SLACK), m, *_relevant_lines(self.model, m, SLACK * x)) for x, m in limits]
         numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
         self._priced = [limit for limit in numbers if limit.measure.channel in LINEAR_BOUNDS]
         # orders of each transmissibility

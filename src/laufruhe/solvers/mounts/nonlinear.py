@@ -127,22 +127,29 @@ def _search_and_bound(
             # a prover has found a better design
             rebalanced = _rebalanced(best)
     best, balance_gap = rebalanced
-    design, optimum, bound = best.design, best.optimum, division.bound
+    design, bound = best.design, division.bound
     zero_level = numerical_zero(problem, design.evaluation.engine)
     # the bound is not valid for moved throws
     if moves is None and problem.search.proves and gap_of(design.value, bound, zero_level) > problem.tolerance:
         bound = max(bound, mounts_bound(problem, () if defer_bounds else design.values))
-    proof = ProofData(
-        bound=bound,
-        strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
-        kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
-        method=_method(search.optima, max(design.value, zero_level), balance_gap, division),
-        prices=best.joint.prices(optimum) if optimum is not None else {},
+    proof = search_proof(
+        best, division, bound, _method(search.optima, max(design.value, zero_level), balance_gap, division)
     )
     if moves is not None:
         # prices of limits refer to the problem with open throws
         design = replace(design, problem=replace(design.problem, phasing=moves.phasing))
     return build_result(design, initial, proof, timing), search.turns
+
+
+def search_proof(best: SearchResult, division: BoxResult, bound: float, method: str) -> ProofData:
+    """Return the proof of the best result of a search by a lower bound [SI]."""
+    return ProofData(
+        bound=bound,
+        strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
+        kkt_residual=best.optimum.kkt_residual if best.optimum is not None else math.inf,
+        method=method,
+        prices=best.joint.prices(best.optimum) if best.optimum is not None else {},
+    )
 
 
 def _rebalanced(best: SearchResult) -> tuple[SearchResult, float | None]:
@@ -192,11 +199,9 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     # measures without loads do not depend on unbalances
     limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.depends_on_loads)
     mounts_only = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
-    return (
-        minimal_conflict(mounts_only)
-        if is_stiffness_problem(mounts_only) and are_contradictory(mounts_only, limits)
-        else ()
-    )
+    if not is_stiffness_problem(mounts_only) or not are_contradictory(mounts_only, limits):
+        return ()
+    return minimal_conflict(mounts_only)
 
 
 def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:

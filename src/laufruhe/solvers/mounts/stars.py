@@ -118,13 +118,10 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
     designs = search_designs(
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(model.problem)
     )
-    stars: list[tuple[float, Star]] = [
-        (
-            s.value,
-            (family.candidate(phasing, s.star, phasing.without(s.built)), None if family.is_of_orders else s.star),
-        )
-        for s in designs.solved
-    ]
+    stars: list[tuple[float, Star]] = []
+    for solved in designs.solved:
+        candidate = family.candidate(phasing, solved.star, phasing.without(solved.built))
+        stars.append((solved.value, (candidate, None if family.is_of_orders else solved.star)))
     return stars, designs.designs
 
 
@@ -263,11 +260,9 @@ def _divide_boxes(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxRe
 def _method(designs: list[StarDesign], design_count: int) -> str:
     moved_count = sum(design.has_moved_throws for design in designs)
     even_count = len(designs) - moved_count
-    text = (
-        f"mounts and balance optimised for each of {counted(even_count, 'star')}"
-        if even_count
-        else "mounts, balance and throws optimised"
-    )
+    text = "mounts, balance and throws optimised"
+    if even_count:
+        text = f"mounts and balance optimised for each of {counted(even_count, 'star')}"
     if even_count and design_count > even_count:
         text += f", the best of {design_count} on the initial mounts"
     return f"{text}; throws moved from {counted(moved_count, 'start')}" if moved_count else text
@@ -277,14 +272,8 @@ def _ranking_entry(phasing: Phasing, design: StarDesign, proven: bool) -> Ranked
     certificate = design.result.certificate
     bound = certificate.lower_bound if certificate is not None else 0.0
     proven = proven and certificate is not None and certificate.kind is Proof.GLOBAL
-    return ranked_star(
-        _fix_firing_order(phasing, design.candidate, design.steps),
-        design.candidate,
-        design.steps,
-        design.value,
-        bound,
-        proven,
-    )
+    fixed = _fix_firing_order(phasing, design.candidate, design.steps)
+    return ranked_star(fixed, design.candidate, design.steps, design.value, bound, proven)
 
 
 def _fix_firing_order(phasing: Phasing, star: Candidate, steps: tuple[int, ...] | None) -> Phasing:
