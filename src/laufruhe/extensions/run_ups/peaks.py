@@ -145,7 +145,8 @@ class RunPeaks:
         models = [self._model(point[:count]) for point in points]
         for sweep, (base, columns) in zip(self.sweeps, self._wrenches, strict=True):
             pairs = (zip(point[count:], columns, strict=True) for point in points)
-            runs.append(responses_to(models, sweep, [sum((u * loads for u, loads in each), base) for each in pairs]))
+            wrenches = [sum((u * loads for u, loads in shares), base) for shares in pairs]
+            runs.append(responses_to(models, sweep, wrenches))
         return [
             None if any(response is None for response in responses) else [
                 signal_of(measure, response)
