@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -104,9 +103,17 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     # no search starts on a resonance
     count = _most_starts(problem) - (not initial.resonance)
     pool = _spread_over(problem) if count else np.zeros((0, len(decisions)))
-    with _evaluating(problem, initial, pool) as scores:
+    # higher orders hardly move the block, but take most of the time
+    loads = tuple(replace(load, wrench=load.wrench.series.truncated(POOL_ORDERS)) for load in initial.loads)
+    coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
+    shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
+    # workers evaluate the candidates while this process balances the initial design
+    with speculation(_scores, math.inf) as ahead:
+        with limit_time(POOL_TIME * seconds_left()):
+            ahead.prefetch(enumerate(shares))
         unbalances = _initial_balance(problem)
-        scored = scores()
+        with limit_time(POOL_TIME * seconds_left()):
+            scored = np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
     best = projected_vector(domains, [d.start for d in problem.unbalances] if unbalances is None else unbalances)
     starts = [] if initial.resonance else [([d.real_start for d in decisions], best)]
     if not count:
@@ -147,29 +154,11 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     return pool[indices], minimum
 
 
-@contextmanager
-def _evaluating(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Callable[[], Array]]:
-    """Evaluate points in workers; yield a function that waits for violation and objective, shape (points, 2).
+def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
+    """Return the sum of violations and the objective of a share of the points, shape (points, 2).
 
     Points not evaluated in time have infinite rows.
     """
-    # higher orders hardly move the block, but take most of the time
-    loads = tuple(replace(load, wrench=load.wrench.series.truncated(POOL_ORDERS)) for load in initial.loads)
-    coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
-    shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
-    with speculation(_scores, math.inf) as ahead:
-        with limit_time(POOL_TIME * seconds_left()):
-            ahead.prefetch(enumerate(shares))
-
-        def scores() -> Array:
-            with limit_time(POOL_TIME * seconds_left()):
-                return np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
-
-        yield scores
-
-
-def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
-    """Return the sum of violations and the objective of a share of the points, shape (points, 2)."""
     problem, coarse, points = share
     if not len(points):
         return np.zeros((0, 2))
