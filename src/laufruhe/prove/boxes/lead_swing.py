@@ -42,7 +42,7 @@ class LeadSwing:
     def __init__(self, problem: Problem, model: PhaseLeadModel, measure: Measure) -> None:
         fidelity, inertia = problem.fidelity, turning_inertia(problem.engine, problem.fidelity)
         if inertia is None:
-            raise ModelError("degree of irregularity: the inertia of what turns is not told; add [flywheel]")
+            raise ModelError("the degree of irregularity needs the inertia of all rotating parts; add [flywheel]")
         self._start, self._turning = model.start, inertia
         self._steps = FINE_SPEED * fidelity.samples
         names = model.names

@@ -144,7 +144,7 @@ class SharedGasBoxes:
         self._model = PhaseLeadModel(motored)
         self._names = self._model.names
         if not all(point.gas is None or isinstance(point.gas, Seiliger) for point in problem.points):
-            raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")
+            raise ModelError("an open lead between two cranks that share chambers needs a seiliger cycle")
         self._fixed = self._fixed_pistons(problem.engine)
         self._masses = {m: [self._slope(m, s) for s in range(len(self._names))] for m in self._measures}
         self._gains = {m: [self._gain(m, point) for point in problem.points] for m in self._measures}
@@ -161,14 +161,14 @@ class SharedGasBoxes:
                 if other is not part and part.faces(other):
                     have_leads = part.shaft.name in self._names, other.shaft.name in self._names
                     if have_leads == (True, True):
-                        why = "come earlier both, and one that stands is needed between two that share a chamber"
-                        raise ModelError(f"{part.shaft.name} and {other.shaft.name} {why}; fix one lead")
+                        names = f"{part.shaft.name} and {other.shaft.name}"
+                        raise ModelError(f"{names} share a chamber, and the leads of both are open; fix one lead")
                     if have_leads[1]:
                         fixed.append(part.name)
         parts_with_leads = (part for part in engine.slider_cranks if part.shaft.name in self._names)
         for part in parts_with_leads:
             if not any(part.faces(other) for other in engine.slider_cranks if other is not part):
-                why = "comes earlier with gas of its own beside chambers that are shared; fix its lead"
+                why = "has an open lead and gas of its own, while other chambers are shared; fix its lead"
                 raise ModelError(f"{part.shaft.name} {why}")
         return fixed
 
