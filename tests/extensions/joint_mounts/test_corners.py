@@ -15,7 +15,7 @@ from claims.test_broken_bounders import first_times, scaled
 from extensions.joint_mounts.test_mount_loops import SEEDS, boxes_of, joint
 from lanes import first_fast
 from laufruhe.errors import BoundError
-from laufruhe.extensions.joint_mounts import corner_boxes as design_boxes
+from laufruhe.extensions.joint_mounts import corner_boxes
 from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners, priced
 from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
 from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
@@ -154,10 +154,10 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
 @pytest.mark.slow
 def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = DesignBoxes(joint(780004), math.inf, lambda *_: math.inf)
-    count = boxes.loads.rows * boxes.loads.columns
+    count = boxes.loads.rows * 3 * (1 + sum(domain.width for domain in boxes.loads.domains))
     for maximum, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
-        monkeypatch.setattr(design_boxes, "MAX_NUMBERS", maximum)
-        monkeypatch.setattr(design_boxes, "MIN_CORNER_SHARE", few)
+        monkeypatch.setattr(corner_boxes, "MAX_NUMBERS", maximum)
+        monkeypatch.setattr(corner_boxes, "MIN_CORNER_SHARE", few)
         assert (boxes.max_boxes > 0) is worth
 
 
