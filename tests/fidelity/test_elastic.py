@@ -15,7 +15,7 @@ from fidelity.scenes import finer, random_elastic_problem
 from lanes import first_fast
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import Scale, reference
+from laufruhe.fidelity.error_bounds import ErrorReference, reference
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load
 from laufruhe.machine import Engine
@@ -59,7 +59,7 @@ def _violation(seed: int) -> tuple[float, float]:
     value = objective_value(own, found)
     truth = objective_value(problem, evaluate(finer(problem, 1009)))
     true = abs(value - truth) / value if value else 0.0
-    stated = Scale(own, best).error_of(found)
+    stated = ErrorReference(own, best).error_of(found)
     return true - stated, stated / true if true > 1e-6 else 1.0
 
 

@@ -10,7 +10,7 @@ import pytest
 from fidelity.scenes import finer, random_problem
 from lanes import first_fast
 from laufruhe.fidelity.automatic import choose
-from laufruhe.fidelity.error_bounds import Scale, reference
+from laufruhe.fidelity.error_bounds import ErrorReference, reference
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 
@@ -35,7 +35,7 @@ def _errors(seed: int, gas: bool | None = None, truth_samples: int = 5760) -> tu
     found = evaluate(own)
     value = objective_value(own, found)
     truth = objective_value(problem, evaluate(finer(problem, truth_samples)))
-    return abs(value - truth) / value if value else 0.0, Scale.of(own).error_of(found), own.fidelity
+    return abs(value - truth) / value if value else 0.0, ErrorReference.of(own).error_of(found), own.fidelity
 
 
 @pytest.mark.parametrize("seed", first_fast(range(QUICK), 30, 34))
@@ -70,7 +70,7 @@ def _violation(seed: int) -> tuple[float, bool]:
     value = objective_value(own, found)
     truth = objective_value(problem, evaluate(finer(problem, 1009)))
     has_gas = any(point.gas is not None for point in problem.points)
-    return (abs(value - truth) / value if value else 0.0) - Scale(own, best).error_of(found), has_gas
+    return (abs(value - truth) / value if value else 0.0) - ErrorReference(own, best).error_of(found), has_gas
 
 
 @pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 6, 8))

@@ -16,7 +16,7 @@ from fidelity.scenes import finer, random_elastic_problem, random_problem
 from lanes import first_fast
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.fidelity.automatic import ladder
-from laufruhe.fidelity.error_bounds import Scale, reference
+from laufruhe.fidelity.error_bounds import ErrorReference, reference
 from laufruhe.files.reader import load
 from laufruhe.load_models import uneven_model
 from laufruhe.load_models.uneven_model import UnevenModel, UnevenSymbols
@@ -46,7 +46,7 @@ def test_estimate_is_not_below_the_error(make, seed: int) -> None:
     except UncarriedLoadError:
         return
     value, truth = objective_value(own, found), objective_value(problem, evaluate(finer(problem, 7001)))
-    assert abs(value - truth) <= Scale(own, best).error_of(found) * max(value, 1e-300)
+    assert abs(value - truth) <= ErrorReference(own, best).error_of(found) * max(value, 1e-300)
 
 
 @pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
@@ -105,7 +105,7 @@ def test_stars_keep_the_choice() -> None:
     assert star.fidelity.gas_orders == 4
     found, best = evaluate(star), reference(star)
     value, truth = objective_value(star, found), objective_value(star, best)
-    assert 0.0 < abs(value - truth) <= Scale(star, best).error_of(found) * value
+    assert 0.0 < abs(value - truth) <= ErrorReference(star, best).error_of(found) * value
 
 
 def test_from_a_file(tmp_path: Path) -> None:
@@ -126,6 +126,8 @@ def test_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_trade_tries_it_where_there_is_gas() -> None:
-    rungs = dict(ladder(Scale.of(_scene(random_problem, 3))))
+    rungs = dict(ladder(ErrorReference.of(_scene(random_problem, 3))))
     assert rungs["exact, gas to order 12, 720 steps"].fidelity.gas_orders == 12
-    assert not any("gas to order" in name for name, _ in ladder(Scale.of(random_problem(random.Random(1), gas=False))))
+    assert not any(
+        "gas to order" in name for name, _ in ladder(ErrorReference.of(random_problem(random.Random(1), gas=False)))
+    )

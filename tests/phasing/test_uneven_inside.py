@@ -26,7 +26,7 @@ from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.throws.irregularity_bound import StoredWorkBound
+from laufruhe.prove.throws.irregularity_bound import IrregularityBound
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.star_results import solve_fixed
 from laufruhe.solvers.throws.throw_starts import start_candidates
@@ -245,7 +245,7 @@ def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
         own = replace(own, points=tuple(replace(point, speed=speed) for point in own.points))
         found, point = evaluate(own), own.points[0]
         work = found.value(Measure(CHANNELS["stored work"], NORMS["peak to peak"]))
-        minimum = StoredWorkBound.from_engine(own.engine, point, own.fidelity, inertia).degree(work)
+        minimum = IrregularityBound.from_engine(own.engine, point, own.fidelity, inertia).degree(work)
         exact = found.value(own.objective[0].measure)
         assert minimum <= exact
         shares.append(minimum / exact)

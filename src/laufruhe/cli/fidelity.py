@@ -84,8 +84,8 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
             for name, page in pages.items():
                 (stage / name).write_bytes(page)
     if len(trades) < len(problems):
-        what = f"{len(trades)} of {len(problems)} problems are measured, with pages in {folder}"
-        raise SolverError(f"the time limit is over: {what}; raise it")
+        what = f"{len(trades)} of {len(problems)} problems, whose pages are in {folder}"
+        raise SolverError(f"the time limit ended the trade after {what}; raise the time limit")
     ordered = [trades[k] for k in range(len(problems))]
 
     def as_json() -> str:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import UncarriedLoadError, plural
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, signals
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, signals
 from laufruhe.fidelity.options import has_gas
 from laufruhe.machine import Engine
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -106,10 +106,10 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     Its error bound is below the tolerance, if the reference is that exact. If the objective is zero, all parts that are
     not zero are computed. An uneven crank speed stays uneven.
     """
-    return choose_from_scale(Scale.of(problem, engine), tolerance)
+    return choose_from_scale(ErrorReference.of(problem, engine), tolerance)
 
 
-def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
+def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
     """Choose the cheapest fidelity as `choose` does, from error bounds relative to a known reference."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
@@ -132,7 +132,7 @@ def choose_from_scale(scale: Scale, tolerance: float) -> Choice:
     )
 
 
-def _cheapest(scale: Scale, allowed_error: float, fidelity: Fidelity) -> Fidelity:
+def _cheapest(scale: ErrorReference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
     """Return the cheapest sufficient fidelity; the allowed error is relative, and from all options together (F10)."""
     problem, loss = scale.problem, scale.relative_loss
     # at an uneven speed, gas and inertia affect all loads
@@ -175,7 +175,7 @@ def _first(
     return candidate
 
 
-def _with_few_modes(scale: Scale, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
+def _with_few_modes(scale: ErrorReference, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
     """Return the fidelity without modes of small response; modes that open rotors excite stay."""
     maximum = scale.relative_loss(fidelity) + allowed_loss
     result, modes = fidelity, scale.excited_modes
@@ -188,7 +188,7 @@ def _with_few_modes(scale: Scale, fidelity: Fidelity, allowed_loss: float) -> Fi
     return result
 
 
-def _description(scale: Scale, fidelity: Fidelity) -> list[str]:
+def _description(scale: ErrorReference, fidelity: Fidelity) -> list[str]:
     """Return descriptions of the physics that a fidelity computes."""
     problem, mounting = scale.problem, scale.mounting
     orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
@@ -208,7 +208,7 @@ def _description(scale: Scale, fidelity: Fidelity) -> list[str]:
     return [*lines, f"{fidelity.samples} steps over the cycle"]
 
 
-def _omitted_parts(scale: Scale, fidelity: Fidelity) -> list[OmittedPart]:
+def _omitted_parts(scale: ErrorReference, fidelity: Fidelity) -> list[OmittedPart]:
     """Return the parts that a fidelity omits, with upper bounds of their effect."""
     parts = []
 
@@ -258,15 +258,15 @@ def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
     return f"{plural('mode', len(named))} {', '.join(named)}"
 
 
-def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) -> Problem:
+def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None = None) -> Problem:
     """Return the problem at its automatic fidelity; `scale` is the reference if it is known."""
     if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
         # simulations have no error bound for omitted orders
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    return problem.at(choose_from_scale(scale or Scale.of(problem), tolerance).fidelity)
+    return problem.at(choose_from_scale(scale or ErrorReference.of(problem), tolerance).fidelity)
 
 
-def ladder(scale: Scale) -> list[tuple[str, Problem]]:
+def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
     """Return the fidelities that a trade compares: (name, problem at this fidelity) (F13)."""
     problem, mounting = scale.problem, scale.mounting
     has_gas = GAS.is_there(problem)

@@ -73,8 +73,8 @@ def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int
     return measure.norm.sampling_bound(signals(measure, evaluation), shares, evaluation.samples, finest)
 
 
-class Scale:
-    """Reference of one design, to which error bounds of cheaper models are relative.
+class ErrorReference:
+    """Evaluation of one design by the best model, to which error bounds of cheaper models are relative.
 
     Attributes
     ----------
@@ -94,8 +94,8 @@ class Scale:
         self._sampling_error = cache(lambda f: relative(self.sampling_error(self.evaluation(f)), self.value))
 
     @classmethod
-    def of(cls, problem: Problem, engine: Engine | None = None) -> Scale:
-        """Return the scale of a design; by default that of the problem as given."""
+    def of(cls, problem: Problem, engine: Engine | None = None) -> ErrorReference:
+        """Return the reference of a design; by default that of the problem as given."""
         return cls(problem, reference(problem, engine))
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
@@ -184,7 +184,7 @@ class Scale:
 
     @cached_property
     def open_wrenches(self) -> list[Spectrum]:
-        """Wrenches of unit unbalances of the open rotors, at all positions along their open axes."""
+        """Wrenches of unit unbalances of open rotors at their places, and with each open coordinate 1 m larger."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
         by_name = {rotor.name: rotor for rotor in rotors}
         for drive in (drive for decision in self.problem.decisions for drive in decision.place_drives):
@@ -221,7 +221,7 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
 
     The physics is that of the fidelity of `evaluation`. Infinite if only the objective is zero.
     """
-    scale = Scale(problem, evaluation)
+    scale = ErrorReference(problem, evaluation)
     bound = scale.sampling_error(evaluation) + ROUNDING * scale.value
     return relative(bound + sum(gas_sampling_errors(problem, evaluation)), scale.value)
 
@@ -234,7 +234,7 @@ def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float
     fidelity = evaluation.fidelity
     if not (fidelity.is_uneven or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
         return 0.0, 0.0
-    scale = Scale(problem, evaluation)
+    scale = ErrorReference(problem, evaluation)
     # mounts in the frequency domain, because integration in time takes long
     still = replace(fidelity, mounts="frequency") if fidelity.mounts == "time" else fidelity
     initial = evaluation if still is fidelity else scale.evaluation(still)

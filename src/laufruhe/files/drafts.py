@@ -97,7 +97,7 @@ def _draft(title: str, engine: str, built_engine: Engine) -> str:
 def _balance(engine: Engine) -> str:
     """Return the lines with counterweights and balancer shafts that may balance free forces and couples.
 
-    The free ones are those of first and second order without the roll moment; balancing pays for large ones.
+    Free forces and couples are those of first and second order without the roll moment. Small ones get no weight.
     """
     parts, speed = engine.slider_cranks, units.parse(SPEED, "rad/s")
     wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))

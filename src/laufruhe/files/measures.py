@@ -198,7 +198,12 @@ class MeasureContext:
         _check_known(of, [rotor.name for rotor in rotors], f"{where}.of", "counterweight or balancer")
         counted = counted_rotors(measure, rotors)
         if not counted and not counterweight_masses(measure, self.engine.slider_cranks):
-            raise Refused(where, measure.name, "counts no part of this engine", "add such a part, or leave it out")
+            raise Refused(
+                where,
+                measure.name,
+                "counts no part of this engine",
+                "add a counterweight or balancer shaft that it counts, or leave it out",
+            )
         for rotor in counted:
             try:
                 radius_of(rotor)

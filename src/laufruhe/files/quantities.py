@@ -72,7 +72,7 @@ QuantitiesTable = create_model(
 
 
 def with_followers(tables: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the tables with all numbers that follow from [quantities] set; `Refused` if one cannot be read."""
+    """Return the tables with all numbers that each quantity of [quantities] determines set; `Refused` if one cannot be read."""
     quantities = tables.get("quantities")
     if not isinstance(quantities, Mapping):
         return tables

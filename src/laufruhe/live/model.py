@@ -43,9 +43,9 @@ NO_SLIDERS = "Nothing that is open here can be moved live."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
-    """Return the page's model of a problem as read; numbers that are not affine keep the values of its result.
+    """Return the model of a live page; open numbers that are not affine keep the values of the result.
 
-    `is_served` is True if a server decides and evaluates numbers that do not follow.
+    `is_served` is True if a server decides and evaluates these numbers.
     """
     file = f"{problem.name}.toml"
     model = LiveModel(

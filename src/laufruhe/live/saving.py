@@ -49,7 +49,10 @@ NOT_SAVED = Saved()
 
 
 def saved_file(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
-    """Return the file of a design with placeholders for moving decisions; empty if it would not read back."""
+    """Return the problem file of a design; placeholders stand for the decisions with sliders.
+
+    The file is empty if the reader would not accept it.
+    """
     if problem.origin is None:
         return NOT_SAVED
     tables: Mapping[str, Any] = problem.origin.tables

@@ -152,7 +152,10 @@ def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
 
 
 def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
-    """Yield sizes of v on the heavy orders; a term with several of them divides its unit between them."""
+    """Yield sizes of the dual vector v on the orders `heavy` with the largest couples.
+
+    A term with several of these orders divides its unit between them.
+    """
     grid = [np.ones(len(heavy))]
     if any(np.count_nonzero(np.take(term.couple, heavy) > 0.0) > 1 for term in objective.terms):
         grid += [np.array(shares) for shares in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))]

@@ -28,7 +28,10 @@ _PARTS_OF_COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """Norm of the rows f . R of many designs: R has the shape (components, features, k), the features f (features,)."""
+    """Norm of the loads f . R of many designs: R has the shape (components, features, k).
+
+    The features f of a design are 1 and its open unbalances, shape (features,).
+    """
 
     norm: Norm
     rows: Array

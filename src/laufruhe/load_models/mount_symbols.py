@@ -161,7 +161,7 @@ class PointResponse:
 
 
 def response(mounts: SymbolicMounts, point: OperatingPoint, wrench: SymbolicSpectrum) -> PointResponse:
-    """Return the response of the block to loads R w."""
+    """Return the response of the block at one operating point to the wrench `wrench` of the loads."""
     real, imaginary, omegas = wrench.real, wrench.imaginary, wrench.orders * point.speed
     count, unit = len(omegas), ca.DM.eye(6)
     # dynamic less static stiffness

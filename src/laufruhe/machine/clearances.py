@@ -56,7 +56,10 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
 
 
 def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[Span]:
-    """Return (least, largest) distance from the origin that every balancer shaft sweeps to, as `distances` [m]."""
+    """Return the distance from the crank axis that each balancer shaft sweeps to [m], between two engines.
+
+    Every item has the smallest and the largest distance for shaft positions between those of the engines.
+    """
     low, high, origin = _shafts(lower), _shafts(upper), Shaft("origin")
     out = []
     for name in low if names is None else names:

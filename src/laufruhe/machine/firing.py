@@ -123,13 +123,16 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
 
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
-    """Return the throw angles of a star [rad], cylinder 1 at its dead centre at phi = 0 (C5)."""
+    """Return the throw angles of a crank star [rad], cylinder 1 at its dead centre at phi = 0 (C5)."""
     first = layout.dead_centre_turn(0)
     return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
 
 
 def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Yield the firing orders of a star, cylinder 1 first, each cylinder on a free firing of its step (S8)."""
+    """Yield the firing orders of a crank star, cylinder 1 first (S8).
+
+    Each cylinder takes a free firing slot at the crank angle of its throw.
+    """
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
     seen = [0] * len(pins)

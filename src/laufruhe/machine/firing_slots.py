@@ -178,7 +178,7 @@ class FiringSlots:
                 yield tuple((first, shapes[number]) for first, number in turned)
 
     def _timed(self, cover: Cover) -> FiringPattern | None:
-        """Return the firing moments that break the bounds least, and then are most even."""
+        """Return firing angles for banks that cover the cycle; they violate bounds least, then are most even."""
         from scipy.optimize import linprog
 
         count, cycle_angle = self.count, self.cycle.angle

@@ -22,7 +22,7 @@ from laufruhe.physics.rigid_body import ROLL
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the wrench of the gas: a roll moment, the reaction to its crank torque (L5; eq. 1)."""
     turns = engine.cycle.turns
-    # equal mechanisms differ only in when they fire
+    # equal mechanisms differ only in their firing angles
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in engine.slider_cranks:
         alike[alike_under(gas, part), part.shaft.ratio].append(part)

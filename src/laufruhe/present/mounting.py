@@ -62,7 +62,7 @@ def is_elastic(result: Result) -> bool:
 
 
 def facts_of(evaluation: Evaluation) -> MountingFacts:
-    """Return the facts of a design on elastic mounts."""
+    """Return sag, travel and natural modes of a design on elastic mounts, for tables."""
     mounting = mounting_in(evaluation.engine)
     weight = static_motion(mounting.modes, weight_wrench(mounting.block))
     travels = [np.abs(np.linalg.norm(loads.mount_travel.coefficients[0], axis=-1)).max()

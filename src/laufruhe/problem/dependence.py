@@ -182,7 +182,7 @@ def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bo
 
 
 def shares_gas(problem: Problem) -> bool:
-    """Return True if a piston with an open lead shares its gas with another one, and the gas affects a measure."""
+    """Return True if a piston on a shaft with open lead angle shares its gas, and the gas affects a measure."""
     names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
     moving = (part for part in parts if part.shaft.name in names)

@@ -8,7 +8,7 @@ from functools import partial
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import (
-    Scale,
+    ErrorReference,
     gas_sampling_errors,
     measure_sampling_error,
     relative,
@@ -53,7 +53,7 @@ def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
         return 0.0
     if problem.fidelity.tolerance is None:
         return sampling_error(problem, evaluation)
-    return Scale.of(problem, evaluation.engine).error_of(evaluation)
+    return ErrorReference.of(problem, evaluation.engine).error_of(evaluation)
 
 
 def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Result) -> Result:

@@ -92,7 +92,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 
 
 def _decision(decision: Decision, length: float, mass: float) -> Decision:
-    """Return a decision with its bounds and drives resized by factors on lengths and masses."""
+    """Return a decision whose bounds, start and unbalance gains are scaled by factors of lengths and masses."""
     size = {"": 1.0, "m": length, "kg": mass, "kg m": mass * length}[decision.unit]
     return replace(
         decision,

@@ -66,7 +66,7 @@ def _merged(complaints: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple
 
 
 def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
-    """Read and check a study, a file, its text or its tables.
+    """Read and check a study, a file, its text or its tables; a part with several readings becomes one part for each.
 
     `InputError` with one line for everything wrong: file, key, value, rule, remedy.
     """

@@ -117,8 +117,8 @@ class _Piece:
 def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[PointResult, None, None]:
     """Yield the answer of every task in any order; raise the error of the first task that fails.
 
-    Those who were given the work do all of it; processes of this machine are started once what is left would take
-    them clearly less time.
+    An executor that is set does all of the work. Without one, worker processes start as soon as they would finish the
+    remaining tasks clearly earlier.
     """
     started, first = time.perf_counter(), 0
     if current_executor() is None:

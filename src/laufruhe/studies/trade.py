@@ -13,7 +13,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import TIME_ORDERS, TIME_SAMPLES, ladder
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, reference
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
@@ -125,7 +125,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     if len(problem.ranks) > 1:
         left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
     problem = traded_part(problem)
-    scale = Scale.of(problem)
+    scale = ErrorReference.of(problem)
     say("solving the reference")
     decided = _Decided(scale)
     rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], TradeRow]()
@@ -179,7 +179,7 @@ class _Decided:
     that keeps the limits; zero of what cancels, NaN where none is.
     """
 
-    def __init__(self, scale: Scale) -> None:
+    def __init__(self, scale: ErrorReference) -> None:
         self._problem = problem = scale.problem
         self.initial_value, self.minimum = objective_value(problem, scale.best), math.nan
         self._known: Result | None = None
@@ -219,7 +219,7 @@ class _Decided:
         return replace(row, regret=row.optimum / self.minimum - 1.0) if self.minimum > 0.0 else row
 
 
-def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> TradeRow:
+def _row(name: str, variant: Problem, scale: ErrorReference, decided: _Decided) -> TradeRow:
     """Measure a fidelity, all but its regret."""
     evaluation, truth = evaluate(variant), decided.initial_value
     value = objective_value(variant, evaluation)

@@ -72,9 +72,9 @@ def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
 
 
 def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult | None:
-    """Evaluate stars with small couples, then search all that may be better (S46, S48).
+    """Evaluate crank stars with small couples, then search all crank stars that may be better (S46, S48).
 
-    None where stars differ by more than their couples, or anything else is open.
+    None if crank stars differ by more than their couples, or if unbalances or shafts are open.
     """
     if len(families) > 1 or problem.decisions or phasing.shafts.optional:
         return None

@@ -140,12 +140,12 @@ class OpenMounts:
 
     @cached_property
     def middle(self) -> Array:
-        """A at s = 0, shape (k, k)."""
+        """Stiffness matrix A at s = 0, the middle of the box, shape (k, k)."""
         return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, self.middles, strict=True)) + self.at_rest)
 
     @property
     def at_rest(self) -> Array:
-        """Static part of A from springs with stiffness that depends on frequency, shape (k, k)."""
+        """Static part of the stiffness matrix A, from springs that depend on frequency, shape (k, k)."""
         rows = self.dynamic.rows @ self.root.T
         return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(
             self.size, self.size

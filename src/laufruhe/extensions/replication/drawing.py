@@ -26,7 +26,7 @@ Names = Mapping[str, Any]
 
 
 def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
-    """Return the picture of a table, evaluated in each reading of the source."""
+    """Return the picture of a table, evaluated once for each interpretation ("reading") of the source."""
     width = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
     count, panels = sum(1 if panel.once else len(readings) for panel in table.panels), list[Panel]()
     for number, panel in enumerate(table.panels, 1):

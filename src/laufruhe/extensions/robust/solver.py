@@ -288,7 +288,7 @@ def _refine_sampling(adversary: Adversary, best: RobustDesign, zero_level: float
 
 
 def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) -> RobustDesign:
-    """Lower limits until the proven bound of a design satisfies them, if the bound alone violates them."""
+    """Tighten the limits of the program until the proven worst case of its design satisfies the given limits."""
     program.margin = best.margin
     for _ in until_time_limit(range(MAX_MARGINS)):
         if not FEASIBILITY_TOL < best.worst.violation <= MAX_MARGIN:

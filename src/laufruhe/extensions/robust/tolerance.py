@@ -47,7 +47,7 @@ class PistonDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with the error in the mass of one cylinder."""
+        """Return the engine drawing with the error in the reciprocating mass of one cylinder."""
         parts = list(drawing.engine.slider_cranks)
         part = parts[self.cylinder]
         mass = part.reciprocating_mass + self.gain * error.real

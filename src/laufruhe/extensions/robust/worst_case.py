@@ -95,7 +95,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
     bound = search.divide((-root.bound, _Node(np.zeros(count), blocks, root.split)), maximum)
     value, errors = search.best
     if is_over(bound, -value):
-        report(BoundError("errors that no engine exceeds", -bound, value))
+        report(BoundError("upper bound of the worst case over manufacturing errors", -bound, value))
     return WorstCase(errors, value, -bound, search.node_count)
 
 
@@ -104,7 +104,9 @@ def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> Non
     sides = [ErrorBlock(part, THIN * np.eye(part.stop - part.start)) for part in columns]
     thin = bound_node(terms, (1.0 - THIN) * worst.errors, sides, -math.inf, [{} for _ in terms])
     # the sum is maximised, and a witness bounds a minimum
-    Witness(worst.errors, -worst.value).check_near("errors that no engine exceeds", -thin.bound)
+    Witness(worst.errors, -worst.value).check_near(
+        "upper bound of the worst case over manufacturing errors", -thin.bound
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,7 +46,7 @@ class LinearMaps:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """S over boxes, in the modes of their middles, by open numbers from -1 to 1.
+    """Inverse square roots S of the stiffness over boxes, in the modes at their middles; open numbers from -1 to 1.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ def pairs_of(count: int) -> list[tuple[int, int]]:
 
 
 def roots(squares: Array, slopes: Array, size: int) -> Roots:
-    """Return S over boxes from the stiffness at their middles and its change over half a box, in the modes (E65).
+    """Return the inverse square roots S of the stiffness over boxes, from middles and half sides (E65).
 
     Parameters
     ----------

@@ -62,7 +62,7 @@ class RunMoments:
         return self.times * self.sweep.step
 
     def ending_at(self, place: int) -> LongSteps:
-        """Return long steps, one of which ends at short step `place`; before the start there is no load."""
+        """Return the long time steps of which one ends at short step `place`; before the start there is no load."""
         first = place % self.times
         if first not in self._known:
             self._known[first] = self._long_steps(first)

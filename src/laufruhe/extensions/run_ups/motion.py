@@ -150,11 +150,14 @@ class Steps:
         self.loads = [np.concatenate(power, axis=-1) for power in loads]
 
     def middle(self, moments: Array) -> Array:
-        """Return z0 from rest under moments of shape (boxes, moments x 6, steps), shape (boxes, 2 n, steps + 1)."""
+        """Return the states at the middle of the boxes, from rest under moments.
+
+        Moments have the shape (boxes, moments x 6, steps), states (boxes, 2 n, steps + 1).
+        """
         return _followed(self.moves[0], (self.loads[0] @ moments)[:, None])[:, 0]
 
     def orders(self, moments: Array, middle: Array) -> tuple[Array, Array]:
-        """Return z_j and z_jk."""
+        """Return the first and second derivatives z_j and z_jk of the states by the open numbers."""
         start_motion = middle[:, None, :, :-1]
         first = _followed(self.moves[0], self.moves[1] @ start_motion + self.loads[1] @ moments[:, None])
         driven = self.moves[2] @ start_motion + self.loads[2] @ moments[:, None]

@@ -27,9 +27,9 @@ _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
-    """Return the optimum of a problem with run-ups in objective or limits, over these kinds of open numbers.
+    """Return the optimum of a problem with run-ups in its objective or limits.
 
-    The function `decide` solves a problem without run-ups.
+    All open numbers are of `kinds`, such as unbalances or stiffness; `decide` solves a problem without run-ups.
 
     Raises
     ------

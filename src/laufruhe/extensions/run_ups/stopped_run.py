@@ -55,7 +55,7 @@ class _DesignBatch:
         return stop_force
 
     def next(self, z: ComplexArray, driven: ComplexArray) -> ComplexArray:
-        """Return the modes after one step, shape (designs, modes)."""
+        """Return the modes after one step, shape (designs, modes); `driven` is the change by the loads."""
         force = self.pressed(z)
         next_modes = self.decays * z
         next_modes += driven

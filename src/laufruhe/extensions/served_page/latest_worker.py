@@ -65,7 +65,7 @@ class LatestWorker:
                 self._changed.notify_all()
 
     def _turn(self) -> tuple[int, Processes]:
-        """Wait until the process is free; end overdue work."""
+        """Wait for the worker process, end overdue work; return the number of the request and the process."""
         with self._changed:
             self._newest += 1
             request_number = self._newest

@@ -83,7 +83,7 @@ def _edits(body: object, where: str) -> tuple[Edit, ...]:
         raise _strange(where, f"is no list of at most {MAX_EDITS} changes")
     for entry in body:
         if not isinstance(entry, list) or len(entry) != 3 or entry[0] not in _WAYS or not isinstance(entry[1], str):
-            raise _strange(where, "holds a change that is none of: " + ", ".join(_WAYS))
+            raise _strange(where, "holds a change of unknown kind; known kinds are " + ", ".join(_WAYS))
         if not _is_plain(entry[2]) or len(entry[1]) > LONGEST:
             raise _strange(where, f"holds a value of '{entry[1][:LONGEST]}' that no number has")
     return tuple(Edit(*entry) for entry in body)

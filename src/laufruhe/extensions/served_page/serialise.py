@@ -112,7 +112,7 @@ def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> d
 
 
 def ranking_of(result: Result) -> list[dict[str, Any]]:
-    """Return the stars of a result with firing orders, best first, in words and as requests."""
+    """Return the crank stars of a result with firing orders, best first, in words and as requests of the page."""
     if result.phasing is None:
         return []
     unit = result.problem.objective_unit or ""

@@ -72,7 +72,7 @@ def _bound(problem: Problem, model: SizeModel, design: Design) -> float:
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:
-    """Return the problem with the masses of its sizes as decisions, and the values of its decisions for `values`.
+    """Return a problem that decides masses in place of running-gear sizes, and its values for the sizes `values`.
 
     Limits on stresses and on sizes are omitted.
     """

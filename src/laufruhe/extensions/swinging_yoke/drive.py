@@ -37,7 +37,9 @@ class SwingingYokeDrive(DriveKind):
             raise KeyedError("pivot_distance", "is missing; add the distance between crank and pivot")
         if (ratio is None) == (length is None):
             state = "is missing" if ratio is None else "is given beside lever_length"
-            raise KeyedError("return_ratio", f"{state}; give one of return_ratio and lever_length")
+            raise KeyedError(
+                "return_ratio", f"{state}; give either return_ratio (slow by quick stroke) or lever_length"
+            )
         if ratio is not None and not ratio > 1.0:
             rule = "makes no quick return; give more than 1, 1.2 to 2 is usual"
             raise KeyedError("return_ratio", rule, f"{ratio:g}")

@@ -128,7 +128,10 @@ def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
 def _stop_errors(
     stops: Stops, expansion: Expansion, corner: Array, signs: Array, equilibrium: Array
 ) -> tuple[Array, Array]:
-    """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60)."""
+    """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60).
+
+    `signs` is +1 or -1 for a stop that acts in that direction, 0 for an open stop.
+    """
     response = mapped(expansion, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
     travel = np.asarray(response.value[:, 0].real)
     span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.remainder[:, 0, None]

@@ -46,7 +46,9 @@ class ArcBox:
         self._chord_errors = np.minimum(curvatures, 2.0)
 
     def functions(self, waves: ComplexArray, slopes: Array, shared: Array) -> Arcs:
-        """Evaluate the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
+        """Evaluate a separable function on arcs: the windows of throw angles theta and shared angles beta.
+
+        It is the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
 
         Parameters
         ----------

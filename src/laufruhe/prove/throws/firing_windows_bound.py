@@ -88,7 +88,10 @@ def star_bounds(costs: Array, stars: Stars) -> Array:
 
 
 def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
-    """Return the minimum of x_k a_p over the window of step p, shape (directions, throws, steps)."""
+    """Return the minimum of x_k a over the angle window of each step, shape (directions, throws, steps).
+
+    x_k is the position of throw k [m], and a the component of its rotating load along a dual direction.
+    """
     lower, upper = windows(phasing, intervals)
     v = dual_directions(objective)
     orders = np.array(objective.orders, dtype=float)

@@ -24,8 +24,10 @@ SAMPLED = 1e-4
 
 
 @dataclass(frozen=True)
-class StoredWorkBound:
-    """Relation between stored work and the degree of irregularity at one operating point (T11).
+class IrregularityBound:
+    """Lower bound of the degree of irregularity from stored work at one operating point (T11).
+
+    Stored work is the peak to peak of the excess work of the loads at constant speed.
 
     The energy is (m_max / 2 + (J_max - J_min) / 4) w_0^2, valid for cylinders at any phases [J].
     """
@@ -33,8 +35,10 @@ class StoredWorkBound:
     energy: float
 
     @classmethod
-    def from_engine(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float) -> StoredWorkBound:
-        """Return the bound for any firing angles; `inertia` is that of all rotating parts [kg m2]."""
+    def from_engine(
+        cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float
+    ) -> IrregularityBound:
+        """Return the bound for any firing angles of the cylinders; `inertia` is of all rotating parts [kg m2]."""
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
         cylinders = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
         inertias = [moving_inertia(cylinder, fidelity, angles)[0] for cylinder in cylinders]

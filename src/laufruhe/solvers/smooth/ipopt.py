@@ -178,7 +178,10 @@ class _Program:
 def _compiled_program(
     oracle: str, expand: bool, max_iterations: int, external_model: tuple[str, Peaks] | None, stay_near: bool = False
 ) -> _Program:
-    """Return the compiled solver of a program, which takes as long as several starts; `stay_near`: small barrier."""
+    """Return the compiled IPOPT solver of a serialised CasADi program; compiling takes as long as several starts.
+
+    `stay_near` starts with a small barrier.
+    """
     function, external = ca.Function.deserialize(oracle), None
     if expand:
         scalars = function.expand()

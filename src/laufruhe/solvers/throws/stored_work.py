@@ -16,7 +16,7 @@ from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.throws.irregularity_bound import StoredWorkBound
+from laufruhe.prove.throws.irregularity_bound import IrregularityBound
 
 
 def with_work_for_search(problem: Problem) -> Problem:
@@ -117,7 +117,7 @@ def _points(problem: Problem, measure: Measure) -> Sequence[str]:
     return [point.name for point in problem.points if measure.includes_point(point)]
 
 
-def _bounds(problem: Problem) -> dict[str, StoredWorkBound]:
+def _bounds(problem: Problem) -> dict[str, IrregularityBound]:
     inertia = turning_inertia(problem.engine, problem.fidelity)
     total = math.inf if inertia is None else inertia
-    return {p.name: StoredWorkBound.from_engine(problem.engine, p, problem.fidelity, total) for p in problem.points}
+    return {p.name: IrregularityBound.from_engine(problem.engine, p, problem.fidelity, total) for p in problem.points}

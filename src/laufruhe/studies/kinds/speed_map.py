@@ -120,7 +120,7 @@ class SpeedMapStudy(Part):
         return {replace(m, points=None): limit for m, limit in limits.items() if narrowed <= set(m.channel.keys)}
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return values, limits and orders of every design at every speed."""
+        """Return values, limits and orders of every design at every speed, for one point of the study."""
         problem = scenes.problem(point)
         load, limits = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
         measures = list(limits)
