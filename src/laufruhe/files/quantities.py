@@ -72,7 +72,10 @@ QuantitiesTable = create_model(
 
 
 def with_followers(tables: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the tables with all numbers that each quantity of [quantities] determines set; `Refused` if one cannot be read."""
+    """Return the tables with the numbers that the quantities of [quantities] determine.
+
+    `Refused` if a quantity cannot be read.
+    """
     quantities = tables.get("quantities")
     if not isinstance(quantities, Mapping):
         return tables

@@ -99,7 +99,7 @@ class FiringBounds:
     open_angles: tuple[tuple[float, float], ...] = ()
 
     @cached_property
-    def late(self) -> tuple[float, ...]:
+    def advance(self) -> tuple[float, ...]:
         """Crank angle by which every cylinder fires before a throw at theta = 0, open angles at zero, c_k [rad]."""
         layout, minimum = self.layout, sum(low for low, _ in self.open_angles)
         zero = [0.0] * len(layout.throw_positions)
@@ -177,7 +177,7 @@ class FiringBounds:
         every = np.array([*(self.throws or free), *self.open_angles])
         if self.throws is None:
             # cylinder 1 is at its dead centre when phi = 0
-            every[self.layout.pins[0]] = -self.late[0]
+            every[self.layout.pins[0]] = -self.advance[0]
         return every[:, 0], every[:, 1]
 
     @property
@@ -196,12 +196,12 @@ class FiringBounds:
 
     def rows(self, window: FiringWindow) -> tuple[Array, Array]:
         """Return firing intervals as A u + b of throws and open angles u, shapes (n, u) and (n,)."""
-        order, late = [number - 1 for number in window.order], self.late
+        order, advance = [number - 1 for number in window.order], self.advance
         throws = len(self.layout.throw_positions)
         moments = np.zeros((len(order), throws + len(self.open_angles)))
         moments[np.arange(len(order)), [self.layout.pins[k] for k in order]] = -1.0
         moments[:, throws:] = -np.array([self.share(k) for k in order])[:, None]
-        constants = math.tau * np.array(window.laps)[order] - np.array(late)[order]
+        constants = math.tau * np.array(window.laps)[order] - np.array(advance)[order]
         following = np.roll(constants, -1)
         following[-1] += self.cycle.angle
         return np.roll(moments, -1, axis=0) - moments, following - constants
@@ -229,7 +229,7 @@ class FiringBounds:
         used, last = {pins[j] for j in fired}, self._angle_index[before]
         back, there = paths[:, last].tolist(), paths[last].tolist()
         for k in candidates:
-            angle_index, still = self._angle_index[k], self.late[k] - self.late[before] + math.tau * laps[before]
+            angle_index, still = self._angle_index[k], self.advance[k] - self.advance[before] + math.tau * laps[before]
             # 2 pi l = interval + theta_own + c_own + t_before
             low = self.minimum + still - back[angle_index]
             high = min(self.maximum, math.tau) + still + there[angle_index]
@@ -245,8 +245,8 @@ class FiringBounds:
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
         """Return the paths with the bounds of one more interval, or None if infeasible."""
-        late = self.late
-        still = math.tau * (lap_after - lap_before) - late[after] + late[before]
+        advance = self.advance
+        still = math.tau * (lap_after - lap_before) - advance[after] + advance[before]
         still += self.cycle.angle if wrapped else 0.0
         maximum = self.maximum if wrapped else min(self.maximum, math.tau)
         # of orders that are rotations of each other, only the one with cylinder 1 first counts

@@ -190,7 +190,8 @@ def _indicator(result: Result) -> Table:
         pressures = (diagram.pressures.get(name, np.full(STEPS, math.nan)) for name in chamber_names)
         columns = np.column_stack([np.degrees(TURN), diagram.travel, diagram.force, diagram.needed, *pressures])
         rows += [[point, part, *row] for row in columns.tolist()]
-    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the gas on the piston [N]",
+    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke",
+            "force of the gas on the piston [N]",
             "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in chamber_names)]  # fmt: skip
     return Table(head, rows)
 

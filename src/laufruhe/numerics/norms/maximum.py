@@ -65,7 +65,7 @@ class Maximum(Norm):
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Add an epigraph variable to the nonlinear program, and return it; no softened length of a row exceeds it (E22)."""
+        """Add an epigraph variable to the nonlinear program and return it; no softened row exceeds it (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)
