@@ -183,6 +183,11 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
         return float(np.sort(objective_values(engines.terms, errors))[379])
 
     assert level(values) == pytest.approx(worst(shared), rel=1e-9)
+    # the initial design is judged by the same share of the same engines
+    engines = BuiltEngines(problem, problem.start, problem.fidelity.samples)
+    initial = np.sort(objective_values(engines.terms, errors))[379]
+    assert shared.objective is not None
+    assert shared.objective.initial == pytest.approx(initial, rel=1e-9)
     for k, step in itertools.product(range(2), (-2e-3, 2e-3)):
         moved = [v * (1.0 + step * (j == k)) for j, v in enumerate(values)]
         assert level(moved) >= worst(shared) * (1.0 - 3e-4)

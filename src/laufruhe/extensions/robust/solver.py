@@ -15,7 +15,13 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.robust.built_engines import Adversary, SampledEngines, WorstCaseAdversary, evaluate_built
+from laufruhe.extensions.robust.built_engines import (
+    Adversary,
+    SampledEngines,
+    WorstCaseAdversary,
+    WorstEngines,
+    evaluate_built,
+)
 from laufruhe.extensions.robust.conclusion import ActiveErrors, RobustDesign, infeasible_robust_result, robust_result
 from laufruhe.extensions.robust.tolerance import robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
@@ -79,7 +85,9 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     report_progress("worst errors of the drawing")
     adversary, robust = _minimise(problem, start, drawing)
     adversary = replace(adversary, samples=robust.samples)
-    initial_worst = adversary.at(problem.start, proven=False)
+    initial_worst, share = adversary.at(problem.start, proven=False), robust_of(problem).population.share
+    if share is not None and isinstance(adversary, SampledEngines):
+        initial_worst = _at_share(initial_worst, adversary, problem.start, share)
     seconds = time.perf_counter() - started
     if robust.conflict:
         return infeasible_robust_result(problem, initial_worst, robust.conflict, {"solve": seconds})
@@ -105,8 +113,8 @@ def _minimise(problem: Problem, start: tuple[Value, ...], drawing: Result) -> tu
         if not is_over(robust.bound, robust.worst.bound, zero_level):
             break
         sampled = replace(sampled, samples=fine_samples(robust.samples))
-        level = _quantile(sampled, robust.values, population.share)
-        robust = replace(robust, worst=replace(robust.worst, value=level, bound=level), samples=sampled.samples)
+        worst = _at_share(robust.worst, sampled, robust.values, population.share)
+        robust = replace(robust, worst=worst, samples=sampled.samples)
     return sampled, robust
 
 
@@ -304,8 +312,10 @@ def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) ->
     return best
 
 
-def _quantile(adversary: SampledEngines, values: Sequence[Value], share: float) -> float:
-    return float(np.sort(adversary.objectives(values))[math.ceil(share * len(adversary.errors)) - 1])
+def _at_share(worst: WorstEngines, adversary: SampledEngines, values: Sequence[Value], share: float) -> WorstEngines:
+    # the objective of these engines is the one that a share of all drawn engines does not exceed
+    level = float(np.sort(adversary.objectives(values))[math.ceil(share * len(adversary.errors)) - 1])
+    return replace(worst, value=level, bound=level)
 
 
 def _minimise_share(
@@ -323,5 +333,4 @@ def _minimise_share(
         best, values = candidate, candidate.values
     if best is None:
         raise ModelError("no design was found within the time limit; raise it")
-    level = _quantile(adversary, best.values, share)
-    return replace(best, worst=replace(best.worst, value=level, bound=level), samples=adversary.samples)
+    return replace(best, worst=_at_share(best.worst, adversary, best.values, share), samples=adversary.samples)
