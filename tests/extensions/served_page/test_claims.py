@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,13 @@ import pytest
 from lanes import first_fast
 from laufruhe.extensions.served_page import answers, scenes
 from laufruhe.extensions.served_page.answers import Source
-from laufruhe.extensions.served_page.claims import Simplification, conflict_claim, is_broken
+from laufruhe.extensions.served_page.claims import Simplification, breaks_words, conflict_claim
 from laufruhe.extensions.served_page.page_state import Edit, PageState
+from laufruhe.extensions.served_page.serialise import limits
 from laufruhe.files.reader import load, tables_of
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.report.sections.values import limits as limit_tables
+from laufruhe.solvers.conclusion import evaluate_only
 from laufruhe.solvers.values import LimitValue
 from problem_files import PROBLEMS
 
@@ -175,10 +179,25 @@ def test_words_of_what_is_simpler() -> None:
 
 @pytest.mark.parametrize(
     ("value", "side", "broken"),
-    [(1.1, "at most", True), (1.0, "at most", False), (0.9, "at least", True), (1.0, "at least", False)],
+    [
+        (1.1, "at most", True),
+        (1.0, "at most", False),
+        (1.0 + 5e-6, "at most", True),
+        (1.0 + 5e-7, "at most", False),
+        (0.9, "at least", True),
+        (1.0, "at least", False),
+        (1.0 - 5e-6, "at least", True),
+        (1.0 - 5e-7, "at least", False),
+    ],
 )
-def test_a_limit_is_broken_on_its_side(value: float, side: str, broken: bool) -> None:
-    assert is_broken(LimitValue("x", value, 1.0, "N", False, 0.0, side)) == broken
+def test_page_and_report_call_the_same_limits_broken(value: float, side: str, broken: bool) -> None:
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    limit = LimitValue("x", value, 1.0, "N", False, 0.0, side)
+    assert bool(breaks_words([limit])) == broken
+    assert limits([limit], problem)[0]["broken"] == broken
+    result = replace(evaluate_only(problem), limits=(limit,))
+    (table,) = limit_tables(result)
+    assert (table.rows[0][3] == "broken") == broken
 
 
 @pytest.mark.parametrize("share", first_fast([slice(0, None, 3), slice(None)], 0, 1), ids=["third", "all"])

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from laufruhe.present.measures import is_met
 from laufruhe.present.numbers import figure, number
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
 
@@ -82,15 +82,9 @@ class Claim:
     is_last: bool = False
 
 
-def is_broken(limit: LimitValue) -> bool:
-    """Return True if a design breaks a limit by more than its tolerance."""
-    over = limit.value - limit.limit if limit.side == "at most" else limit.limit - limit.value
-    return over > FEASIBILITY_TOL * (abs(limit.limit) or 1.0)
-
-
 def breaks_words(limits: Iterable[LimitValue]) -> str:
     """Return the broken limits with value and edge, in words; empty if all are met."""
-    broken = [limit for limit in limits if is_broken(limit)]
+    broken = [limit for limit in limits if not is_met(limit)]
     words = [
         f"{limit.name} ({figure(limit.value, limit.unit)}, {limit.side} {figure(limit.limit, limit.unit)})"
         for limit in broken[:_MAX_NAMES]

@@ -9,11 +9,12 @@ from dataclasses import asdict
 from typing import Any
 
 from laufruhe.errors import InputError
-from laufruhe.extensions.served_page.claims import Claim, ClaimKind, is_broken
+from laufruhe.extensions.served_page.claims import Claim, ClaimKind
 from laufruhe.extensions.served_page.controls import as_typed
 from laufruhe.extensions.served_page.page_state import STAR, Edit
 from laufruhe.files.complaints import Refused
 from laufruhe.live.model import sides_of
+from laufruhe.present.measures import is_met
 from laufruhe.present.numbers import figure, price_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -58,7 +59,7 @@ def limits(values: Iterable[LimitValue], problem: Problem, is_estimate: bool = F
             "sides": [(limit.side, limit.limit)]
             if (edge := edges.get(limit.name)) is None or edge.outside is not None
             else sides_of(edge),
-            "broken": is_broken(limit),
+            "broken": not is_met(limit),
             "active": limit.active,
             "price": limit.shadow_price,
             "words": _words(limit, problem, is_estimate),
@@ -69,7 +70,7 @@ def limits(values: Iterable[LimitValue], problem: Problem, is_estimate: bool = F
 
 def _words(limit: LimitValue, problem: Problem, is_estimate: bool) -> str:
     value = figure(limit.value, limit.unit)
-    if is_broken(limit):
+    if not is_met(limit):
         return f"broken: {value}, {limit.side} {figure(limit.limit, limit.unit)}"
     if not limit.active:
         return f"is {value}; has room"
