@@ -122,10 +122,10 @@ Labels such as P13 are those of [the theory](../theory/equations.md).
 
 ## Methods
 
-The first row that fits decides. Quantities that are not in the second table are left to the last row. A method
-may have a bound that closes, but not know one of the limits or terms. Then the bound leaves this limit or term out.
+The first row that fits decides. Only the last row accepts quantities that are not in the second table. If a
+method does not cover one of the limits or terms, its bound leaves this limit or term out.
 
-The first table calls these the *quantities of elastic mounts*: {of_mounts}.
+The first table calls the following the *quantities of elastic mounts*: {of_mounts}.
 
 | method | open | quantities may be | its bound proves |
 | --- | --- | --- | --- |
@@ -133,7 +133,7 @@ The first table calls these the *quantities of elastic mounts*: {of_mounts}.
 DEPENDENCES = """
 ## Quantities
 
-Each row shows how its quantities depend on numbers of one kind while all other numbers are fixed. It holds on elastic
+Each row shows how its quantities depend on numbers of each kind while all other numbers are fixed. The table holds for elastic
 mounts at an even speed. Quantities in one row depend on all kinds in the same way. A dash means no
 dependence.
 
@@ -171,12 +171,12 @@ CLAIMS = """
 ## Norms
 
 A norm makes one number of a signal, such as its mean or its largest value. Methods and bounds use only the properties
-in this table. Every method with a bound needs a convex norm. Boxes, stars and smooth programs also need one that takes
-points alone, and boxes of sizes one of row lengths.
+in this table. Every method with a bound needs a convex norm. Boxes, stars and smooth programs also need the property
+*points alone*, and boxes of sizes the property *of row lengths*.
 
-- *Of row lengths* means that only the lengths of the vectors count, wherever they stand. The norm never
-  falls when one grows.
-- *Points alone* means that operating points do not count as groups.
+- *Of row lengths* means that only the lengths of the vectors count, and not their directions. The norm never
+  falls if one length grows.
+- *Points alone* means that the norm does not depend on which samples belong to which operating point.
 - *Averages bound it* means that averages about the angles bound the whole cycle (P7).
 
 | norm | properties |
