@@ -133,8 +133,8 @@ The first table calls the following the *quantities of elastic mounts*: {of_moun
 DEPENDENCES = """
 ## Quantities
 
-Each row shows how its quantities depend on numbers of each kind while all other numbers are fixed. The table holds for elastic
-mounts at an even speed. Quantities in one row depend on all kinds in the same way. A dash means no
+Each row shows how its quantities depend on numbers of each kind while all other numbers are fixed. The table holds for
+elastic mounts at an even speed. Quantities in one row depend on all kinds in the same way. A dash means no
 dependence.
 
 | words | meaning |
