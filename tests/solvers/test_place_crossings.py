@@ -137,7 +137,13 @@ def test_a_bound_that_knows_no_bearing_is_false(tmp_path: Path, monkeypatch: pyt
     told = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
     problem = _loaded({**told, "fidelity": {"samples": 180}}, tmp_path)
     whole = _bound(problem)
-    monkeypatch.setattr(Relaxation, "_kinks_of", lambda *_: np.zeros(0))
+    initialise = Relaxation.__init__
+
+    def without_kinks(relaxation: Relaxation, *args: Any) -> None:
+        initialise(relaxation, *args)
+        relaxation._kinks = [np.zeros(0) for _ in relaxation.places]
+
+    monkeypatch.setattr(Relaxation, "__init__", without_kinks)
     minimum = min(
         objective_value(problem, evaluate(problem, problem.design([float(x)]))) for x in np.linspace(-0.15, 0.15, 61)
     )
