@@ -23,8 +23,9 @@ from laufruhe.prove.certificate import PROOF_RANK, Proof, gap_of
 from laufruhe.solvers.result import Result, Status
 
 _ROUNDS = 4
+"""Largest number of further solves at a better fidelity."""
 TIMES, MAX_GAS = 4, 23040
-"""Factor by which the steps of the gas pressure grow, and their largest number per cycle."""
+"""Factor by which the number of gas pressure steps grows in each round, and its largest value per cycle."""
 
 
 def objective_error(problem: Problem, evaluation: Evaluation) -> float:
@@ -38,9 +39,9 @@ def objective_error(problem: Problem, evaluation: Evaluation) -> float:
     load_error = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
         return load_error
-    load_share = value_of_loads(problem, evaluation) * load_error
+    load_value_error = value_of_loads(problem, evaluation) * load_error
     run_error = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in runs)
-    return relative(load_share + run_error, objective_value(problem, evaluation))
+    return relative(load_value_error + run_error, objective_value(problem, evaluation))
 
 
 def largest_error(results: Sequence[Result]) -> float:
@@ -57,9 +58,9 @@ def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Result) -> Result:
-    """Solve with more steps of the gas pressure while their error exceeds the tolerance, or weaken the proof by it.
+    """Solve again with more steps of the gas pressure until their error is within the tolerance.
 
-    Numbers of steps that the file states are not changed.
+    If the error stays larger, subtract it from the lower bound. Keep a number of steps that the file states.
     """
     fidelity = problem.fidelity
     if (

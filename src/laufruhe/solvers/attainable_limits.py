@@ -38,7 +38,7 @@ from laufruhe.solvers.values import AttainableLimit, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 MIN_SECONDS = 10.0
-"""Time limit of all limits together [s], if the solve itself took less."""
+"""Time limit for the attainable values of all limits together [s], if the solve itself took less time."""
 HALVINGS, CLOSE = 10, 1e-3
 """Largest number of bisections of a limit, and relative width at which they stop."""
 LONG = "there was no time left; raise the time limit"
@@ -67,6 +67,8 @@ def with_attainable_limits(
         Problem as the caller of `solve` gave it, and kinds of its open numbers.
     spent
         Duration of the solve [s].
+    solve
+        Solver for the problem with another objective or other limits.
     """
     names = _violated_names(result, problem)
     limits = [limit for limit in problem.limits if limit.name in names]
@@ -87,7 +89,7 @@ def with_attainable_limits(
                 is_ended = is_time_over() and not entry.why and entry.proof is not Proof.GLOBAL
                 answers.append(replace(answer, attainable=replace(entry, ended=is_ended)))
         if len(result.conflict) > 1 and any(answer.is_infeasible for answer in answers):
-            # limits that conflict on one star may be met on another
+            # limits that conflict on one crank star may be met on another
 
             def excluded(subset: Sequence[Limit]) -> bool:
                 part = _subproblem(problem, problem.objective, tuple(subset))
@@ -140,7 +142,10 @@ def _violated_names(result: Result, problem: Problem) -> Collection[str]:
 
 
 def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
-    """Return the attainable value of a limit under the others; its lower side if the upper one is not the cause."""
+    """Return the attainable value of a limit while the other limits hold.
+
+    The upper side of the limit comes first. The lower side follows if no design meets it together with the others.
+    """
     measure, default = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
         return _Answer(replace(default, why="a band has no single attainable value"))
@@ -180,7 +185,7 @@ def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], re
 
 
 def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
-    # decisions that affect nothing here are left out
+    # leave out decisions that change no measure of this problem
     part = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
     if problem.phasing is not None:
         return part
@@ -190,7 +195,7 @@ def _subproblem(problem: Problem, objective: tuple[Term, ...], limits: tuple[Lim
 
 
 def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
-    # the other limits have no design either
+    # if the other limits alone are infeasible, this limit has no attainable value
     if result.status is Status.INFEASIBLE:
         names = quote_names(result.conflict)
         reason = f"the other limits cannot be met together either{names and ': no design meets '}{names}"

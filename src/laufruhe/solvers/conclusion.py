@@ -45,7 +45,7 @@ _PRICE_FLOOR = 1e-7
 _ACTIVE_PRICE = 1e-3
 
 _UNPROVEN = {Status.OPTIMAL: Status.FEASIBLE, Status.INFEASIBLE: Status.FAILED}
-"""Status without proof, by the proven one."""
+"""Status of a result whose proof is withheld, by the status that the proof gave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +55,7 @@ class Design:
     Attributes
     ----------
     problem
-        Problem with the star and the firing order of the design.
+        Problem with the crank star and the firing order of the design.
     value, violation
         Objective [SI], and largest relative violation of a limit.
     """
@@ -86,15 +86,15 @@ class ProofData:
     Attributes
     ----------
     bound
-        Lower bound of the objective over all feasible designs.
+        Lower bound of the objective over all feasible designs [SI].
     strength
         Kind of proof that a bound of this method can give.
     kkt_residual, method
         Residual of the optimality conditions and name of the method, as in a certificate.
     prices
-        Known shadow prices of sides of limits.
+        Known shadow prices by limit and side.
     bounds
-        Shadow prices of active bounds of decisions, by the name of the size or angle.
+        Shadow prices of active bounds of decisions, by the name of the size or angle that is bounded.
     """
 
     bound: float
@@ -262,9 +262,9 @@ def violation_message(problem: Problem, evaluation: Evaluation) -> str:
 
 
 def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
-    """Evaluate the initial design without a change; infeasible if its throws have no permitted firing order.
+    """Evaluate the initial design; the result is infeasible if its throws have no permitted firing order.
 
-    If a search starts from it, the design may stand on an undamped resonance (`allow_resonance`).
+    If `allow_resonance` is True, the design may stand on an undamped resonance, as the start of a search may.
     """
     started = time.perf_counter()
     problem = problem.drawing
@@ -297,7 +297,7 @@ def conflict_message(conflict: Sequence[str]) -> str:
 
 
 def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
-    """Return a smallest subset for which `conflicts` is still True: without any of its elements it is False."""
+    """Return a minimal subset for which `conflicts` is True: if any element is removed, it is False."""
     subset = list(conflicting)
     for element in tuple(subset):
         reduced = [other for other in subset if other is not element]
@@ -307,7 +307,7 @@ def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence
 
 
 def smallest_conflict(limits: Sequence[Limit], conflicts: Callable[[Sequence[Limit]], bool]) -> tuple[str, ...]:
-    """Return the names of a smallest set of limits that no design meets together."""
+    """Return the names of a minimal set of limits that no design meets together; `conflicts` tests a set."""
     return tuple(limit.name for limit in smallest_conflicting(limits, conflicts))
 
 
@@ -357,7 +357,7 @@ def limit_values(
     value: float = 0.0,
     price_floor: float = _PRICE_FLOOR,
 ) -> tuple[LimitValue, ...]:
-    """Return value and shadow price of each limit at a design with an objective `value` (E15).
+    """Return value and shadow price of each limit at a design with the objective `value` [SI] (E15).
 
     Parameters
     ----------
@@ -445,7 +445,7 @@ def priced_decisions(
 
 
 def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ...]:
-    """Return the size of one decision, and its angle if that is open."""
+    """Return the entry of a decision's size, and that of its angle if the angle is open."""
     bounds = decision.set
     (size, angle), (initial_size, initial_angle) = bounds.split(value), bounds.split(decision.start)
     tolerance = bounds.scale * ACTIVE if decision.is_affine else (bounds.upper - bounds.lower) * ACTIVE

@@ -1,6 +1,6 @@
 """Solve flywheel, crankshaft and all other decisions as separate problems.
 
-At constant speed no measure of one depends on the others. So the sum of the optima is the optimum, and the sum of the
+At constant speed each measure depends on one of these problems alone. So the sum of the optima is the optimum, and the sum of the
 lower bounds is a lower bound.
 """
 

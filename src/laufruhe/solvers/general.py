@@ -1,8 +1,8 @@
 """Optimise any open numbers by local programs of exact evaluations, without a lower bound.
 
 An open number of the problem file has an address there, and each design is built anew from the file. Unbalances and
-other numbers in which loads are affine come from cone programs, in turn with local programs of the others. Open stars
-are solved one by one, up to a maximum number.
+other numbers in which loads are affine come from cone programs, in turn with local programs of the others. Open
+crank stars are solved one by one, up to a maximum number.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ INNER = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 ROUNDS, GAIN = 4, 1e-6
 """Largest number of rounds of cone program and local program, and relative gain below which they stop."""
 MAX_STARS = 60
-"""Largest number of stars, firing orders and sets of shafts that are solved one by one."""
+"""Largest number of crank stars, firing orders and sets of shafts that are solved one by one."""
 
 
 def solve_by_local_programs(
@@ -96,7 +96,7 @@ def _alternate_with_cones(program: LocalProgram, best: Array, decide: Decide) ->
 
 
 def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
-    """Solve each star with even firing and each set of shafts as a problem of its own, up to `MAX_STARS`."""
+    """Solve each crank star with even firing and each set of shafts as a problem of its own, up to `MAX_STARS`."""
     phasing = problem.phasing
     assert phasing is not None
     stars = even_stars(phasing)

@@ -15,7 +15,7 @@ from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.accuracy import solve_accurately
 from laufruhe.solvers.result import Result
 
-# dependences on stars and optional shafts that methods of stars accept
+# dependences on crank stars and optional shafts that methods of crank stars accept
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
 OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
 """Channels for which programs of mounts have formulas or a simulation."""
@@ -64,7 +64,7 @@ class Method:
     accepts_problem
         Return True if all else about a problem is permitted.
     proves
-        Text of what it proves.
+        What the method proves, in words for the user.
     before
         Name of the method that follows one of an extension in the table.
     """

@@ -329,7 +329,7 @@ def refuse(problem: Problem) -> None:
 def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
     """Solve a problem by the first reduction that applies, else by the first method that suits it.
 
-    The bound of an exact method for part of the measures may raise that of the method.
+    An exact method for part of the measures may raise the lower bound of the method.
     """
     remaining = reductions() if remaining is None else remaining
     for k, reduction in enumerate(remaining):

@@ -1,4 +1,4 @@
-"""Prices of limits and bounds on either side: least and largest multipliers that hold an optimum (P5, P19)."""
+"""Shadow prices of limits and bounds: smallest and largest multipliers that balance the slopes at an optimum (P5, P19)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from laufruhe.prove.certificate import Bound
 from laufruhe.solvers.cones.cone_program import ConeRows, run_clarabel
 
 ALIKE = 0.02
-"""Share of the larger price up to which two sides are one."""
+"""Relative difference up to which the prices of relaxing and tightening count as equal."""
 INDEPENDENT, BALANCED = 1e-3, 1e-2
 """Smallest relative singular value of independent slopes, and largest relative residual of their balance."""
 _RESIDUAL_MARGIN = 1e-6
@@ -78,7 +78,7 @@ class Slopes:
     Attributes
     ----------
     hull
-        Gradients whose convex hull is meant, shape (m, n); one row for a smooth function.
+        Gradients that span the convex hull, shape (m, n); one row for a smooth function.
     segments
         Half-lengths of segments, shape (s, n): each enters with a factor from -1 to 1.
     """
@@ -116,7 +116,7 @@ class Slopes:
 def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
     """Return the price of every active limit, then of every active bound (P19).
 
-    None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
+    The result is None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
 
     Parameters
     ----------
@@ -294,7 +294,10 @@ def affine_prices(
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """Return all slopes of a norm at a design; None if unknown, or if too many rows are zero."""
+    """Return all subgradients of a norm at x, times its weight; None if unknown, or if too many rows are zero.
+
+    `z` has known dual rows of the norm, shape (k, d).
+    """
     rows = norm.rows(x)
     kinks = norm.norm.subdifferential(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
     if kinks is None or len(kinks.vanishing) > MAX_VANISHING:
@@ -323,5 +326,5 @@ def _disc_segments(slope: Array) -> list[Array]:
 
 
 def angle_name(decision: Decision) -> str:
-    """Return the name of the angle that belongs to an open size."""
+    """Return the name of the angle that belongs to the size of a decision."""
     return decision.name.rsplit(".", 1)[0] + ".angle"

@@ -146,7 +146,7 @@ class Result(ResultContent):
     timing
         Duration of each stage of the solve [s], by its name.
     phasing
-        Ranking of stars and firing orders, if these were open.
+        Ranking of crank stars and firing orders, if these were open.
     details
         Further data of the extension that solved the problem.
     ranks

@@ -34,12 +34,12 @@ from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
 SHARE = 0.25
-"""Share of the tolerance for the programs of boxes."""
+"""Share of the problem's tolerance that the cone program of a box may use."""
 
 
 @dataclass(frozen=True, eq=False)
 class RebalancedDesign:
-    """A design, and the result of the problem that determined its unbalances, if any is open."""
+    """A design, and the result of the problem that determined its unbalances; None if no unbalance is open."""
 
     design: Design
     result: Result | None = None
@@ -57,7 +57,7 @@ class RebalancedDesign:
 
 @dataclass(frozen=True, eq=False)
 class BoundedBox:
-    """A box with bounds of its numbers, shape (n,) each, and a lower bound of the objective in it [SI].
+    """A box with bounds of its open numbers, shape (n,) each, and a lower bound of the objective in it [SI].
 
     A box is exact if splitting it cannot improve its bound by more than the tolerance.
     """
@@ -97,7 +97,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         return bool(np.all(box.lower <= numbers) and np.all(numbers <= box.upper))
 
     def prices(self, _: Design) -> dict[Side, Price]:
-        """Return prices of limits that are not in the problem of the unbalances."""
+        """Return shadow prices of limits that the problem of the unbalances leaves out."""
         return {}
 
     def add_conflict(self, conflict: Sequence[str]) -> None:
@@ -110,6 +110,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     ) -> Result:
         """Return the best design of a branch and bound search over at most `maximum` boxes, with its certificate.
 
+        `root` is the box of all open numbers with its bound, and `first` is the first incumbent.
         `numbers` and `method` are the names of the open numbers and of the bounding method, for reports.
         """
         started, problem = time.perf_counter(), self.problem

@@ -33,7 +33,7 @@ from laufruhe.solvers.smooth.local_programs import (
 WIDTH = "flywheel.width"
 # share of the tolerance for a monotone objective, whose gap closes fast
 MONOTONE_SHARE = 1e-3
-# relative margin of local programs to limits
+# relative distance that local programs keep from limits
 MARGIN = 1e-9
 # largest number of boxes to test a set of limits for a contradiction
 FEW_BOXES = 64
@@ -88,9 +88,9 @@ class _Coordinates:
         return real_bounds(self.problem.decisions)
 
     def monotone_problem(self, initial: Evaluation, limits: Sequence[Limit]) -> MonotoneProblem:
-        """Return the objective and some limits as monotone functions of the coordinates.
+        """Return the objective and the given limits as monotone functions of the coordinates.
 
-        At constant speed, the flywheel affects no quantity of the loads, which are those of the initial design.
+        At constant speed the flywheel changes no load, so the loads are those of the evaluation `initial`.
         """
         lower, upper = self.bounds
         width: list[tuple[float, Monotone]] = []
@@ -126,7 +126,7 @@ class _WheelProgram(LocalProgram):
     functions: MonotoneProblem
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective [SI], then the relative distance to each limit."""
+        """Return the objective [SI] and the relative distance to each limit; `shares` are decisions over their range."""
         x, problem = np.array(self.values(shares)), self.functions
         distances = (1.0 - function.value(x) / maximum - MARGIN for maximum, function in problem.limits)
         return np.array([problem.value(x), *distances])

@@ -1,4 +1,5 @@
-"""Solve for phase leads by branch and bound: of geared shafts and coupled machines (P13, P14), and of shared gas (P15).
+"""Solve for phase leads by branch and bound: of geared shafts and coupled machines (P13, P14), and of cranks
+that share gas (P15).
 
 A cone program at the middle of every box optimises the unbalances. Its dual rows bound the objective in the whole box.
 If only leads are open, simplex searches from the best points of a grid find the first design.
@@ -46,15 +47,15 @@ from laufruhe.solvers.result import Result
 MAX_BOXES, MAX_PROGRAMS = 20_000, 2_000
 """Largest number of boxes without and with cone programs."""
 GRID, GRID_OF_SHARED_GAS, SEARCHES = (24, 600, 300), (48, 400, 80), 3
-"""Points of a start grid along a lead and in all, and iterations of a simplex search; simplex searches."""
+"""Largest numbers: points of a start grid along a lead and in all, iterations of a simplex search; simplex searches."""
 COARSE, NEAR = 4, 10.0
 """Factor of coarser sampling in cone programs, and the multiple of the tolerance within which programs use all samples.
 """
 PROBES, SAME = (0.0, 0.31, 0.67), 1e-6
 """Shares of the range at which a lead is tested for an effect, and the relative change that counts as none."""
 EXACT, SHARE_OF_SHARED_GAS = 0.02, 0.5
-"""Shares of the tolerance: by which splitting an exact box may still improve its bound, and at which boxes of leads of
-shared gas end."""
+"""Shares of the tolerance: improvement by splitting up to which a box counts as exact, and gap at which the boxes of
+cranks that share gas end."""
 
 
 def solve_leads(problem: Problem) -> Result:
@@ -69,7 +70,7 @@ def solve_leads(problem: Problem) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class _Box(BoundedBox):
-    """Box of leads [rad], with a lower bound of the objective at its middle [SI], and the lead to split."""
+    """Box of leads [rad]; `at_middle` bounds the objective at its middle [SI], and `side` is the lead to split."""
 
     at_middle: float
     side: int
@@ -140,7 +141,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         self, middle: Array, half: Array, program: AffineProblem, norms: tuple[PhaseLeadNorm, ...],
         limits: tuple[Array, ...],
     ) -> LeadBound | None:  # fmt: skip
-        # LeadBound with an infinite bound if the multipliers prove that the box has no feasible design, else None
+        # return an infinite bound if the multipliers prove that the box has no feasible design, else None
         stripped = replace(program, terms=())
         bound = self.boxes.bound(middle, half, stripped, norms, Multipliers((), limits))
         if not math.isinf(bound.value):
@@ -242,7 +243,10 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
 def _search_from_grid(
     penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
 ) -> list[Array]:
-    """Return the ends of simplex searches from the best points of a grid, shape (n,) each. See `GRID`."""
+    """Return the ends of simplex searches from the best points of a grid, shape (n,) each.
+
+    The grid has at most `steps` points along a lead and `maximum` in all. A search has at most `most_steps` iterations.
+    """
     from scipy.optimize import minimize
 
     count = min(steps, max(int(maximum ** (1.0 / len(lower))), 2))

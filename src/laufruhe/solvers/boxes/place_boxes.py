@@ -1,7 +1,7 @@
 """Relax open positions to a problem whose unbalances stand at the vertices of a box (P8).
 
-The load of an unbalance U at a position r is linear in U and in U r. If r lies in a box with
-vertices r_c, it is the load of the unbalances
+The load of an unbalance U at a position r is linear in U and in U r. If r lies in a box, it is a
+mixture of the vertices r_c with weights l_c. Then the load is that of the unbalances
 
     U_c = l_c U,    sum l_c = 1,    l_c >= 0,    r = sum l_c r_c                           (P8)
 
@@ -41,7 +41,7 @@ UNUSED = 1e-6
 
 
 class Relaxation:
-    """Relaxations of a problem over boxes of positions, with a share of the problem's tolerance."""
+    """Relaxations of a problem over boxes of positions; `share` is their share of the problem's tolerance."""
 
     def __init__(self, problem: Problem, share: float) -> None:
         self._tolerance = share * problem.tolerance
@@ -52,7 +52,7 @@ class Relaxation:
         self.other_decisions = tuple(d for d in problem.decisions if d.kind is not Kind.PLACE)
         self.unbalances = problem.unbalances
         self._smallest = [_smallest(decision.set) for decision in self.unbalances]
-        # rotors with the smallest unbalances that their bounds allow
+        # engine whose rotors have the smallest unbalances that their bounds allow
         self._base = problem.design(self._smallest, self.unbalances)
         self._rotors = {rotor.name: rotor for rotor in self._base.rotors}
         self._placed: dict[str, list[int]] = {}
@@ -95,7 +95,7 @@ class Relaxation:
             for rotor_name, copies in parts.items():
                 rotors += copies
                 names.setdefault(rotor_name, [rotor_name]).extend(rotor.name for rotor in copies)
-            # the sum over all vertices
+            # limit the sum of the unbalances over all vertices
             first = decision.rotor_drives[0]
             copies = parts[first.rotor]
             maximum = _from_zero(decision.set).scale * abs(first.gain) / (copies[0].radius or 1.0)
@@ -115,7 +115,8 @@ class Relaxation:
     def _fixed_unbalances(self, nodes: Sequence[Array]) -> tuple[list[Rotor], list[Decision]]:
         """Return rotors and decisions of fixed unbalances, whose loads are linear in the position within a cell.
 
-        Each decision is the share of a cell that the position has covered. The relaxation drops the condition that a
+        A cell lies between two bounds or inner bearings of a box that are neighbours. Each decision is the share of a
+        cell that the position has covered. The relaxation drops the condition that a
         position covers a whole cell before it enters the next.
         """
         rotors: list[Rotor] = []

@@ -33,7 +33,7 @@ Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
 MAX_BOXES, MAX_OTHERS = 300, 500
 """Largest number of boxes of positions, and of boxes of the method for the other decisions."""
 OTHER_SHARE = 0.5
-"""Share of the tolerance for the method for the other decisions."""
+"""Share of the problem's tolerance that the method for the other decisions may use."""
 # spread of unbalances up to which a relaxation counts as exact [m]
 EXACT_SPREAD = 1e-6
 # share of the range of a position by which finite differences move it

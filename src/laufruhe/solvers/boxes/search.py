@@ -59,18 +59,19 @@ class BoxSearch(Generic[B, D]):
         raise NotImplementedError
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
-        """Yield parts that cover a box, each with a design in it, or None; `value` is that of the incumbent [SI].
+        """Yield parts that cover a box, each with a design in it, or None.
 
-        A part is a box, or the proof that no design in it has an objective below a level.
+        A part is a box, or the proof that no design in it has an objective below a level. The objective of the
+        incumbent is `value` [SI].
         """
         raise NotImplementedError
 
     def level(self, _: float) -> float:
-        """Return the level that bounds exclude, for the objective of the incumbent [SI]; infinite if none."""
+        """Return the smallest objective of designs in boxes cut off [SI], from that of the incumbent; infinite if none."""
         return math.inf
 
     def witness_of(self, _: D) -> Witness | None:
-        """Return a design as a witness of bounds, or None."""
+        """Return a design as a witness of bounds, or None if it violates limits."""
         raise NotImplementedError
 
     def contains(self, _box: B, _design: D) -> bool:
@@ -78,7 +79,7 @@ class BoxSearch(Generic[B, D]):
         return False
 
     def around(self, _: D) -> B | FathomedPart | None:
-        """Return a thin box around a design, with its bound, or None."""
+        """Return a thin box around a design, with its bound; None if the method builds none."""
         raise NotImplementedError
 
     def add_conflict(self, conflict: Sequence[str]) -> None:

@@ -17,9 +17,9 @@ from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 
 MINIMUM_SHARE = 1e-7
-"""Weights of sums below this one are set to zero."""
+"""Multipliers of sums of terms below this share of their total are set to zero."""
 MINIMUM_SECONDS = 0.05
-"""Time of an attempt that starts after the time limit [s]."""
+"""Time allowed to a solve that starts after the time limit [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class SparseMatrix:
 
 
 class ConeRows:
-    """Rows A x + s = b with s in a product of cones, added block by block."""
+    """Rows A x + s = b of a cone program, with slacks s in a product of cones; A has `columns` columns."""
 
     def __init__(self, columns: int) -> None:
         self.columns = columns
@@ -112,7 +112,7 @@ class RowBlock:
     Attributes
     ----------
     unit
-        Unit of the rows [SI].
+        Unit in which the program measures the norm [SI].
     first
         First column of the epigraph variables.
     """
@@ -222,7 +222,10 @@ def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
 
 
 def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
-    """Add V0 + B x of a norm, one cone per row or one cone in all for a root mean square; return the first row."""
+    """Add the rows V0 + B x of a norm, with a cone for each, or a single cone for a root mean square.
+
+    Return the index of the first row in the program.
+    """
     import clarabel
 
     norm, cones, start = block.norm, block.cones, rows.count

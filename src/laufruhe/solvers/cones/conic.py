@@ -39,7 +39,8 @@ ATTEMPTS: tuple[Mapping[str, Any], ...] = (
 )
 """Settings of the solver, in the order of the attempts."""
 FEW_ROWS, ROUNDS, NEAR_LIMIT = 500, 6, 0.95
-"""Rows of a peak up to which all enter the program, rounds that add rows, and share of a limit from which rows do."""
+"""Number of rows of a peak up to which all enter the program, largest number of rounds that add rows, and share of a
+limit from which rows are added."""
 
 
 def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = None) -> ConicSolution:
@@ -129,7 +130,7 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
 
 
 def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Return the indices of rows of a norm whose length at x, shape (n,), exceeds `share` times a limit [SI]."""
+    """Return the indices of rows of a norm whose length at x, shape (n,), exceeds `share` times `maximum` [SI]."""
     return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
 
 
@@ -172,7 +173,7 @@ def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> Con
 def solve_quadratic(
     problem: AffineProblem, gradient: Array, curvature: Array, x: Array, damping: float
 ) -> tuple[Array, tuple[Array, ...]] | None:
-    """Minimise gradient . (y - x) + (y - x)' curvature (y - x) / 2 within sets and limits (P10).
+    """Minimise gradient . (y - x) + (y - x)' curvature (y - x) / 2 over designs y within sets and limits (P10).
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ COARSE, SLACK = 180, 1e-7
 COARSEST = 48
 """Samples per cycle of the first test for other optimal designs."""
 FAINT, WEAK = 1e-8, 1e-7
-"""Weight of the distance term in that test and for the ends of ranges, relative to the objective."""
+"""Weights of the distance from a target, relative to the objective: in the first test, and for the ends of ranges."""
 FAR = 10.0
 """Distance of the target points from the optimum, in units of the decisions."""
 NEGLIGIBLE = 1e-2
@@ -48,7 +48,8 @@ FREE = 0.2
 def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     """Return the range of every unbalance over all designs that keep the limits and stay optimal.
 
-    Empty unless all decisions are affine, and there are few. The limit keeps the objective at its optimum.
+    `limit` keeps the objective at its optimum. The tuple is empty if a decision is not affine, if more than `MAX_OPEN`
+    are open, if a measure has no cones, or if no time is left.
     """
     problem = result.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]

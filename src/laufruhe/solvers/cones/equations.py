@@ -1,6 +1,6 @@
 """Limits of zero as linear equations between the decisions, satisfied to rounding (P11).
 
-If a norm must be zero, V0 + B x = 0, and its cone has no interior for the solver. The rows of such limits are reduced
+If a norm must be zero, its rows V0 + B x are zero, and its cone has no interior for the solver. The rows of such limits are reduced
 to independent equations. Dual rows of a limit of zero cost nothing, so a bound may use those that improve it.
 """
 
@@ -61,7 +61,7 @@ class Equations:
 
 
 def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | None:
-    """Return the equations of the limits with these indices, all of zero; None if there are none or they contradict."""
+    """Return the equations of limits of zero from their indices; None if there are no limits, or they contradict."""
     norms = [problem.limits[k][1] for k in limits]
     if not norms:
         return None

@@ -1,6 +1,6 @@
 """Newton steps from the optimum at few samples per cycle to the optimum at many (P10).
 
-A cone program has as many samples as its time allows, and its dual rows between them are guesses. If the objective is
+A cone program has as many samples as its time allows, and its dual rows between the samples are guesses. If the objective is
 smooth, a few Newton steps from its solution reach the optimum at many more samples. There, the subgradient of the
 design gives the dual rows.
 """
@@ -17,6 +17,7 @@ from laufruhe.prove.certificate import ROUNDING, Bound, Multipliers, flatten_int
 from laufruhe.solvers.cones.conic import solve_quadratic
 
 TARGET_GAP = 1e-6
+"""Gap below which an optimum is not refined."""
 REFINEMENT = 16
 """Factor of samples over the cone program."""
 MAX_STEPS = 5
@@ -27,7 +28,9 @@ CONVERGED = 1e-5
 NO_STEP = 1e-9
 """Step relative to a decision's scale that counts as zero if the decision is zero."""
 FEW_ROWS = 64
+"""Largest number of rows of a limit for which Newton steps are tried."""
 MAX_NUMBERS = 8_000_000
+"""Largest size of the slopes of all terms for which Newton steps are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +44,7 @@ class Optimum:
     bound
         Lower bound of all designs, with its multipliers.
     problem
-        Rows on the grid of the bound.
+        Affine problem, sampled on the grid of the bound.
     gap
         Gap between objective and bound, relative to the objective.
     violation

@@ -78,13 +78,13 @@ def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
 
 
 def is_moved_along(norm: AffineNorm, directions: Array) -> bool:
-    """Return True if a direction, shape (n, m), changes a norm by more than rounding."""
+    """Return True if one of the directions, shape (n, m), changes a norm by more than rounding."""
     change = np.abs(np.einsum("kdn,nm->kdm", norm.slope, directions)).max(initial=0.0)
     return bool(change > SAME_LOAD * np.abs(norm.slope * np.abs(directions).max(axis=1)).max(initial=0.0))
 
 
 def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
-    """Return the distance of a decision from a target, shape (width,), as an affine norm of all columns."""
+    """Return the distance of a decision from a target, shape (width,), as an affine norm; `columns` is the length of x."""
     slope = np.zeros((1, domain.width, columns))
     slope[0, :, domain.columns] = np.eye(domain.width)
     return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))

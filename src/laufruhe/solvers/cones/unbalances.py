@@ -39,9 +39,13 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
 
 MAX_DOUBLINGS = 4
+"""Number of doublings of the samples after which a gap may stay open."""
 MAX_MARGINS = 3
+"""Largest number of attempts with lowered limits."""
 MANY_ROWS = 2000
+"""Number of rows of a term from which the first program takes half the samples."""
 MAX_ROWS = 60_000
+"""Number of rows of a term from which the samples are not doubled."""
 
 
 def conflict_on_any_mounts(problem: Problem) -> tuple[str, ...]:
@@ -220,7 +224,10 @@ def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:
 
 
 def is_infeasible(affine: AffineProblem) -> bool:
-    """Return True if no design keeps the limits: a proof if rows are sample averages, never above a mean."""
+    """Return True if no design keeps the limits.
+
+    This is a proof if the rows are sample averages, which never exceed the mean over the cycle (P7).
+    """
     return solve_cones(replace(affine, terms=())).x is None
 
 

@@ -69,8 +69,10 @@ def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in
 
     Parameters
     ----------
-    value, cutoff
-        Objective of the best design of all stars; the bound need not be higher. Bound at which the proof stops [SI].
+    value
+        Objective of the best design of all crank stars, which the bound need not exceed [SI].
+    cutoff
+        Lower bound at which the proof stops [SI].
     in_batch
         True if many results are bounded, so that cheap bounds come first.
     """

@@ -46,6 +46,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, describe_starts, distinct_optima
 
+# ratio of local optima from which the certificate mentions it
 NOTABLE_RATIO = 1.01
 # evaluated operating points from which a search takes longer than the start of workers
 MANY_EVALUATIONS = 256
@@ -86,9 +87,9 @@ def solve_joint(
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even_result: Result | None) -> tuple[Result, Candidate]:
-    """Solve a problem whose throws may leave their star; return the result and the star with its new throws (E36).
+    """Solve a problem whose throws may leave their crank star; return the result and the moved star (E36).
 
-    The result of the star without moves, `even_result`, is the first start.
+    The first start is `even_result`, the result of the star without moves.
     """
     first = start_of_result(problem, even_result) if even_result is not None and even_result.decisions else None
     # bounds over mounts alone are not valid for moved throws
@@ -103,7 +104,7 @@ def _search_and_bound(
     first: StartPoint | None,
     defer_bounds: bool,
 ) -> tuple[Result, Array]:
-    """Return the result, and the moves of the throws from their star [rad], shape (moves,)."""
+    """Return the result, and the moves of the throws from their crank star [rad], shape (moves,)."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
     uses_workers = evaluation_count(problem) >= MANY_EVALUATIONS and workers != 1 and not defer_bounds
@@ -205,7 +206,7 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 
 
 def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
-    """Return a lower bound of the objective: the sum of bounds of each kind of terms, none of which is negative [SI].
+    """Return a lower bound of the objective [SI]: the sum of bounds for each kind of terms. No term is negative.
 
     Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
     and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts, for which they

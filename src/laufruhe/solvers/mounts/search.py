@@ -25,6 +25,7 @@ from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct_optima,
 from laufruhe.solvers.smooth.nonlinear import StopWhen, run_all_starts, solve_nonlinear
 from laufruhe.solvers.smooth.program import SmoothProgram
 
+# largest relative violation of a limit by a feasible result
 SLACK = 1e-5
 # relative difference of objectives that counts as none
 SAME = 1e-6
@@ -40,12 +41,13 @@ SIMULATED_ITERATIONS = 60
 # share of the objective's unit below which a search is repeated in a smaller unit, and number of repetitions
 SMALL = 1e-2
 MAX_SIZES = 3
+# standard deviation of starts around a local optimum, relative to its numbers or their range
 SPREAD = 0.4
 # starts at which limits are checked
 CHECKED_STARTS = 6
 # relative distance to a limit from which the program leaves it out, and below which the program includes it again
 FAR_FROM_LIMIT, NEAR_LIMIT = 0.5, 0.05
-# deviation of start throws from their star [rad]
+# deviation of start throws from their crank star [rad]
 THROW_DEVIATION = 0.02
 
 
@@ -76,9 +78,10 @@ class MountSearch:
     workers
         Number of processes; by default the number of processors.
     moves
-        Moves of the throws from their star; None if throws are fixed.
+        Moves of the throws from their crank star; None if throws are fixed.
     first
-        First start. Without columns, it has the unbalances that are optimal on the initial mounts.
+        First start: numbers of the mounts, and columns of the unbalances. If the columns are None, the unbalances are
+        those that are optimal on the initial mounts.
     keep_initial
         True to keep the initial design as a start if there is another first start.
     coarser
@@ -147,7 +150,7 @@ class MountSearch:
     def search_from(self, places: Sequence[StartPoint]) -> bool:
         """Search from additional starts; return True if the best design improved.
 
-        Starts without columns take the unbalances of the best design. Complete starts are candidates themselves.
+        Starts without columns of unbalances take those of the best design. Complete starts are candidates themselves.
         """
         previous = self.best
         default = self._points[0][1] if previous is None or previous.optimum is None else _start_of(previous)[1]
@@ -176,7 +179,7 @@ class MountSearch:
 
     @property
     def turns(self) -> Array:
-        """Moves of the throws of the best design from their star [rad], shape (moves,)."""
+        """Moves of the throws of the best design from their crank star [rad], shape (moves,)."""
         optimum = self.best.optimum if self.best is not None else None
         return self.joint.throw_deviations(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
 

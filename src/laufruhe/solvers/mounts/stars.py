@@ -43,13 +43,14 @@ from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_s
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
+# number of the best crank stars that are solved again from all starts
 MAX_SEARCHED = 3
-# starts of a star, in addition to the mounts of the first star of the ranking
+# starts of a crank star, in addition to the mounts of the first star of the ranking
 FEW_STARTS = 2
 
 
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
-"""A star with a set of shafts, and its steps if it fires evenly."""
+"""A crank star with a set of shafts, and the steps of its throws if it fires evenly."""
 
 
 def _rank(design: StarDesign) -> tuple[bool, float]:
@@ -62,7 +63,7 @@ def _minimum_value(designs: list[StarDesign]) -> float:
 
 
 def solve_star_mounts(problem: Problem) -> Result:
-    """Return the best of the stars, each with its optimal mounts and unbalances (E35).
+    """Return the best of the crank stars, each with its optimal mounts and unbalances (E35).
 
     Raises
     ------
@@ -89,7 +90,7 @@ def solve_star_mounts(problem: Problem) -> Result:
 
 
 def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
-    """Return stars in ascending order of the objective on the initial mounts, and the number of all stars."""
+    """Return crank stars in ascending order of the objective on the initial mounts, and the number of all."""
     if phasing.throws is not None:
         star = Candidate(phasing.throws, None, *phasing.minimum_geometry)
         sets = phasing.shafts.allowed
@@ -113,7 +114,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
 
 
 def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> tuple[list[tuple[float, Star]], int]:
-    """Return stars of one geometry with their objective on the initial mounts, and the number of all (S15)."""
+    """Return crank stars of one geometry with their objective on the initial mounts, and the number of all (S15)."""
     model = family.model(phasing)
     designs = search_designs(
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(model.problem)
@@ -139,7 +140,7 @@ def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts
 
 
 def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
-    """Solve the first star from all starts, and the others from its mounts and few starts; return the best first."""
+    """Solve the first crank star from all starts, the others from its mounts and few starts; return the best first."""
     starts = problem.search.starts
     problems = [_problem_of(problem, phasing, candidate, starts) for candidate, _ in stars[:1]]
     problems += [_problem_of(problem, phasing, candidate, min(starts, FEW_STARTS)) for candidate, _ in stars[1:]]
@@ -158,7 +159,7 @@ def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]
 
 
 def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarDesign]:
-    """Solve the best few stars again from all starts."""
+    """Solve the best few crank stars again from all starts."""
     improved = list(designs)
     starts = problem.search.starts
     for k, design in enumerate(() if is_time_over() else designs[:MAX_SEARCHED]):
@@ -176,7 +177,7 @@ def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarD
 
 
 def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int) -> list[StarDesign]:
-    """Improve the bounds of all stars by provers of mounts, up to the objective of the best star (E54)."""
+    """Improve the bounds of all crank stars by provers of mounts, up to the objective of the best star (E54)."""
     minimum = _minimum_value(designs)
     if len(designs) < design_count or phasing.continuous or not 0.0 < minimum < math.inf:
         return designs
@@ -192,7 +193,7 @@ def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int)
 
 
 def _solve_moved_throws(problem: Problem, phasing: Phasing, designs: list[StarDesign]) -> list[StarDesign]:
-    """Return designs with throws moved from the best stars, or from the middle of their bounds (E36)."""
+    """Return designs with throws moved from the best crank stars, or from the middle of their bounds (E36)."""
     starts: list[tuple[Candidate, Result | None]] = [
         (design.candidate, design.result) for design in designs[:MAX_SEARCHED] if not _rank(design)[0]
     ]
@@ -282,7 +283,7 @@ def _fix_firing_order(phasing: Phasing, star: Candidate, steps: tuple[int, ...] 
 
 
 def _without_design(problem: Problem, designs: list[StarDesign], initial: Evaluation, design_count: int) -> Result:
-    """Return a result without a design: infeasible if that is proven for every star, else failed."""
+    """Return a result without a design: infeasible if that is proven for every crank star, else failed."""
     is_proven = len(designs) == design_count and all(f.result.status is Status.INFEASIBLE for f in designs)
     first = designs[0].result
     status = Status.INFEASIBLE if is_proven else Status.FAILED

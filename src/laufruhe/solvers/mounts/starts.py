@@ -23,7 +23,7 @@ from laufruhe.solvers.conclusion import Design, evaluate_design, unbalance_value
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 
-# starts per open number; candidates per start, which together cost about as much as its search
+# largest number of starts per open number, and candidates per start, which cost about as much as a search
 STARTS = 4
 POOL = 16
 # relative gap of the unbalances of starts
@@ -154,12 +154,12 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     return pool[indices], minimum
 
 
-def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
-    """Return the sum of violations and the objective of a share of the points, shape (points, 2).
+def _scores(task: tuple[Problem, Evaluation, Array]) -> Array:
+    """Return the sum of violations and the objective [SI] of each point, shape (points, 2).
 
     Points not evaluated in time have infinite rows.
     """
-    problem, coarse, points = share
+    problem, coarse, points = task
     if not len(points):
         return np.zeros((0, 2))
     count = len(problem.mount_decisions)
