@@ -21,16 +21,16 @@ _STEPS = 720
 
 @dataclass(frozen=True)
 class Knuckle:
-    """A pin on a master rod.
+    """Knuckle pin: hinge of an articulated rod on a master rod.
 
     Attributes
     ----------
     master
-        The cylinder whose rod it is.
+        Slider-crank of the master rod.
     radius
-        From the crank pin [m].
+        Distance of the knuckle pin from the crank pin [m].
     angle
-        From the line of the master rod's pins, positive as the crank turns [rad].
+        Angle of the knuckle pin from the line of the master rod's pins, positive as the crank turns [rad].
     """
 
     master: SliderCrank
@@ -38,7 +38,7 @@ class Knuckle:
     angle: float
 
     def motion(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
-        """Return place, velocity and acceleration by alpha, in the plane of a cylinder at `bank` (K11) [m]."""
+        """Return the position of the pin and its first two derivatives by alpha [m], for a cylinder at `bank` (K11)."""
         arm, rate, swing = self._arm(lib, alpha, bank)
         pin = (0.0 * alpha + self.master.crank_radius) * (lib.cos(alpha) + 1j * lib.sin(alpha))
         return pin + arm, 1j * (pin + rate * arm), (1j * swing - rate * rate) * arm - pin
@@ -56,13 +56,13 @@ class Knuckle:
         return arm, -kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape)
 
     def push(self, lib: Any, alpha: Any, bank: float, force: Any) -> Any:
-        """Return the wall force on the master's piston that keeps its rod from turning under `force` here (B11)."""
+        """Return the wall force on the master's piston that holds its rod against `force` on the knuckle pin (B11)."""
         arm, _, _ = self._arm(lib, alpha, bank)
         reach = (0.0 * alpha + self.master.rod_length) * kinematics.cos_psi(*self._shape(lib, alpha, bank))
         return -(arm.conjugate() * force).imag / reach
 
     def length_to(self, reach: complex, bank: float) -> float:
-        """Return the length of a rod whose piston pin reaches `reach` at its highest [m] (K13)."""
+        """Return the length of a rod whose piston pin comes to the point `reach` at its highest [m] (K13)."""
 
         def slope(alpha: float) -> tuple[float, float]:
             place, velocity, acceleration = self.motion(np, alpha, bank)
@@ -73,13 +73,13 @@ class Knuckle:
         return float(abs(reach - place))
 
     def scaled(self, length: float, mass: float) -> Knuckle:
-        """Return the pin in another size."""
+        """Return the pin with lengths and masses multiplied by these factors."""
         return Knuckle(self.master.scaled(length, mass), self.radius * length, self.angle)
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArticulatedCrank(SliderCrank):
-    """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share there."""
+    """A cylinder whose rod works on a knuckle pin; `rotating_mass` is the rod's share at that pin."""
 
     knuckle: Knuckle
 
@@ -166,7 +166,7 @@ class ArticulatedCrank(SliderCrank):
 
     @property
     def big_end_area(self) -> float:
-        """Unknown for a knuckle pin."""
+        """Projected area of the pin, which is unknown for a knuckle pin."""
         raise ModelError(f"{self.name} works on a knuckle pin, whose area is not told; ask for the crank-pin force")
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
@@ -184,7 +184,7 @@ class ArticulatedCrank(SliderCrank):
         )
 
     def scaled(self, length: float, mass: float) -> Self:
-        """Return the mechanism in another size."""
+        """Return the mechanism with lengths and masses multiplied by these factors."""
         return replace(super().scaled(length, mass), knuckle=self.knuckle.scaled(length, mass))
 
 

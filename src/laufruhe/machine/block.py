@@ -21,14 +21,14 @@ class Block:
     Attributes
     ----------
     mass
-        Everything that the mounts carry, moving parts included [kg].
+        Mass of everything that the mounts carry, moving parts included [kg].
     inertia
-        Tensor about the centre of gravity in the axes of C2 [kg m2]; xy = - integral of x y dm.
+        Inertia tensor about the centre of gravity in the axes of C2 [kg m2]; xy = - integral of x y dm.
     centre_of_gravity
-        (x, y, z) [m] (C2).
+        Position (x, y, z) [m] (C2).
     turning_inertia
-        Of what turns with the crank at its imposed speed, about its axis [kg m2]: a part of `inertia` that
-        does not roll with the block (E1a).
+        Inertia of what turns with the crank at its imposed speed, about the crank axis [kg m2]: a part of `inertia`
+        that does not roll with the block (E1a).
     """
 
     mass: float
@@ -63,12 +63,12 @@ class Block:
 
     @property
     def tensor(self) -> Array:
-        """Inertia without what turns at imposed speed, shape (3, 3) [kg m2] (E1a)."""
+        """Inertia tensor without `turning_inertia`, shape (3, 3) [kg m2] (E1a)."""
         return np.array(self.inertia, dtype=float) - np.diag([self.turning_inertia, 0.0, 0.0])
 
     @property
     def mass_matrix(self) -> Array:
-        """M of (u, theta) of the centre of gravity, shape (6, 6) (E1)."""
+        """Mass matrix M for displacement u and rotation theta at the centre of gravity, shape (6, 6) (E1)."""
         matrix = np.zeros((6, 6))
         matrix[:3, :3] = self.mass * np.eye(3)
         matrix[3:, 3:] = self.tensor
@@ -77,14 +77,14 @@ class Block:
 
 @dataclass(frozen=True)
 class LoadCase:
-    """Forces and moments on the block; travel counts from where it stands without them (E55).
+    """Static forces and moments on the block, whose travel counts from its position without them (E55).
 
     Attributes
     ----------
     times_weight
-        The weight of the block so many times along x, y and z (C2).
+        Multiples of the weight of the block along x, y and z (C2).
     force, place, moment
-        A force [N], where it acts [m], and a moment [N m].
+        Force [N], point where it acts [m], and moment [N m].
     """
 
     name: str

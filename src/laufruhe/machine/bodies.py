@@ -15,7 +15,7 @@ class Rod:
     centre_of_gravity
         Distance from the crank pin, on the line of the pins [m].
     inertia
-        About the centre of gravity, across the plane of motion [kg m2].
+        Moment of inertia about the centre of gravity, across the plane of motion [kg m2].
     """
 
     length: float
@@ -25,17 +25,17 @@ class Rod:
 
     @property
     def reciprocating_mass(self) -> float:
-        """Share of the piston pin [kg]: two masses keep mass and centre of gravity (eq. 9)."""
+        """Mass at the piston pin [kg]: masses at both pins keep the rod's mass and centre of gravity (eq. 9)."""
         return self.mass * self.centre_of_gravity / self.length
 
     @property
     def rotating_mass(self) -> float:
-        """Share of the crank pin [kg]."""
+        """Mass at the crank pin [kg]."""
         return self.mass - self.reciprocating_mass
 
     @property
     def inertia_deficit(self) -> float:
-        """Error of two masses in the inertia, Theta - m1 s1^2 - m2 s2^2 [kg m2] (eqs. 9, 10)."""
+        """Inertia of the rod less that of its two masses, Theta - m1 s1^2 - m2 s2^2 [kg m2] (eqs. 9, 10)."""
         return self.inertia - self.mass * self.centre_of_gravity * (self.length - self.centre_of_gravity)
 
 
@@ -49,9 +49,9 @@ class Motion:
     Attributes
     ----------
     points
-        Mass [kg], and its place [m] with first and second derivative. The piston comes first.
+        Masses [kg], each with its position [m] and the first two derivatives by alpha. The piston comes first.
     swings
-        Inertia that point masses leave out [kg m2], with first and second derivative of its angle.
+        Inertias that point masses leave out [kg m2], each with the first two derivatives of its angle by alpha.
     """
 
     points: tuple[tuple[float, tuple[Any, Any, Any]], ...]
@@ -65,11 +65,11 @@ class Outline:
     Attributes
     ----------
     points
-        Of a closed line about the shaft, in the plane turned to the cylinder axis [m].
+        Points of a closed line about the shaft, in the plane turned to the cylinder axis [m].
     width
-        Along the shaft [m].
+        Width along the shaft [m].
     moves
-        Else it is of the block.
+        True if the body moves; False if it belongs to the block.
     """
 
     points: Any

@@ -12,7 +12,7 @@ from laufruhe.machine.gas import AMBIENT_PRESSURE, PressureTrace, Seiliger, Wieb
 from laufruhe.machine.slider_crank import SliderCrank
 
 ENDS: Mapping[str, int] = {"head": 1, "crank": -1}
-"""Ends of a cylinder, and which way the pressure there drives the piston: 1 towards the crank."""
+"""Ends of a cylinder, and direction in which the pressure there drives the piston: 1 towards the crank."""
 
 
 @dataclass(frozen=True)
@@ -24,19 +24,19 @@ class Steam:
     Attributes
     ----------
     admission, back_pressure
-        Absolute [Pa].
+        Absolute pressures while steam enters and while it leaves [Pa].
     cut_off
-        Where admission ends.
+        Point where admission ends.
     release
-        Where the outlet opens; from there the pressure falls evenly to the dead centre.
+        Point where the outlet opens; from there the pressure falls evenly to the dead centre.
     compression
-        Where the outlet closes on the way back.
+        Point where the outlet closes on the way back.
     lead
-        Where fresh steam enters on the way back; from there the pressure rises evenly to the dead centre.
+        Point where fresh steam enters on the way back; from there the pressure rises evenly to the dead centre.
     clearance
         Volume that is left at the dead centre, over that of the stroke.
     exponent
-        Of expansion and compression; 1 is a hyperbola.
+        Exponent of expansion and compression; 1 is a hyperbola.
     """
 
     admission: float
@@ -85,7 +85,7 @@ class Chamber:
     cylinders
         Names of the slider-cranks whose rods carry such a piston.
     end
-        "head" presses the piston towards the crank, "crank" away from it.
+        End of the cylinder: "head" presses the piston towards the crank, "crank" away from it.
     bore, rod
         Diameters of the piston, and of the piston rod where it passes through this end [m].
     """

@@ -1,4 +1,4 @@
-"""Distances of shafts, and the room that they sweep, also over boxes of places."""
+"""Distances between shafts, and radii that shafts sweep, also for shafts that move in boxes of positions."""
 
 from __future__ import annotations
 
@@ -39,10 +39,11 @@ def shafts_of(engine: Engine) -> tuple[str, ...]:
 
 
 def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: bool) -> list[Span]:
-    """Return (least, largest) distance of every two axes, with shafts between their places in two engines [m].
+    """Return the smallest and largest distance of every two shaft axes, for positions between two engines [m].
 
-    Named shafts count, one alone from the crankshaft, and all where None. One of two is a balancer shaft; an engine may
-    lack one that is optional. The room that the weights and throws of both sweep is taken off on request.
+    `names` selects shafts; a single one is paired with the crankshaft, and None selects all. At least one shaft of a
+    pair is a balancer shaft. Optional shafts that the engines lack are left out. If `swept` is True, the radii that
+    both shafts sweep are subtracted.
     """
     low, high = _shafts(lower), _shafts(upper)
     counted = low if names is None else (*names, CRANKSHAFT.name) if len(names) == 1 else names

@@ -1,4 +1,4 @@
-"""Names that riders and drivers have for cranks."""
+"""Common names of crank stars."""
 
 from __future__ import annotations
 

@@ -20,14 +20,16 @@ class FluidTrack:
 
     Attributes
     ----------
+    axis
+        Index of the mount's own axis along which the fluid acts.
     mass
-        Effective, of the fluid in the track [kg].
+        Effective mass of the fluid in the track [kg].
     bulge
         Stiffness of the rubber against swelling [N/m].
     stiffness
-        Of the lower chamber [N/m].
+        Stiffness of the lower chamber [N/m].
     damping
-        Of the flow through the track [N s/m].
+        Damping of the flow through the track [N s/m].
     """
 
     axis: int
@@ -48,7 +50,7 @@ class FluidTrack:
         return self.bulge * self.stiffness / (self.bulge + self.stiffness)
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Return the stiffness of the bulge in series with fluid, track and lower chamber."""
+        """Return the stiffness of the bulge in series with track and lower chamber at angular frequencies [rad/s]."""
         behind = self.stiffness - self.mass * omegas**2 + 1j * self.damping * omegas
         total = self.bulge + behind
         # without damping the fluid resonates: the force of the mount has no size there
@@ -57,7 +59,7 @@ class FluidTrack:
 
 @dataclass(frozen=True)
 class MeasuredStiffness:
-    """Complex stiffness [N/m] over rising frequency [rad/s], straight between the rows, constant beyond them (E51)."""
+    """Complex stiffness [N/m] over rising frequency [rad/s], linear between these values, constant beyond (E51)."""
 
     axis: int
     omegas: tuple[float, ...]
@@ -81,7 +83,7 @@ class MeasuredStiffness:
         return self.values[0].real
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Interpolate real and imaginary part."""
+        """Return the stiffness at angular frequencies [rad/s], interpolated in real and imaginary part."""
         values = np.array(self.values)
         real, imag = (np.interp(omegas, self.omegas, part) for part in (values.real, values.imag))
         return np.asarray(np.where(omegas == 0.0, self.static, real + 1j * imag), dtype=complex)

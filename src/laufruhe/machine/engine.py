@@ -38,7 +38,7 @@ class Cycle(Enum):
 
     @property
     def turns(self) -> int:
-        """Crank turns a cycle."""
+        """Crank turns per cycle."""
         return self.value
 
     @property
@@ -61,7 +61,7 @@ class OperatingPoint:
     speed
         Crank speed [rad/s].
     weight
-        Share in a metric taken over several points.
+        Weight in a measure over several points.
     """
 
     name: str
@@ -77,19 +77,19 @@ class Engine:
     Attributes
     ----------
     slider_cranks
-        In the order of cylinder numbers (C3).
+        Slider-cranks in the order of cylinder numbers (C3).
     mounts
-        Empty for an engine whose shaking loads alone are requested.
+        Mounts; empty if only shaking loads are requested.
     block
-        The body that elastic mounts carry; without one the mounts are rigid.
+        Body that elastic mounts carry; None for rigid mounts.
     bearings
         Main bearings of its shafts; empty if no measure refers to them.
     flywheel
         Parts that turn with the crank; None if no measure refers to them.
     geared
-        Shares of the inertia of all that turns on shafts of other speeds.
+        Inertias on shafts of other speeds, as shares of the inertia of all that turns.
     load_cases
-        Loads that are held, under which mounts give way.
+        Static loads under which the block moves on its mounts.
     extras
         Parts that extensions add, one of a class.
     """

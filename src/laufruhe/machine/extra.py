@@ -10,7 +10,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 
 class Extra(ABC):
-    """A part that an extension adds to an engine; equal parts are equal and hash alike.
+    """A part that an extension adds to an engine; parts with equal numbers compare equal and have equal hashes.
 
     Attributes
     ----------
@@ -25,13 +25,13 @@ class Extra(ABC):
         return self
 
     def move(self, engine: Any, changes: Mapping[Any, float], before: Sequence[SliderCrank]) -> Any:
-        """Return an engine in which its numbers have changed; before are the slider-cranks of the engine as given."""
+        """Return an engine in which its numbers have changed; `before` has the slider-cranks of the initial engine."""
         moved = self.moved(changes, before, engine.slider_cranks)
         return engine if moved is self else engine.with_extra(moved)
 
     @abstractmethod
     def scaled(self, length: float, mass: float) -> Self:
-        """Return the part of an engine whose lengths and masses are so many times as large."""
+        """Return the part of an engine whose lengths and masses are multiplied by these factors."""
 
     def turning_inertia(self, _parts: Sequence[SliderCrank], /) -> float | None:
         """Return the inertia of all rotating parts except pistons and rods [kg m2]; None if it has none."""

@@ -1,6 +1,6 @@
 """Shared chamber of two pistons that face each other, on cranks that need not be in step (G18).
 
-Both sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. It is least between the dead
+Both pistons sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. It is least between the dead
 centres of the two, and from there its charge counts the angle.
 """
 
@@ -31,11 +31,11 @@ class Facing:
     ahead: float
 
     def scaled(self, length: float) -> Facing:
-        """Return the piston in another size."""
+        """Return the piston with lengths multiplied by this factor."""
         return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
 
     def swept(self, part: SliderCrank) -> Swept:
-        """Return the chamber that a piston shares with it."""
+        """Return the chamber that the piston `part` shares with this one."""
         if self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0):
             # pistons in step have half of the chamber each
             return Swept(part)
@@ -45,7 +45,7 @@ class Facing:
 
 @dataclass(frozen=True)
 class SharedChamber(SliderCrank):
-    """Slider-crank that sweeps alone what two pistons sweep together."""
+    """Slider-crank whose travel is that of two pistons together, so that it sweeps their shared chamber."""
 
     @property
     def _other(self) -> Facing:

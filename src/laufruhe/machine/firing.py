@@ -1,8 +1,8 @@
-"""Even firing as a lattice: stars that fire evenly, and their orders (S6-S8).
+"""Even firing as a lattice: crank stars that fire evenly, and their firing orders (S6-S8).
 
-Cylinders that fire at equal intervals of turns/n have their dead centres on multiples
-of 1/R of a turn, R of them, and every multiple is taken by as many cylinders as there
-are firings on it. That is all: a star is even if and only if its counts add up.
+Cylinders that fire at equal intervals of turns/n have their dead centres on the R multiples of 1/R of a turn, with R the
+number of steps. As many cylinders have their dead centre on a multiple as the lattice has firings there. So a crank
+star fires evenly if and only if these counts agree.
 """
 
 from __future__ import annotations
@@ -22,11 +22,13 @@ from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.exact_angles import SAME_TURN, angle_of
 
 MAX_ORDERS = 4096
+"""Largest number of firing orders that are ranked for a crank star, or solved one by one."""
 ORDERS_LOOKED_AT = 200_000
+"""Largest number of sequences that are examined for firing orders."""
 
 
 class NoEvenStarError(ModelError):
-    """Error of a layout without an evenly firing star."""
+    """Error of a layout without an evenly firing crank star."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +91,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     Raises
     ------
     NoEvenStarError
-        If there is none.
+        If no pattern fires evenly.
     """
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
@@ -160,14 +162,14 @@ def _dead_centres(layout: Layout, throws: tuple[float, ...]) -> tuple[float, ...
 
 
 def slot_steps(cycle: Cycle, slots: Sequence[int]) -> tuple[int, ...]:
-    """Return the lattice steps of throws whose single cylinders fire in these of n equal slots (S6)."""
+    """Return the lattice steps of throws with one cylinder each, from the slots in which these fire (S6)."""
     count = len(slots)
     shared = math.gcd(cycle.turns, count)
     return tuple(-slot * (cycle.turns // shared) % (count // shared) for slot in slots)
 
 
 def slot_order(slots: Sequence[int]) -> tuple[int, ...]:
-    """Return the firing order of cylinders that fire in these slots."""
+    """Return the firing order of cylinders, from the slot in which each fires."""
     return tuple(1 + slots.index(slot) for slot in range(len(slots)))
 
 
@@ -202,8 +204,8 @@ def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) 
 def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterator[tuple[int, ...]]:
     """Yield each firing order of throws at any angles once, cylinder 1 first.
 
-    An order says no more than that a cylinder fires at its first dead centre after the one
-    before it: firings that wait for a later one, or come two at once, have no order.
+    An order says only that a cylinder fires at its first dead centre after the cylinder before it. Firings that wait
+    for a later dead centre, and simultaneous firings, have no order.
     """
     turns = np.array(_dead_centres(layout, tuple(throws)))
     relative = (turns - turns[0]) % 1.0

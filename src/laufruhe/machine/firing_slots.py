@@ -1,8 +1,8 @@
-"""Shares of the firings of a cycle between throws when intervals are bounded (S25).
+"""Assign the firings of a cycle to throws within bounds on firing intervals (S25).
 
 The interval between cylinders of one throw is the angle between their banks and pins, plus whole turns. It does
-not depend on the throw. Firings are numbered from 0 to n - 1: a throw takes a set of them, all throws
-together take each once, and the moments of the firings are then a linear program.
+not depend on the throw. Firings are numbered from 0 to n - 1. A throw takes a set of them, and all throws
+together take each once. For given sets, a linear program finds the moments of the firings.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ import numpy as np
 from laufruhe.machine.engine import Cycle
 
 Shape: TypeAlias = tuple[tuple[int, float, float], ...]
+"""Further cylinders of a throw: slots after the first one, whole turns [rad], share of bank plus split pin angle."""
 Cover: TypeAlias = tuple[tuple[int, Shape], ...]
+"""Assignment of all firings to throws: slot of the first cylinder and shape of every throw."""
 
 _MAX_COVERS = 500
 _MAX_BROKEN = 40
@@ -32,18 +34,18 @@ _BROKEN = 1e3
 
 @dataclass(frozen=True)
 class FiringPattern:
-    """Firings shared out between throws.
+    """Firings of a cycle that are assigned to throws.
 
     Attributes
     ----------
     moments
         Crank angle of every firing after the first [rad].
     members
-        Of every throw the firings of its cylinders, in the order of the cylinders; the throw is any of them.
+        Slots of the cylinders of every throw, in the order of the cylinders; throws are in no order.
     angle
-        Bank angle plus split pin [rad].
+        Bank angle plus split pin angle [rad].
     broken
-        By how much intervals are outside of what is allowed [rad].
+        Largest violation of the bounds of intervals [rad].
     """
 
     moments: tuple[float, ...]
@@ -58,16 +60,16 @@ class FiringPattern:
 
 @dataclass(frozen=True)
 class FiringSlots:
-    """Firings to share out between throws, and the bounds of intervals.
+    """Firings to assign to throws, and the bounds of intervals.
 
     Attributes
     ----------
     sides
         Share of bank angle plus split pin by which the dead centre of each cylinder of a throw is late.
     angle
-        Least and largest bank angle plus split pin [rad].
+        Smallest and largest bank angle plus split pin angle [rad].
     minimum, maximum
-        Bounds of an interval [rad].
+        Bounds of a firing interval [rad].
     """
 
     cycle: Cycle
@@ -79,13 +81,13 @@ class FiringSlots:
 
     @property
     def count(self) -> int:
-        """Firings of a cycle."""
+        """Number of firings in a cycle."""
         return self.throws * len(self.sides)
 
     def patterns(self, throw_slots: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
-        """Return all ways to fire within the bounds, or the least broken ones, and True if none was left out.
+        """Return all patterns within the bounds, else those with the least violation, and True if none is left out.
 
-        A given firing order says which firings the cylinders of every throw take.
+        If the firing order is given, `throw_slots` has the slots of the cylinders of every throw.
         """
         even, slack, complete = self.cycle.angle / self.count, 0.0, True
 
@@ -104,7 +106,7 @@ class FiringSlots:
             slack = max(0.05 * even, 1.3 * slack)
 
     def _first_covers(self, slack: float, throw_slots: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
-        """Return covers in order of unevenness, as many as pay for a program, and True if these are all."""
+        """Return covers in order of unevenness, up to a largest number, and True if these are all."""
         even, covers = self.cycle.angle / self.count, dict[Cover, None]()
         maximum = min(_MAX_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
         complete = False
@@ -141,7 +143,7 @@ class FiringSlots:
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
 
     def _covers(self, throw_slots: Sequence[Sequence[int]] | None, nodes: Iterator[int]) -> Iterator[Cover]:
-        """Yield the ways to cover every firing once by throws, of so many nodes: slot of the first cylinder, shape."""
+        """Yield assignments of all firings to throws; `nodes` counts the steps of the search."""
         count, shapes = self.count, self._shapes()
         if throw_slots is not None:
             offset_choices = [
@@ -178,7 +180,7 @@ class FiringSlots:
                 yield tuple((first, shapes[number]) for first, number in turned)
 
     def _timed(self, cover: Cover) -> FiringPattern | None:
-        """Return firing angles for banks that cover the cycle; they violate bounds least, then are most even."""
+        """Return the firing angles of a cover that violate bounds least, and then are most even; None without any."""
         from scipy.optimize import linprog
 
         count, cycle_angle = self.count, self.cycle.angle

@@ -1,11 +1,14 @@
 """Angles at which throws keep a firing order and bounds on firing intervals (S26).
 
-A cylinder fires at t_k = 2 pi l_k - (theta_p + c_k), p its throw, c_k what its pin and bank add, l_k whole
-turns. Bounds on intervals, and on throws, are bounds on differences of two throws, or of a throw and
-nothing: a network whose shortest paths are the tightest bounds, and which no crank keeps where a circle is negative.
-Where the bank angle or split pins are open, it is one of own angles, theta_p - s_k beta with beta their sum and
-s_k = +- 1/2 the side of a cylinder; the angle between two of one throw depends on beta. Throws that are open are
-then counted from where cylinder 1 at its dead centre has the first one, as theta_p - s_1 beta.
+Cylinder k fires at t_k = 2 pi l_k - (theta_p + c_k), with l_k whole turns, theta_p the angle of its throw p, and c_k
+what its pin and bank add. Bounds on intervals and on throws are bounds on differences of two throws, or of a throw and
+zero. These differences form a network whose shortest paths are the tightest bounds. If a closed path is negative, no
+crank keeps the bounds.
+
+If the bank angle or the split pins are open, own angles of the cylinders take the place of throws: theta_p - s_k beta.
+Here beta is the sum of the open angles, and s_k = +- 1/2 the side of cylinder k. Own angles of two cylinders on one
+throw differ by a multiple of beta. Open throws count from the crank with cylinder 1 at its dead centre, as
+theta_p - s_1 beta.
 """
 
 from __future__ import annotations
@@ -22,8 +25,8 @@ from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, Indices
 
 SLACK = 1e-7
-"""By which firing intervals may miss their bounds [rad]: a rounding of the programs that place throws."""
-# a circle of bounds may be negative by this rounding error
+"""Angle by which firing intervals may miss their bounds [rad]: a rounding of the programs that place throws."""
+# a closed path of bounds may be negative by this rounding error
 _ROUNDING = 1e-10
 # rounds in which throws and open angles narrow each other
 _ROUNDS = 3
@@ -43,12 +46,12 @@ class FiringWindow:
     order
         Cylinder numbers; empty where firings are in no order and intervals without bounds.
     laps
-        l_k of every cylinder.
+        Whole turns l_k of every cylinder.
     paths
-        Most by which own angle j stands ahead of own angle i [rad], shape (own angles + 1, own angles + 1); the last
-        is none but the angle 0.
+        Largest angle by which own angle j is ahead of own angle i [rad], shape (own angles + 1, own angles + 1); the
+        last row and column are those of the angle zero.
     bounds
-        Conditions that it keeps.
+        Conditions that the window keeps.
     """
 
     order: tuple[int, ...]
@@ -58,7 +61,7 @@ class FiringWindow:
 
     @cached_property
     def box(self) -> tuple[Array, Array]:
-        """Least and largest of every throw and open angle [rad]."""
+        """Smallest and largest value of every throw and open angle [rad]."""
         return self.within(*self.bounds.root) or self.bounds.root
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
@@ -81,7 +84,7 @@ class FiringBounds:
     Attributes
     ----------
     minimum, maximum
-        Of every firing interval [rad].
+        Bounds of every firing interval [rad].
     throws
         Bounds of every throw [rad]; None where they are open, and cylinder 1 is at its dead centre at phi = 0.
     order
@@ -100,7 +103,7 @@ class FiringBounds:
 
     @cached_property
     def advance(self) -> tuple[float, ...]:
-        """Crank angle by which every cylinder fires before a throw at theta = 0, open angles at zero, c_k [rad]."""
+        """Crank angle c_k by which every cylinder fires before a throw at theta = 0, with open angles at zero [rad]."""
         layout, minimum = self.layout, sum(low for low, _ in self.open_angles)
         zero = [0.0] * len(layout.throw_positions)
         return tuple(
@@ -127,7 +130,7 @@ class FiringBounds:
 
     @cached_property
     def shares(self) -> Array:
-        """Parts of open angles in every own angle, shape (own angles, open angles)."""
+        """Shares of the open angles in every own angle, shape (own angles, open angles)."""
         return np.tile(np.array([share for _, share in self._named])[:, None], len(self.open_angles))
 
     @cached_property

@@ -15,7 +15,7 @@ LATERAL = 0.3
 
 @dataclass(frozen=True)
 class Arms:
-    """Oval arms between hub and rim, a full section each.
+    """Arms between hub and rim, each with a full oval section.
 
     Attributes
     ----------
@@ -38,9 +38,9 @@ class Rim:
     Attributes
     ----------
     mean_diameter, width, height
-        To the middle of the section; along the shaft; along a radius [m].
+        Diameter at the middle of the section, width along the shaft, and height along a radius [m].
     density
-        [kg/m3].
+        Density of the rim [kg/m3].
     mass_ratio
         Mass of the whole flywheel over that of its rim; what is within the rim is not counted as inertia.
     """
@@ -54,7 +54,7 @@ class Rim:
 
     @property
     def radii(self) -> tuple[float, float]:
-        """Inside and outside [m]."""
+        """Inner and outer radius [m]."""
         return 0.5 * (self.mean_diameter - self.height), 0.5 * (self.mean_diameter + self.height)
 
     @property
@@ -106,7 +106,7 @@ class Flywheel:
 
     @property
     def ring(self) -> Rim:
-        """The rim; an error without one."""
+        """Rim; `ModelError` if the flywheel is given by its inertia alone."""
         if self.rim is None:
             raise ModelError("a flywheel that is given by its inertia has no mass and no stress; give its rim")
         return self.rim

@@ -23,9 +23,10 @@ class Charge:
     compression_ratio
         Largest over smallest volume.
     intake_pressure, exhaust_pressure
-        Absolute pressures of the gas exchange [Pa]; compression starts at the first. Two strokes need no second.
+        Absolute pressures of the gas exchange [Pa]; compression starts at the first. A two-stroke
+        needs no exhaust pressure.
     crankcase_pressure
-        Absolute [Pa], on the underside of the piston.
+        Absolute pressure on the underside of the piston [Pa].
     """
 
     compression_ratio: float = 17.0
@@ -46,13 +47,13 @@ class Charge:
 class Seiliger(Charge):
     """Mixed cycle, its heat given at constant volume and then at constant pressure.
 
-    Constant volume goes up to the peak pressure, constant pressure up to the cut-off that
-    gives the indicated mean pressure wanted.
+    Heat at constant volume raises the pressure to its peak. Heat at constant pressure lasts up to the cut-off that
+    gives the indicated mean effective pressure.
 
     Attributes
     ----------
     peak_pressure
-        Absolute [Pa].
+        Absolute peak pressure [Pa].
     imep
         Indicated mean effective pressure of the whole cycle, gas exchange included [Pa].
     compression_exponent, expansion_exponent
@@ -84,11 +85,11 @@ class Wiebe(Charge):
     Attributes
     ----------
     imep
-        As of `Seiliger` [Pa]; the heat released follows from it.
+        Indicated mean effective pressure, as in `Seiliger` [Pa]; the heat released follows from it.
     start, duration
-        Of combustion, crank angle from the firing dead centre [rad].
+        Start and duration of combustion, as crank angles; the start counts from the firing dead centre [rad].
     shape
-        Exponent m.
+        Exponent m of the burnt fraction.
     completeness
         Fraction burnt at the end; a = -ln(1 - completeness).
     heat_ratio
@@ -127,14 +128,14 @@ class Wiebe(Charge):
 
 @dataclass(frozen=True)
 class PressureTrace:
-    """A measured trace over one cycle.
+    """Measured cylinder pressure over one cycle.
 
     Attributes
     ----------
     angles
         Ascending crank angles of one cycle after the firing dead centre [rad]; the end may repeat the beginning.
     pressures, crankcase_pressure
-        Absolute [Pa].
+        Absolute pressures in the cylinder, and on the underside of the piston [Pa].
     """
 
     angles: tuple[float, ...]
@@ -168,7 +169,7 @@ class PressureTrace:
 
 
 def check_pressures(gas: object, *names: str) -> None:
-    """Raise `ModelError` unless these pressures of a gas are absolute ones."""
+    """Raise `ModelError` if one of the named pressures of a gas is not positive and finite."""
     for name in names:
         pressure = getattr(gas, name)
         if not 0.0 < pressure < math.inf:

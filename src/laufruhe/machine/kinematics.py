@@ -1,11 +1,9 @@
 """Kinematics of the slider-crank, exact, offset included (K1-K6).
 
-Lengths are in crank radii and time is crank angle, so every kernel is a function of
-the local crank angle alpha (C5), the rod ratio lambda = r/l and the offset ratio
-epsilon = e/l. The maths namespace `lib` is NumPy or CasADi; arguments are scalars,
-symbols, or arrays of one shape, and the result has that shape. lambda = 0 is the
-Scotch yoke. The kernels raise nothing: lambda + |epsilon| >= 1, a crank that cannot
-turn, is refused where a machine is described.
+Lengths are in crank radii and time is crank angle. Every kernel is a function of the local crank angle alpha (C5), the
+rod ratio lambda = r/l and the offset ratio epsilon = e/l. The maths namespace `lib` is NumPy or CasADi. Arguments are
+scalars, symbols, or arrays of one shape, and the result has that shape. A Scotch yoke has lambda = 0. The kernels raise
+no error: a crank with lambda + |epsilon| >= 1, which cannot turn, is refused by the class of the mechanism.
 """
 
 from __future__ import annotations
@@ -14,23 +12,23 @@ from typing import Any
 
 
 def sin_psi(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """Sine of the rod's angle, sin psi = lambda sin alpha - epsilon (K1)."""
+    """Return the sine of the rod's angle, sin psi = lambda sin alpha - epsilon (K1)."""
     return rod_ratio * lib.sin(alpha) - offset_ratio
 
 
 def cos_psi(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """Cosine of the rod's angle, as (1 - sin psi)(1 + sin psi) to keep digits (K1)."""
+    """Return the cosine of the rod's angle, as the root of (1 - sin psi)(1 + sin psi) to keep digits (K1)."""
     sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
     return lib.sqrt((1.0 - sine) * (1.0 + sine))
 
 
 def rod_rate(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """psi' = d psi / d alpha = lambda cos alpha / cos psi (K2)."""
+    """Return the rate of the rod's angle, psi' = d psi / d alpha = lambda cos alpha / cos psi (K2)."""
     return rod_ratio * lib.cos(alpha) / cos_psi(lib, alpha, rod_ratio, offset_ratio)
 
 
 def rod_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """psi'' = (psi'^2 sin psi - lambda sin alpha) / cos psi (K3)."""
+    """Return the acceleration of the rod's angle, psi'' = (psi'^2 sin psi - lambda sin alpha) / cos psi (K3)."""
     sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
     cosine = cos_psi(lib, alpha, rod_ratio, offset_ratio)
     rate = rod_ratio * lib.cos(alpha) / cosine
@@ -38,9 +36,9 @@ def rod_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0
 
 
 def travel(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """Piston travel from alpha = 0, (s(0) - s(alpha)) / r (K4; Roetscher eq. 285).
+    """Return the piston travel from alpha = 0, (s(0) - s(alpha)) / r (K4; Roetscher eq. 285).
 
-    Written without differences of near-equal numbers, so it holds for any rod ratio
+    The formula has no differences of near-equal numbers, so it holds for any rod ratio
     down to the Scotch yoke.
     """
     half = lib.sin(0.5 * alpha)
@@ -51,13 +49,13 @@ def travel(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any
 
 
 def piston_velocity(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """s' / r = -sin alpha - cos alpha tan psi, positive away from the crank (K5)."""
+    """Return the piston velocity s' / r = -sin alpha - cos alpha tan psi, positive away from the crank (K5)."""
     tangent = sin_psi(lib, alpha, rod_ratio, offset_ratio) / cos_psi(lib, alpha, rod_ratio, offset_ratio)
     return -lib.sin(alpha) - lib.cos(alpha) * tangent
 
 
 def piston_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
-    """s'' / r = -cos alpha + sin alpha tan psi - lambda cos^2 alpha / cos^3 psi (K6)."""
+    """Return the piston acceleration s'' / r = -cos alpha + sin alpha tan psi - lambda cos^2 alpha / cos^3 psi (K6)."""
     sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
     cosine = cos_psi(lib, alpha, rod_ratio, offset_ratio)
     turning = lib.cos(alpha)

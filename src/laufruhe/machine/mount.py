@@ -24,25 +24,26 @@ class Mount:
     Attributes
     ----------
     position
-        (x, y, z) [m] (C2).
+        Position (x, y, z) [m] (C2).
     stiffness
-        Along its own three axes [N/m]; a rigid mounting uses the ratios; zero where the mount carries nothing.
+        Stiffness along its own three axes [N/m], zero along an axis that carries nothing. A rigid mounting uses the
+        ratios alone.
     orientation
-        Rows are the mount's own axes in the axes of C2.
+        Matrix whose rows are the mount's own axes in the axes of C2.
     loss_factor
-        Hysteretic: K becomes K (1 + i eta); damping work over work of deformation over 2 pi (eq. 40).
+        Hysteretic loss factor eta: K becomes K (1 + i eta); damping work over work of deformation over 2 pi (eq. 40).
     damping
-        Viscous, along its own three axes [N s/m].
+        Viscous damping along its own three axes [N s/m].
     lag
         Further viscous damping over stiffness, along each axis [s] (E48).
     dynamic
         Further springs along its own axes, whose stiffness depends on frequency (E50, E51).
     joined
-        Further springs at the same place, whose forces count with its own as one (E49).
+        Further springs at the same place; the sum of all forces there is one mount force (E49).
     stop_gap
         Travel along each own axis at which a bump stop is met [m]; time domain only.
     stop_stiffness
-        Added beyond the gap [N/m].
+        Stiffness that the bump stop adds beyond the gap [N/m].
     """
 
     name: str
@@ -68,7 +69,7 @@ class Mount:
 
     @property
     def springs(self) -> tuple[Mount, ...]:
-        """Springs of this place, each by itself."""
+        """Springs of this place, each as a mount without joined springs."""
         return (replace(self, joined=()), *self.joined) if self.joined else (self,)
 
     @property
@@ -81,7 +82,7 @@ class Mount:
 
     @property
     def depends_on_frequency(self) -> bool:
-        """True if the stiffness of any spring of the place does."""
+        """True if the stiffness of a spring of the place depends on frequency."""
         return any(spring.dynamic for spring in self.springs)
 
     def mapped(self, change: Callable[[Mount], Mount]) -> Mount:
@@ -91,17 +92,17 @@ class Mount:
 
     @property
     def stiffness_matrix(self) -> Array:
-        """3 x 3 stiffness at rest in the axes of C2 (E2)."""
+        """Stiffness matrix at rest, shape (3, 3), in the axes of C2 (E2)."""
         return self._in_c2(lambda spring: spring.at_rest)
 
     @property
     def loss_matrix(self) -> Array:
-        """3 x 3 stiffness times loss factor in the axes of C2 (E2)."""
+        """Matrix of stiffness times loss factor, shape (3, 3), in the axes of C2 (E2)."""
         return self._in_c2(lambda spring: tuple(spring.loss_factor * k for k in spring.stiffness))
 
     @property
     def damping_matrix(self) -> Array:
-        """3 x 3 viscous damping in the axes of C2 (E2, E48)."""
+        """Matrix of viscous damping, shape (3, 3), in the axes of C2 (E2, E48)."""
         return self._in_c2(
             lambda spring: tuple(c + spring.lag * k for c, k in zip(spring.damping, spring.stiffness, strict=True))
         )
@@ -115,5 +116,5 @@ class Mount:
 
 
 def every_spring(mounts: Sequence[Mount]) -> list[tuple[int, Mount]]:
-    """Return (place index, spring) of all springs of all places, those of one place one after the other."""
+    """Return all springs in the order of the mounts, each with the index of its mount."""
     return [(place, spring) for place, mount in enumerate(mounts) for spring in mount.springs]

@@ -16,9 +16,9 @@ class Shaft:
     Attributes
     ----------
     ratio
-        Speed over crank speed; negative runs against the crank (C3).
+        Speed over crank speed; negative if it runs against the crank (C3).
     y, z
-        Place of the axis in the plane across the crank axis [m] (C2).
+        Position of the axis in the plane across the crank axis [m] (C2).
     """
 
     name: str
@@ -31,7 +31,7 @@ class Shaft:
             raise ModelError(f"shaft '{self.name}' has ratio 0: a shaft that stands still balances nothing")
 
     def scaled(self, length: float) -> Shaft:
-        """Return the shaft in another size."""
+        """Return the shaft with lengths multiplied by this factor."""
         return replace(self, y=self.y * length, z=self.z * length)
 
 
@@ -53,11 +53,11 @@ class Rotor:
     Attributes
     ----------
     x
-        Place along the crank axis [m].
+        Position along the crank axis [m].
     unbalance
-        Mass times eccentricity, at its angle when phi = 0 [kg m], zeta = z + i y.
+        Mass times eccentricity at phi = 0, as a complex number z + i y [kg m].
     radius
-        Eccentricity of its mass [m], where the mass itself matters.
+        Eccentricity of its mass [m]; None if the mass itself is not needed.
     """
 
     name: str
@@ -92,9 +92,9 @@ class Bearing:
     Attributes
     ----------
     x
-        Middle along the crank axis [m] (C2).
+        Position of its middle along the crank axis [m] (C2).
     diameter, width
-        Of its journal [m]; needed for a pressure, the diameter for friction too.
+        Size of its journal [m]; needed for a pressure, the diameter for friction too.
     friction
         Coefficient of friction; needed for friction power only.
     """
@@ -112,7 +112,7 @@ class Bearing:
                 raise ModelError(f"bearing '{self.name}' has a {what} of {size:g} m; it must be positive")
 
     def scaled(self, length: float) -> Bearing:
-        """Return the bearing in another size."""
+        """Return the bearing with lengths multiplied by this factor."""
         diameter, width = (None if size is None else size * length for size in (self.diameter, self.width))
         return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=self.shaft.scaled(length))
 
@@ -140,9 +140,9 @@ class GearedInertia:
     Attributes
     ----------
     ratio
-        Speed over crank speed; negative runs against the crank (C3).
+        Speed over crank speed; negative if it runs against the crank (C3).
     share
-        Part of the inertia of all that turns, reduced to the crank: n^2 J_n over the sum of all (L8).
+        Share of the inertia of all that turns, reduced to the crank: n^2 J_n over the sum of all (L8).
     """
 
     name: str
@@ -160,11 +160,11 @@ _GRADE = re.compile(r"^\s*G\s*(\d+\.?\d*|\.\d+)\s*$")
 
 
 def grade_of(text: str) -> float | None:
-    """Return the grade [m/s] of a text such as "G 6.3" (in mm/s), or None."""
+    """Return the balance quality grade [m/s] of a text such as "G 6.3" (in mm/s), or None."""
     match = _GRADE.match(text)
     return float(match.group(1)) * 1e-3 if match else None
 
 
 def permitted_unbalance(grade: float, mass: float, speed: float) -> float:
-    """Return the permitted unbalance of a rotor at its fastest speed in service, summed over its planes (R1)."""
+    """Return the permitted unbalance of a rotor at its fastest speed in service, summed over its planes [kg m] (R1)."""
     return grade * mass / speed

@@ -27,13 +27,13 @@ class Swept:
     piston
         Slider-crank that sweeps one chamber, its angle counted from firing.
     pace
-        Its crank angle over that of the engine.
+        Crank angle of the piston over that of the engine.
     lags
-        Crank angles of the engine by which each fires before the first [rad].
+        Crank angles of the engine by which each chamber fires before the first [rad].
     four_strokes
-        Whether a chamber makes four strokes whatever the cycle of the engine.
+        True if a chamber makes four strokes whatever the cycle of the engine.
     charge
-        What sweeps the chamber, where that is not the piston alone.
+        Mechanism that sweeps the chamber, if that is not the piston alone.
     late
         Crank angle from the firing of the piston to that of its chamber [rad].
     """
@@ -55,7 +55,7 @@ class Shared(Protocol):
     """Second piston of a chamber."""
 
     def scaled(self, length: float) -> Any:
-        """Return the piston in another size."""
+        """Return the piston with lengths multiplied by this factor."""
 
     def swept(self, part: SliderCrank) -> Swept:
         """Return the shared chamber as seen by one of the pistons."""
@@ -68,13 +68,13 @@ class SliderCrank:
     Attributes
     ----------
     x
-        Place along the crank axis [m].
+        Position along the crank axis [m].
     crank_radius
-        Throw r [m].
+        Crank radius r [m].
     rod_length
-        Between the pins, l [m]; infinite for a Scotch yoke.
+        Distance l between the pins of the rod [m]; infinite for a Scotch yoke.
     reciprocating_mass
-        Piston, pin, and the rod's share [kg].
+        Mass of piston and pin with the rod's share [kg].
     throw
         Angle theta of the crank pin when phi = 0 [rad] (C3).
     bank
@@ -90,7 +90,7 @@ class SliderCrank:
     firing_angle
         Crank angle phi at which this cylinder fires [rad], within the cycle (C5).
     facing
-        Another piston that works in its chamber, out of step with it; None where there is none.
+        Another piston that works in its chamber, out of step with it; None if there is none.
     big_end
         Diameter and width of the rod's bearing on the crank pin [m]; needed for a pressure only.
     """
@@ -111,13 +111,13 @@ class SliderCrank:
     big_end: tuple[float, float] | None = None
     facing: Shared | None = None
     noun: ClassVar[str] = "cylinder"
-    """Noun in its name."""
+    """Noun in its name, before its number."""
     has_pin_loads: ClassVar[bool] = True
-    """Whether the force on its crank pin is known."""
+    """True if the force on its crank pin is known."""
     has_rod: ClassVar[bool] = True
-    """Whether a rod leans on a cylinder wall."""
+    """True if a rod presses the piston against a cylinder wall."""
     is_balanced_by_share: ClassVar[bool] = True
-    """Whether a share of its reciprocating mass at the crank pin means anything (eq. 13)."""
+    """True if a counterweight may balance a share of its reciprocating mass (eq. 13)."""
     dimensions: ClassVar[Mapping[str, tuple[int, int]]] = {
         **dict.fromkeys(("x", "crank_radius", "rod_length", "offset", "bore"), (0, 1)),
         **dict.fromkeys(("reciprocating_mass", "rotating_mass"), (1, 0)), "rod_inertia_deficit": (1, 2),
@@ -141,12 +141,12 @@ class SliderCrank:
 
     @property
     def rod_ratio(self) -> float:
-        """lambda = r / l."""
+        """Rod ratio lambda = r / l."""
         return self.crank_radius / self.rod_length
 
     @property
     def offset_ratio(self) -> float:
-        """epsilon = e / l."""
+        """Offset ratio epsilon = e / l."""
         return self.offset / self.rod_length
 
     @property
@@ -191,7 +191,7 @@ class SliderCrank:
 
     @property
     def counterweight_mass(self) -> float | None:
-        """Mass that it carries against its other masses [kg], or None if it carries no such mass."""
+        """Mass of its own counterweight [kg]; None if it has none."""
         return None
 
     def only(self, masses: Mapping[str, float]) -> Self:
@@ -200,7 +200,7 @@ class SliderCrank:
         return replace(self, **none | dict(masses))
 
     def scaled(self, length: float, mass: float) -> Self:
-        """Return the mechanism in another size."""
+        """Return the mechanism with lengths and masses multiplied by these factors."""
         numbers: dict[str, Any] = {
             name: getattr(self, name) * mass**mass_power * length**length_power
             for name, (mass_power, length_power) in self.dimensions.items()
@@ -266,7 +266,7 @@ class SliderCrank:
 
     @property
     def piston_area(self) -> float:
-        """Area the gas acts on [m2]."""
+        """Area on which the gas acts [m2]."""
         if self.bore is None:
             raise ModelError(f"{self.name}: gas forces need a bore")
         return math.pi * self.bore**2 / 4.0

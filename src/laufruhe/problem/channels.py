@@ -31,7 +31,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
-"""Function that returns the factor of each place on its load, shape (places,) or (places, d), such as 1 / area."""
+"""Function that returns the factor on the load of each place, such as 1 / area, shape (places,) or (places, d)."""
 FlywheelFunction: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
@@ -74,7 +74,7 @@ class Need:
 
 
 class Needs:
-    """Needs of the channels of the core."""
+    """Parts of an engine that channels of the core need."""
 
     UNCONDITIONAL = Need(lambda _: True, "", "")
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
@@ -116,6 +116,8 @@ class Channel:
         Part that the engine must have.
     sides
         Sides that a limit may have: "min", "max", "outside".
+    minimised
+        True if an objective may contain it.
     depends_on_loads
         False if it certainly does not depend on the loads that excite the block.
     flywheel_value
@@ -254,7 +256,7 @@ class LoadChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class MassChannel(Channel):
-    """Sum of the masses of rotors with some roles."""
+    """Sum of the masses of rotors with certain roles, such as counterweights."""
 
     keys: tuple[str, ...] = ("of",)
     roles: tuple[Role, ...] = field(kw_only=True)

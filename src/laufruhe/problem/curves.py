@@ -129,7 +129,7 @@ class Fields:
 
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
-    """Return the loads on block, mounts and bearings, and the mount travel, at some steps over the cycle (C7)."""
+    """Return the loads on block, mounts and bearings, and the mount travel, at `steps` angles of the cycle (C7)."""
     check_integer("steps", steps, 1, MAX_STEPS)
     first = next(iter(designs.values()))
     cycle, direction, fields = first.engine.cycle, CurveAxis("direction", ("x", "y", "z")), []

@@ -46,18 +46,19 @@ class Kind:
     is_alone: bool = field(default=False, compare=False)
 
     UNBALANCE: ClassVar[Kind]
-    """Every load is affine in it (P1)."""
+    """Unbalance: every load is affine in it (P1)."""
     PLACE: ClassVar[Kind]
-    """Every load is affine in it while the unbalances are fixed (P8)."""
+    """Position of a rotor: every load is affine in it while the unbalances are fixed (P8)."""
     STIFFNESS: ClassVar[Kind]
-    """The stiffness matrix of the mounting is linear in it."""
+    """Stiffness of a mount: the stiffness matrix of the mounting is linear in it."""
     MOUNT: ClassVar[Kind]
+    """Any other number of a mount."""
     STAR: ClassVar[Kind]
-    """The phasing, which is no number."""
+    """Phasing, which is no number: crank star, firing order and optional shafts."""
     FLYWHEEL: ClassVar[Kind]
-    """Affects the flywheel and the evenness of the crank's speed only."""
+    """Number of the flywheel: it affects only the flywheel and the evenness of the crank's speed."""
     PISTON: ClassVar[Kind]
-    """Every load is affine in it, but not the turning inertia."""
+    """Mass of a piston: every load is affine in it, but not the turning inertia."""
     SIZE: ClassVar[Kind]
     """Size of the running gear: stresses fall with it, masses follow from it (Z2)."""
     SHARE: ClassVar[Kind]
@@ -122,7 +123,7 @@ class Numbers:
     changes: dict[tuple[Kind, Any], float] = field(default_factory=dict)
 
     def engine(self, base: Engine) -> Engine:
-        """Return an engine with these numbers."""
+        """Return the engine `base` with these numbers."""
         rotors = []
         for rotor in base.rotors:
             unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
@@ -152,7 +153,7 @@ class Numbers:
         return with_leads(engine, leads) if leads else engine
 
     def flywheel(self, base: Flywheel) -> Flywheel:
-        """Return a flywheel with these numbers."""
+        """Return the flywheel `base` with these numbers."""
         changes = self._of_kind(Kind.FLYWHEEL.name)
         # numbers without a change may be None
         return base.moved([x + changes[k] if k in changes else x for k, x in enumerate(base.numbers)])

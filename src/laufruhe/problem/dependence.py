@@ -29,7 +29,7 @@ class Dependence(StrEnum):
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Affine in masses that follow from sizes, times a factor of each place that is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
-    """Sum of parts, each delayed by its own angle: the throws of a star, or the loads of geared shafts (P13)."""
+    """Sum of parts, each delayed by its own angle: the throws of a crank star, or the loads of geared shafts (P13)."""
     SWING = "a number of a signal that is SHIFT"
     CONVEX = "convex"
     MONOTONE_UP = "never falls"

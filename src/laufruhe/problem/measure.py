@@ -134,7 +134,7 @@ class Term:
 class PriorityLevel:
     """Objective of one priority, minimised over the optima of all objectives of higher priority.
 
-    Those of lower priority may increase it by the fraction `within` of its minimum.
+    Objectives of lower priority may increase this one by the fraction `within` of its minimum.
     """
 
     terms: tuple[Term, ...]

@@ -24,7 +24,7 @@ def evaluate_start(problem: Problem) -> Evaluation:
     Raises
     ------
     ModelError
-        As `evaluate`; also on a resonance without open mounts.
+        If `evaluate` raises it, or if the design is on a resonance and no mounts are open.
     """
     try:
         return evaluate(problem)

@@ -18,7 +18,7 @@ from laufruhe.problem.problem import Problem
 ROUNDING = 1e-9
 """Fraction of cancelling loads below which their sum counts as zero."""
 OF_ORDERS = 1e-12
-"""Fraction of all orders of a part below which a single order counts as zero; all come from one signal."""
+"""Fraction of the load of one cylinder or rotor over all orders, below which a single order counts as zero."""
 SAMPLES = 96
 """Number of samples over the cycle for these estimates."""
 
@@ -32,10 +32,11 @@ _SIZES: Mapping[Channel, Callable[[Engine], float]] = {
 
 
 def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
-    """Return the value of the objective that counts as zero [SI]: the rounding error of the sum over all parts.
+    """Return the value of the objective that counts as zero [SI]: the rounding error of the sum of loads.
 
-    The objective of a balanced engine gives no scale, so the objectives of single parts are summed. If only some orders
-    count, a small fraction of all orders is added, because each order is a sum over the cycle of the complete signal.
+    The objective of a balanced engine gives no scale, so those of single cylinders and rotors are summed. If only some
+    orders count, a small fraction of all orders is added, because each order is a sum over the cycle of the complete
+    signal.
     The engine is by default that of the problem as given.
     """
     engine = problem.engine if engine is None else engine

@@ -23,7 +23,7 @@ _EVEN_STARS = 3
 
 
 class Method(StrEnum):
-    """Method of deciding the discrete part."""
+    """Method that decides crank star, firing order and optional shafts."""
 
     AUTO = "auto"
     SEARCH = "search"
@@ -31,7 +31,7 @@ class Method(StrEnum):
 
 
 class OrderCriterion(StrEnum):
-    """Criterion that ranks firing orders of one star."""
+    """Criterion that ranks firing orders of one crank star."""
 
     ROLL_MOMENT = "roll moment"
     NEIGHBOURS = "neighbours"
@@ -148,7 +148,7 @@ class PhasingOf(Generic[P]):
     layout
         Function that returns the layout of a bank angle [rad] and a split pin angle [rad].
     throws
-        Given throws [rad]; None if the star is open.
+        Given throws [rad]; None if the crank star is open.
     throw_bounds
         Bounds of every throw [rad] if these are open one by one, else None.
     firing_order
@@ -158,7 +158,7 @@ class PhasingOf(Generic[P]):
     steps
         Number of steps of a turn for throws; None for those of even firing.
     best
-        Number of stars in the ranking.
+        Number of crank stars in the ranking.
     criteria
         Criteria that rank firing orders, the most important first.
     time_limit
@@ -240,7 +240,7 @@ class PhasingOf(Generic[P]):
         self, steps: Sequence[int], phases: int, geometry: tuple[float | None, float | None],
         left_out: tuple[str, ...] = (),
     ) -> Candidate:  # fmt: skip
-        """Return the candidate of a star with even firing, with the first of its firing orders.
+        """Return the candidate of a crank star with even firing, with the first of its firing orders.
 
         The angles of its throws are `steps`, of which one turn has `phases`.
         """
@@ -281,7 +281,7 @@ class PhasingOf(Generic[P]):
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
-    """Return start stars within the bounds of the throws [rad]: the middle, then the nearest evenly firing stars.
+    """Return start cranks within the bounds of the throws [rad]: the middle, then the nearest evenly firing stars.
 
     For more than seven cylinders without a firing order, only the middle is returned.
     """

@@ -13,7 +13,7 @@ from laufruhe.numerics.exact_angles import as_turn, reduced_turn
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
-"""Mean piston speed [m/s]; racing engines reach 26."""
+"""Largest usual mean piston speed [m/s]; racing engines reach 26."""
 MIN_DENSITY, MAX_DENSITY = 150.0, 20_000.0
 """Usual range of reciprocating mass over swept volume [kg/m^3]; engines that were built have about 700 to 4000."""
 SHORTEST_ROD = 0.45

@@ -117,7 +117,7 @@ class Origin:
 
 @dataclass(frozen=True, eq=False)
 class KnownRows:
-    """Rows of a measure in time: its value is the largest length of constant + slope x.
+    """Rows of a measure over time, whose value is the largest length of constant + slope x.
 
     The rows have the shapes (k, d) and (k, d, n); x are the columns of the decisions that loads are affine in.
     """
@@ -159,7 +159,7 @@ class Problem:
     known_rows
         Rows of measures in time whose largest length is convex in the unbalances.
     rebuild
-        Function that draws the file with other numbers.
+        Function that builds engine, points and decisions from the file with other numbers.
     """
 
     name: str
@@ -288,7 +288,7 @@ class Problem:
 
     @property
     def depends_on_firing_order(self) -> bool:
-        """True if a measure depends on the firing order of a star: torsion, and loads inside the crankcase with gas."""
+        """True if a measure depends on a crank star's firing order: torsion, and loads inside the crankcase with gas."""
         if any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]
@@ -350,7 +350,7 @@ class Problem:
         return self.origin.edited(self.origin, edit, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
-        """Return the problem with other attributes, also in the problems of its candidates if stars are open."""
+        """Return the problem with other attributes, also in the problems of its candidates if crank stars are open."""
         changes = {"origin": None, **changes}
         if self.phasing is not None:
             realise = self.phasing.realise
@@ -387,7 +387,7 @@ class Problem:
         )  # fmt: skip
 
     def _drawn(self, changes: Mapping[Path, str | float]) -> Problem:
-        """Return the problem drawn from its file with other numbers; decisions keep their sets."""
+        """Return the problem built again from its file with other numbers; decisions keep their sets."""
         if not changes:
             return self
         drawing = self.rebuild(changes)

@@ -1,7 +1,7 @@
 """Solve flywheel, crankshaft and all other decisions as separate problems.
 
-At constant speed each measure depends on one of these problems alone. So the sum of the optima is the optimum, and the sum of the
-lower bounds is a lower bound.
+At constant speed each measure depends on one of these problems alone. So the sum of the optima is the
+optimum, and the sum of the lower bounds is a lower bound.
 """
 
 from __future__ import annotations

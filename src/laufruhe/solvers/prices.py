@@ -1,4 +1,4 @@
-"""Shadow prices of limits and bounds: smallest and largest multipliers that balance the slopes at an optimum (P5, P19)."""
+"""Shadow prices of limits and bounds: smallest and largest multipliers that balance an optimum (P5, P19)."""
 
 from __future__ import annotations
 

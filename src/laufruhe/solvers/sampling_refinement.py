@@ -32,7 +32,8 @@ from laufruhe.solvers.result import Result, Status
 ROUNDS, MAX_TIMES = 4, 16
 """Largest number of refinements, and largest factor of the samples in one of them."""
 SMALL_ERROR, LARGE_ERROR = 0.1, 2.0
-"""Sampling error of the objective that counts as none, and smallest sampling error that counts; in tolerances."""
+"""Sampling error of the objective that counts as none, and smallest value of an error that changes the proof; in
+tolerances."""
 
 
 def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:

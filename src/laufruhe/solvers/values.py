@@ -13,8 +13,9 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.prices import Price
 
 ZERO_SHARE = 1e-5
+"""Value relative to its bounds that counts as zero."""
 DISTINCT_SHARE = 0.05
-"""Share of the largest decision by which two designs differ."""
+"""Width of a range, relative to the largest decision of its unit, above which the designs in it differ."""
 
 
 class _Priced:

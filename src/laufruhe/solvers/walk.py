@@ -41,16 +41,16 @@ SHARE, SECONDS = 0.03, 0.01
 STEP, SHORTER, LONGER = 0.1, 0.2, 2.0
 """First step relative to the range of a decision, and its factors after a failure and after a success."""
 ORDERS = 6
-"""Number of firing orders of one star that the walk tries."""
+"""Number of firing orders of one crank star that the walk tries."""
 ROUNDING = 1e-9
 """Relative difference that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Design before its evaluation: a problem with its star, and the values of the decisions [SI].
+    """Design before its evaluation: a problem with its crank star, and the values of the decisions [SI].
 
-    The candidate is the star and firing order; None if neither is open.
+    The candidate is the crank star and firing order; None if neither is open.
     """
 
     problem: Problem
@@ -61,7 +61,7 @@ class Point:
 Move = Callable[[Point, float], Point | None]
 """Function that returns a design at a signed step, relative to the range of the decisions; None if bounds forbid it."""
 Change = Callable[[Candidate, float], Candidate | None]
-"""Function that returns a star and firing order at a signed step; None if there is none."""
+"""Function that returns a crank star and firing order at a signed step; None if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +327,10 @@ def _change(phasing: Phasing, change: Change, point: Point, step: float) -> Poin
 
 
 def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -> bool:
-    """Return True if a design is feasible and below the bound by more than the sampling error; no bound is None."""
+    """Return True if a design is feasible and below the bound by more than the sampling error.
+
+    `bound` is None if the result claims that no design is feasible.
+    """
     problem, evaluation = witness.point.problem, witness.evaluation
     if bound is not None:
         if witness.value >= bound:

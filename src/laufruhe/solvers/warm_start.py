@@ -23,13 +23,13 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import candidates_of
 
 STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
-"""Starts of the first search, stars that it ranks, and fewer stars if mounts or throws are open too."""
+"""Starts of the first search, crank stars that it ranks, and fewer crank stars if mounts or throws are open too."""
 BOXES, NEAR_BOXES = 100, 30
 """Largest number of boxes of positions and leads: of the first search, and of a search from a known design."""
 SIMILAR = 0.1
 """Relative difference of the objective up to which a search from the known design alone is sufficient."""
 STEPS = 96
-"""Samples per cycle for the ranking of stars with even firing."""
+"""Samples per cycle for the ranking of crank stars with even firing."""
 
 
 def is_convex(problem: Problem) -> bool:
@@ -42,14 +42,14 @@ def is_convex(problem: Problem) -> bool:
 
 
 def compares_stars(problem: Problem) -> bool:
-    """Return True if all stars are compared: phasing is open, throws stand on even steps, and mounts are fixed."""
+    """Return True if all crank stars are compared: phasing is open, throws are on even steps, and mounts are fixed."""
     return problem.phasing is not None and not (problem.phasing.continuous or problem.mount_decisions)
 
 
 def solve_by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
     """Return the engine with optimal unbalances by one cone program; None if it has no solution.
 
-    The program has a number of samples over the period of the loads; by default all of the model.
+    `samples` is the number of samples over the period of the loads; by default that of the model.
     """
     model = AffineModel(problem)
     x = solve_cones(model.at(samples or model.full_samples)).x
@@ -71,7 +71,7 @@ def first_search(problem: Problem) -> Result | None:
 def reoptimise(problem: Problem, neighbour: Result) -> Engine | None:
     """Return the best engine of searches from a known result; None if no search ends within the limits.
 
-    The known result is of a problem with the same decisions. It gives the start values and the stars to compare.
+    The known result is of a problem with the same decisions. It gives the start values and the crank stars to compare.
     """
     if compares_stars(problem):
         # the best star may differ from the best one of the neighbour
@@ -101,7 +101,7 @@ def _best_engine(problem: Problem, engines: Sequence[Engine | None]) -> Engine |
 
 
 def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
-    """Return the best engine of the first-ranked stars; open throws may then leave the best star."""
+    """Return the best engine of the first-ranked crank stars; open throws may then leave the best star."""
     phasing = problem.phasing
     if phasing is None or neighbour.phasing is None:
         return None

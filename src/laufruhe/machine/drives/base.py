@@ -14,14 +14,14 @@ from laufruhe.machine.layouts.build import Mechanism
 
 @dataclass(frozen=True)
 class Sizes:
-    """Lengths of [engine], in SI.
+    """Lengths from the table [engine] of a problem file, in SI.
 
     Attributes
     ----------
     rod_length, rod_ratio
-        One of them, of a drive that has a rod.
+        Length or rod ratio of a drive that has a rod; one of them is None.
     options
-        The drive's own keys, None where left out.
+        Values of the keys of this drive alone; None if the file leaves a key out.
     """
 
     stroke: float
@@ -37,9 +37,9 @@ class DriveKind:
     Attributes
     ----------
     keys
-        Of [engine], in addition to those of every drive.
+        Keys of [engine] in addition to those of every drive.
     has_rod
-        Whether a connecting rod swings between crank pin and piston.
+        True if a connecting rod swings between crank pin and piston.
     """
 
     name: ClassVar[str]

@@ -52,7 +52,7 @@ def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.
 
 
 def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
-    """Return banks as of a vee of 180 degrees, every cylinder on a throw of its own, opposed pistons in step."""
+    """Return two opposed banks, with every cylinder on a throw of its own and opposed pistons in step."""
     layout = in_banks("boxer", cylinders, spacing, (0.5 * math.pi, -0.5 * math.pi), bank_stagger)
     return replace(layout, pins=tuple(range(cylinders)), throw_positions=layout.positions)
 

@@ -26,7 +26,7 @@ class LayoutKey:
         "length", "positive length", "non-negative length", "angle", "open angle", "open lead", "angles", "cylinder",
         "sign", "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
     default
-        Where it is left out.
+        Value if the file leaves the key out.
     """
 
     name: str
@@ -50,13 +50,13 @@ class LayoutInput:
     Attributes
     ----------
     options
-        The layout's own keys in SI, None where left out or open.
+        Values of the keys of this layout alone in SI; None for a key that is left out or open.
     piston_mass
         Reciprocating mass without the share of `rod` [kg].
     rod
-        Where it is given as a rigid body.
+        Connecting rod, if the file gives it as a rigid body.
     gas
-        Whether gas acts on the pistons.
+        True if gas acts on the pistons.
     """
 
     cycle: Cycle
@@ -101,21 +101,21 @@ class LayoutKind(ABC):
     Attributes
     ----------
     keys
-        Of [engine], in addition to those of every layout.
+        Keys of [engine] in addition to those of every layout.
     lists
-        Of the keys `throws`, `firing_order`, `slider_cranks` and `shafts` those that it takes.
+        Keys among `throws`, `firing_order`, `slider_cranks` and `shafts` that the layout takes.
     openable
         Keys that may be left open.
     banks
         Number of banks, which each have a cylinder at every place along the crank.
     is_free
-        Whether every slider-crank is listed, and nothing is placed.
+        True if the file lists every slider-crank with its place.
     fires_evenly
         True if open throws take the steps of even firing only, and loads on the block distinguish them.
     needs_rod
-        Whether a drive without a connecting rod means nothing here.
+        True if the layout needs a drive with a connecting rod.
     has_pistons
-        Whether [engine] says what its pistons, rods and strokes are; else the layout's own keys make the mechanism.
+        True if [engine] gives pistons, rods and strokes; else keys of the layout alone give the mechanism.
     """
 
     name: ClassVar[str]
@@ -130,11 +130,11 @@ class LayoutKind(ABC):
     has_pistons: ClassVar[bool] = True
 
     def takes(self, key: str) -> bool:
-        """Return True if a key means anything here."""
+        """Return True if the layout takes a key."""
         return key in self.lists or any(layout_key.name == key for layout_key in self.keys)
 
     def cycle(self, said: Cycle) -> Cycle:
-        """Return the cycle in which loads repeat, of the cycle of the chambers (C6)."""
+        """Return the cycle in which loads repeat, from the cycle of the chambers, `said` (C6)."""
         return said
 
     def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:
@@ -146,12 +146,12 @@ class LayoutKind(ABC):
 
     @abstractmethod
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return places, banks and pins.
+        """Return places, banks and pins of the cylinders.
 
         Raises
         ------
         ModelError
-            A `KeyedError` where one key is to blame.
+            If there is no such layout; a `KeyedError` if one key is the cause.
         """
 
     def parts(

@@ -23,15 +23,15 @@ class Mechanism:
     Attributes
     ----------
     crank_radius, rod_length, offset, bore, big_end
-        [m]; see `SliderCrank`.
+        Lengths [m]; see `SliderCrank`.
     reciprocating_mass
-        Per cylinder [kg].
+        Reciprocating mass per cylinder [kg].
     rotating_mass
-        Per throw, at the crank radius [kg].
+        Rotating mass per throw without rods, at the crank radius [kg].
     rod_rotating_mass
-        The rod's share per cylinder [kg].
+        Share of the rod at the crank pin, per cylinder [kg].
     rod_inertia_deficit
-        [kg m2] (eq. 10).
+        Inertia of the rod less that of its two masses [kg m2] (eq. 10).
     kind
         Class of the slider-cranks.
     numbers
@@ -130,7 +130,7 @@ class Throw:
     cylinders
         Indices of the slider-cranks that work on it.
     unbalance
-        Of its rotating mass, rods not included [kg m].
+        Unbalance of its rotating mass without rods [kg m].
     """
 
     x: float

@@ -22,15 +22,15 @@ from laufruhe.numerics.exact_angles import Turn, angle_of, as_turn, cis, reduced
 class Triangle:
     """Three cranks at the corners of a triangle that stands on one corner, and the dead centres of their pistons.
 
-    Bank k lies between corner k and the next one, counted with the clock from below as seen from the front; its first
-    piston works on corner k.
+    Bank k lies between corner k and the next one. Corners count from below with the clock, as seen from the front. The
+    first piston of bank k works on corner k.
 
     Attributes
     ----------
     side
         Distance of two cranks [m].
     ratios
-        Of the cranks, 1 or -1; the first is the crankshaft.
+        Speed ratios of the cranks, 1 or -1; the first is the crankshaft.
     leads
         Crank angle by which the first piston of every bank comes to its dead centre first, as parts of a turn.
     """

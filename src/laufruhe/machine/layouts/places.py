@@ -24,9 +24,9 @@ class Layout:
         Place along x of every throw [m].
     sides
         Share of the angle between the banks at which every cylinder leans; its pin is offset by as much of the
-        split pins' angle the other way. Empty where no bank is.
+        split pins' angle the other way. Empty without such banks.
     late
-        Crank angle from alpha = 0 to the dead centre that every cylinder fires at [rad]; empty where there is none.
+        Crank angle from alpha = 0 to the dead centre that every cylinder fires at [rad]; empty if all are zero.
     throws
         Angle of every throw [rad] where the layout leaves no choice.
     """

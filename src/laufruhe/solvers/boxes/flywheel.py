@@ -126,7 +126,7 @@ class _WheelProgram(LocalProgram):
     functions: MonotoneProblem
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective [SI] and the relative distance to each limit; `shares` are decisions over their range."""
+        """Return objective [SI] and relative distance to each limit; `shares` are scaled decisions, shape (n,)."""
         x, problem = np.array(self.values(shares)), self.functions
         distances = (1.0 - function.value(x) / maximum - MARGIN for maximum, function in problem.limits)
         return np.array([problem.value(x), *distances])

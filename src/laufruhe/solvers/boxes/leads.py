@@ -1,5 +1,4 @@
-"""Solve for phase leads by branch and bound: of geared shafts and coupled machines (P13, P14), and of cranks
-that share gas (P15).
+"""Solve for phase leads of shafts, coupled machines (P13, P14) and cranks with shared gas (P15) by branch and bound.
 
 A cone program at the middle of every box optimises the unbalances. Its dual rows bound the objective in the whole box.
 If only leads are open, simplex searches from the best points of a grid find the first design.

@@ -67,7 +67,7 @@ class BoxSearch(Generic[B, D]):
         raise NotImplementedError
 
     def level(self, _: float) -> float:
-        """Return the smallest objective of designs in boxes cut off [SI], from that of the incumbent; infinite if none."""
+        """Return the smallest objective that designs in cut-off boxes may have [SI]; infinite if none is cut off."""
         return math.inf
 
     def witness_of(self, _: D) -> Witness | None:

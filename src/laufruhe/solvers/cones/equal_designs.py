@@ -48,8 +48,8 @@ FREE = 0.2
 def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     """Return the range of every unbalance over all designs that keep the limits and stay optimal.
 
-    `limit` keeps the objective at its optimum. The tuple is empty if a decision is not affine, if more than `MAX_OPEN`
-    are open, if a measure has no cones, or if no time is left.
+    `limit` keeps the objective at its optimum. The tuple is empty if the method does not apply: a decision
+    is not affine, more than `MAX_OPEN` are open, or a measure has no cones. It is also empty if no time is left.
     """
     problem = result.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]

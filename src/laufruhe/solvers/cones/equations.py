@@ -1,7 +1,8 @@
 """Limits of zero as linear equations between the decisions, satisfied to rounding (P11).
 
-If a norm must be zero, its rows V0 + B x are zero, and its cone has no interior for the solver. The rows of such limits are reduced
-to independent equations. Dual rows of a limit of zero cost nothing, so a bound may use those that improve it.
+If a norm must be zero, its rows V0 + B x are zero, and its cone has no interior for the solver. The rows of such
+limits are reduced to independent equations. Dual rows of a limit of zero cost nothing, so a bound may use those that
+improve it.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Newton steps from the optimum at few samples per cycle to the optimum at many (P10).
 
-A cone program has as many samples as its time allows, and its dual rows between the samples are guesses. If the objective is
-smooth, a few Newton steps from its solution reach the optimum at many more samples. There, the subgradient of the
-design gives the dual rows.
+A cone program has as many samples as its time allows, and its dual rows between the samples are guesses. If the
+objective is smooth, a few Newton steps from its solution reach the optimum at many more samples. There, the subgradient
+of the design gives the dual rows.
 """
 
 from __future__ import annotations

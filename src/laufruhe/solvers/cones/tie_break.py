@@ -84,7 +84,7 @@ def is_moved_along(norm: AffineNorm, directions: Array) -> bool:
 
 
 def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
-    """Return the distance of a decision from a target, shape (width,), as an affine norm; `columns` is the length of x."""
+    """Return the distance of a decision from a target, shape (width,), as a norm of all `columns` columns."""
     slope = np.zeros((1, domain.width, columns))
     slope[0, :, domain.columns] = np.eye(domain.width)
     return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))

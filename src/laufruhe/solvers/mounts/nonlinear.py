@@ -209,8 +209,8 @@ def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
     """Return a lower bound of the objective [SI]: the sum of bounds for each kind of terms. No term is negative.
 
     Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
-    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts, for which they
-    need the values of the decisions of a good design.
+    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts. They need
+    `values`, the decisions of a good design.
     """
     problem, total, results = named_part(problem), 0.0, []
     on_mounts, block = (

@@ -25,7 +25,7 @@ SOFT = 1e-5
 
 @dataclass(frozen=True, eq=False)
 class MountResponse:
-    """Deflection [m] and force [N] of the mounts, shape (3 mounts,)."""
+    """Deflection [m] and force [N] of the mounts as CasADi expressions, shape (3 mounts,)."""
 
     travel: Any
     force: Any
@@ -52,7 +52,7 @@ class StaticCases:
         self._response = cache(self._new_response)
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
-        """Return a variable constrained to be at least every length of a measure, scaled by the initial one (E22)."""
+        """Return an expression that is at least the length of each vector of a measure, from a new variable (E22)."""
         part, selected = measure.channel.case_vectors, measure.places([mount.name for mount in engine.mounts])
         assert part is not None
         cases, weights = counted_cases(measure, engine), ca.DM(list(measure.direction_weights or (1.0, 1.0, 1.0)))

@@ -64,7 +64,7 @@ class MeasureCollector:
     name: str
 
     def head(self, value: Any, lower: float = 0.0) -> Any:
-        """Add a column of epigraph variables for largest values, and return it; `value` is the start (E22)."""
+        """Add a column of epigraph variables with a lower bound, and return it; `value` is its start (E22)."""
         variable = ca.MX.sym(f"head{len(self.into.heads)}", value.numel())
         self.into.heads.append((variable, value))
         self.into.floors += [lower] * value.numel()

@@ -59,10 +59,11 @@ _ENDINGS = {
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """Nonlinear program that can be pickled; its variables are scaled.
+    """Nonlinear program that can be pickled, in scaled variables.
 
-    The values of an external model are the input r of the oracle. Its arguments are a serialized function of the
-    variables.
+    `oracle` is its serialized CasADi function, from variables and parameters to objective and constraints (N1).
+    `stages` has the parameters of every stage (N4). Values of an external model are the input r of the oracle.
+    `external_model` has the serialized function from the variables to the arguments of the model, and the model.
     """
 
     oracle: str
@@ -81,7 +82,7 @@ class Task:
 
 
 def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
-    """Return the local optima from numbered start points of a program."""
+    """Return the local optima from numbered start points of a program; `share` has the program and these points."""
     task, points = share
     if not points:
         return []
@@ -91,7 +92,7 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
 
 
 class _Callback(ca.Callback):
-    """CasADi function in Python, from columns of these sizes to one dense matrix of this shape."""
+    """CasADi function that Python computes, from columns of `sizes` to a dense matrix of `shape`."""
 
     def __init__(self, sizes: tuple[int, ...], shape: tuple[int, int] = (1, 1)) -> None:
         ca.Callback.__init__(self)
@@ -132,7 +133,7 @@ class _Clock(_Callback):
 
 
 class _ExternalFunction(_Callback):
-    """CasADi function whose values and derivatives Python computes."""
+    """CasADi function whose values (`answer`) and derivatives (`slopes`) Python computes."""
 
     def __init__(self, name: str, sizes: tuple[int, ...], shape: tuple[int, int], answer: Any, slopes: Any) -> None:
         super().__init__(sizes, shape)
@@ -141,7 +142,7 @@ class _ExternalFunction(_Callback):
         self.construct(name, {})
 
     def eval(self, external: Any) -> list[Any]:
-        """Return the output at the first input; a derivative also receives the values, and ignores them."""
+        """Return the output at the first input; a function of derivatives ignores its second input, the values."""
         return [ca.DM(self._answer(_flat(external[0])))]
 
     def has_jacobian(self, *_: Any) -> bool:
@@ -246,7 +247,7 @@ def _from_start(task: Task, program: _Program, k: int, point: Array) -> LocalOpt
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """End point of a stage, with its multipliers of constraints and bounds."""
+    """End point y of a stage, with multipliers m of the constraints and b of the bounds."""
 
     y: Array
     m: Array

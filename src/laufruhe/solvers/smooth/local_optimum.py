@@ -8,6 +8,7 @@ from enum import StrEnum
 
 from laufruhe.numerics.arrays import Array
 
+# largest relative violation of constraints at a usable optimum
 _NEAR = 1e-6
 # relative difference of equal objectives
 _SAME = 1e-4
@@ -81,7 +82,7 @@ def distinct_optima(optima: Sequence[LocalOptimum], scale: float, tolerance: flo
 
 
 def describe_starts(optima: Sequence[LocalOptimum], count: int) -> str:
-    """Return a text with the number of IPOPT starts and of different optima."""
+    """Return a text with the number of IPOPT starts and the number `count` of different optima."""
     if not optima:
         return "a design to start from"
     starts, usable = (sum(o.starts for o in group) for group in (optima, [o for o in optima if o.usable]))

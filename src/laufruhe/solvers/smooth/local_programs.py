@@ -33,7 +33,7 @@ ROUNDS = 2
 
 @dataclass(frozen=True, eq=False)
 class LocalProgram:
-    """Objective and margins of all limits as functions of scaled decisions ("shares", 0 to 1, shape (n,)).
+    """Objective and distances to all limits as functions of scaled decisions ("shares", 0 to 1, shape (n,)).
 
     An unbalance with an open angle has two columns, each between minus and plus its largest size.
     """
@@ -68,22 +68,22 @@ class LocalProgram:
         return [d.complex_value(inside) if d.decision.is_affine else float(inside[d.start]) for d in self.domains]
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective, the relative margin of each limit, and the margins of each set that is no interval.
+        """Return the objective [SI], relative distances to limits, and those to edges of sets that are no intervals.
 
         The objective is infinite at an undamped resonance.
         """
         edges = self.edges(shares)
         try:
             evaluation = evaluate(self.problem.fixed_at(self.values(shares)))
-            rooms = [-evaluation.check_limit(limit).violation for limit in self.problem.limits]
-            return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
+            margins = [-evaluation.check_limit(limit).violation for limit in self.problem.limits]
+            return np.array([objective_value(self.problem, evaluation), *margins, *edges])
         except ModelError:
             return np.array([math.inf, *(-1.0 for _ in self.problem.limits), *edges])
 
     def edges(self, shares: Array) -> list[float]:
-        """Return relative margins inside the sets that are no intervals."""
+        """Return the relative distances to the edges of sets that are no intervals."""
         columns = self.columns(shares)
-        return [room for domain in self.domains for room in domain.set.margins(columns[domain.columns])]
+        return [margin for domain in self.domains for margin in domain.set.margins(columns[domain.columns])]
 
     def place(self, values: Array) -> Array:
         """Return the start point of a search from decision values of a box."""
@@ -172,8 +172,8 @@ class _TimeOverError(Exception):
 
 def _rank(numbers: Array) -> tuple[float, float]:
     # sort key: feasible designs by objective, others by violation
-    value, *rooms = numbers
-    return max(-min(rooms, default=0.0), FEASIBILITY_TOL), float(value)
+    value, *margins = numbers
+    return max(-min(margins, default=0.0), FEASIBILITY_TOL), float(value)
 
 
 BoundByBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
@@ -200,24 +200,27 @@ class ProvenDesign:
 
 
 def prove_design(program: LocalProgram, best: Array, bounded: BoundByBoxes) -> ProvenDesign:
-    """Return a design, first at the shares `best`, with its bound by boxes.
+    """Return the best design with its lower bound by boxes, which `bounded` computes.
 
-    While a gap is open, local searches start from the boxes with the smallest bound.
+    The first design has the shares `best`. While a gap is open, local searches start from the boxes
+    with the smallest bound.
     """
     problem = program.problem
     result = ProvenDesign(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
     for _ in range(ROUNDS):
         if is_time_over():
             break
-        value, room = math.inf, 0.0
+        value, gap_tolerance = math.inf, 0.0
         if result.design.violation <= FEASIBILITY_TOL:
             value = result.design.value
-            room = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, result.design.evaluation.engine))
+            gap_tolerance = gap_tolerance_of(
+                value, problem.tolerance, numerical_zero(problem, result.design.evaluation.engine)
+            )
             # boxes cannot close the part of the gap that is a sampling error
             value -= sampling_overestimate(problem, result.design.evaluation)
-        result = replace(result, divided=bounded(value, room, result.design))
+        result = replace(result, divided=bounded(value, gap_tolerance, result.design))
         places = [program.place(x) for x in result.divided.places]
-        if not places or result.divided.bound >= value - room:
+        if not places or result.divided.bound >= value - gap_tolerance:
             break
         retry = best_local_optimum(program, [result.shares, *places], len(places) + 1)
         if program.rank(retry) >= program.rank(result.shares):
@@ -232,11 +235,11 @@ def proof_data(program: LocalProgram, design: Design, bound: float, strength: Pr
 
     problem, best = program.problem, program.shares(design.values)
     slopes = program.slopes(best)
-    rooms = program.numbers(best)[1:]
+    margins = program.numbers(best)[1:]
     largest = [float(np.abs(row).max()) or 1.0 for row in slopes]
-    active_rooms = [k for k, room in enumerate(rooms) if room <= ACTIVE_MARGIN]
+    active_margins = [k for k, margin in enumerate(margins) if margin <= ACTIVE_MARGIN]
     low, high = best <= ACTIVE_MARGIN, best >= 1.0 - ACTIVE_MARGIN
-    columns = [-slopes[1 + k] / largest[1 + k] for k in active_rooms]
+    columns = [-slopes[1 + k] / largest[1 + k] for k in active_margins]
     columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
     scale = max(largest[0], design.value)
     no_shares = np.zeros(0), largest[0] / scale
@@ -244,7 +247,7 @@ def proof_data(program: LocalProgram, design: Design, bound: float, strength: Pr
     prices: dict[Side, Price] = {}
     # gradient of the Lagrangian without the bounds of decisions
     gradient, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
-    for k, share in zip(active_rooms, shares, strict=False):
+    for k, share in zip(active_margins, shares, strict=False):
         if k >= len(problem.limits):
             # an edge of a set, which is priced as a bound of its decision
             continue

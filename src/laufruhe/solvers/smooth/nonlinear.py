@@ -128,7 +128,7 @@ def solve_nonlinear(
     """Return the local optima of a multistart search, the best usable one first.
 
     With `stop_when`, all starts run the first stage. One start of each distinct end runs the later stages, if its
-    objective is below that of the best final optimum: later stages never lower the objective (N4). Without it, each
+    objective is below that of the best final optimum. Later stages never lower the objective (N4). Without it, each
     start runs all stages, because one point may lead to several optima.
 
     Parameters
@@ -195,7 +195,7 @@ class _SharedStarts:
         self._count, self._executor = count, stack.enter_context(executor_for(count))
 
     def __call__(self, share: Share) -> list[LocalOptimum]:
-        """Run a share of starts on all workers, as `run` does."""
+        """Return the local optima of a program's starts, run on all workers, in the order of the starts."""
         task, points = share
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
@@ -213,7 +213,7 @@ class _ReadyWorkers:
         self._ahead.prefetch(self._shares(share))
 
     def __call__(self, share: Share) -> list[LocalOptimum]:
-        """Run a share of starts as `run` does; a single start runs in this process."""
+        """Return the local optima of a program's starts, run by the pool; a single start runs in this process."""
         if len(share[1]) == 1:
             return run(share)
         self.begin(share)

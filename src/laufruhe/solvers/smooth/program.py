@@ -1,7 +1,7 @@
 """Build one smooth program of mounts, unbalances and throws (E20-E24, S20).
 
 Variables are the open numbers of the mounts, the columns of the unbalances, and the deviations of the throws from a
-star. For measures of modes the shapes V and squared frequencies l are variables too, with the constraints
+crank star. For measures of modes the shapes V and squared frequencies l are variables too, with the constraints
 
     V' V = 1,    V' A V = diag(l)                                                       (E21)
 
@@ -49,6 +49,7 @@ from laufruhe.solvers.smooth.modes import ModeVariables
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
 from laufruhe.solvers.smooth.simulated import SimulatedVariables
 
+# softening of norms relative to their unit: in the first stages, and in the last one (N4)
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # a stiffness whose bounds have a larger ratio is replaced by its logarithm
 WIDE = 100.0
@@ -65,13 +66,13 @@ class SmoothProgram:
     Parameters
     ----------
     problem
-        Problem with one star and one firing order.
+        Problem with one crank star and one firing order.
     unit
-        Typical size of the objective.
+        Typical size of the objective [SI].
     margin
         Share by which limits on loads are tightened, because the program has few samples.
     moves
-        Open throws, which may leave the star of the problem; None if they are fixed.
+        Open throws, which may leave the crank star of the problem; None if they are fixed.
     slack
         Share by which all limits are tightened.
     softest
@@ -121,7 +122,7 @@ class SmoothProgram:
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._mount_numbers)
             self._cases = StaticCases(self._mounts, self._mounting, self._root, self._constraints)
             wrench_map = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
-            # E4
+            # response of the mounts at every operating point (E4)
             self._points = [
                 response(self._mounts, point, wrench)
                 for point, wrench in zip(problem.points, self._loads.wrenches(wrench_map), strict=True)
@@ -222,7 +223,7 @@ class SmoothProgram:
         self._constraints.add(value, -np.inf, maximum, limit.name, maximum=((limit, "at most"), slope / unit))
 
     def _hold_unbalances(self) -> None:
-        # P4
+        # sets of the unbalances (P4)
         for domain in self.domains:
             if domain.width == 1:
                 continue
@@ -312,11 +313,11 @@ class SmoothProgram:
         return mounts, [domain.complex_value(columns) for domain in self.domains]
 
     def throw_deviations(self, x: Array) -> Array:
-        """Return the deviations of the throws from their star [rad]."""
+        """Return the deviations of the throws from their crank star [rad], from the variables, shape (n,)."""
         return np.asarray(x[self._throw_columns])
 
     def problem_at(self, x: Array) -> Problem:
-        """Return the problem with the throws of an optimum."""
+        """Return the problem with the throws of an optimum x, shape (n,)."""
         if self.moves is None:
             return self.problem
         problem = self.problem
@@ -326,7 +327,10 @@ class SmoothProgram:
         )
 
     def start(self, mounts: Sequence[float], columns: Array, throw_deviations: Array | None = None) -> Array:
-        """Return variables at decision values, shape (n,); modes and epigraph variables follow from these."""
+        """Return variables, shape (n,), at numbers of mounts, columns of unbalances and deviations of throws.
+
+        Start values of modes and epigraph variables follow from these.
+        """
         throw_deviations = np.zeros(self._throw_deviations.numel()) if throw_deviations is None else throw_deviations
         parts: list[Array] = [self._to_variables(mounts), columns, throw_deviations]
         if self._modes.has_modes:

@@ -1,4 +1,4 @@
-"""Search exactly over stars and sets of shafts, with unbalances at their optimum (S13-S15).
+"""Search exactly over crank stars and sets of shafts, with unbalances at their optimum (S13-S15).
 
 The cone program of one star gives dual rows Z. The bound from these rows is affine in the star, so one solve bounds
 every star from below, or proves that other stars violate the limits too. The next star is the one with the lowest
@@ -21,6 +21,7 @@ from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.solvers.stars.star_program import SolvedStar, shaft_owners, solve_design
 
+# number of crank stars whose bounds are computed at once
 _CHUNK = 1 << 17
 
 
@@ -37,7 +38,7 @@ class CutSearchResult:
     complete
         True if the search ended with a proof, False if its time ended.
     designs, infeasible
-        Number of stars times number of sets of shafts, and number of those solved without a feasible design.
+        Number of crank stars times number of sets of shafts, and number of those solved without a feasible design.
     """
 
     solved: tuple[SolvedStar, ...]
@@ -51,12 +52,12 @@ class CutSearchResult:
 def search_designs(
     model: StarModel, stars: Stars, count: int, tolerance: float, time_limit: float = math.inf, zero_level: float = 0.0
 ) -> CutSearchResult:
-    """Return the best designs of stars and shafts, with a proof (S15). See `solve_design`.
+    """Return the best designs of crank stars and shafts, with a proof (S15). See `solve_design`.
 
     Parameters
     ----------
     stars
-        Steps of every star allowed, shape (n, throws).
+        Steps of the throws of every crank star allowed, shape (n, throws).
     count
         Number of best designs to prove.
     time_limit
@@ -104,7 +105,7 @@ def search_designs(
 
 
 def _distinct_values(space: StarSpace, solved: Sequence[SolvedStar]) -> list[float]:
-    """Return ascending objectives of designs [SI]; images of one star with equal objectives count once (S2)."""
+    """Return ascending objectives of designs [SI]; images of one crank star with equal objectives count once (S2)."""
     if not solved:
         return []
     images = replace(space, mirror=True, reflect=True)

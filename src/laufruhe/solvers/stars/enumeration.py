@@ -1,4 +1,4 @@
-"""Find the best stars and the best firing orders by enumeration (S4, V9)."""
+"""Find the best crank stars and the best firing orders by enumeration (S4, V9)."""
 
 from __future__ import annotations
 
@@ -17,12 +17,13 @@ SLACK = 1e-9
 """Relative difference of objectives that counts as none."""
 MAX_SLOTS = 13
 """Largest number of cylinders whose firing orders are enumerated; their number grows as the factorial."""
+# number of partial firing orders that are evaluated at once
 _BLOCK = 1 << 17
 
 
 @dataclass(frozen=True, eq=False)
 class StarSearchResult:
-    """Best stars in ascending order of the objective.
+    """Best crank stars in ascending order of the objective.
 
     Attributes
     ----------
@@ -44,7 +45,7 @@ class StarSearchResult:
 
 
 class BestStars:
-    """Best `count` stars so far, best first: their steps, shape (n, throws), and objectives [SI], shape (n,)."""
+    """Best `count` crank stars so far, best first: steps, shape (n, throws), and objectives [SI], shape (n,)."""
 
     def __init__(self, count: int, throws: int) -> None:
         self.count, self.throws = count, throws
@@ -71,7 +72,7 @@ class BestStars:
 
 
 def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarSearchResult:
-    """Return the best `count` stars of a space, by evaluating all of them in blocks."""
+    """Return the best `count` crank stars of a space, by evaluating all of them in blocks."""
     best, nodes = BestStars(count, space.throws), 0
     for block in space.blocks():
         best.offer(block, objective.values(space, block))

@@ -1,4 +1,4 @@
-"""Solve for even stars if the problem also measures the degree of irregularity, which is equal for all (S35)."""
+"""Solve for even crank stars if the problem also measures the degree of irregularity, which is equal for all (S35)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def flywheel_measures(problem: Problem) -> list[Measure]:
 
 
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
-    """Choose among even stars without the flywheel's measures, which are equal for all of them (S35).
+    """Choose among even crank stars without the flywheel's measures, which are equal for all of them (S35).
 
     All even stars of equal cylinders have the same dead centres, and so the same torque. The problem without measures
     of the flywheel is left to `solve`.
@@ -87,7 +87,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
 
 
 def _any_star(problem: Problem, phasing: Phasing) -> Result:
-    """Return the result of the first star; all stars have the same objective."""
+    """Return the result of the first crank star; all crank stars have the same objective."""
     families, reason = families_of(phasing)
     if not families:
         return no_star(problem, f"no star exists: {reason}")

@@ -1,4 +1,4 @@
-"""Search all even stars for the best designs, by enumeration or by cuts of cone programs (S18)."""
+"""Search all even crank stars for the best designs, by enumeration or by cuts of cone programs (S18)."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 
 MAX_LISTED = 1_000_000
+"""Largest number of even crank stars that are enumerated."""
 
 
 @dataclass(frozen=True, eq=False)
 class EvenDesign:
-    """Design of an even star from a search, before the exact model evaluates it.
+    """Design of an even crank star from a search, before the exact model evaluates it.
 
     Attributes
     ----------
@@ -72,7 +73,7 @@ class EvenDesign:
 
 @dataclass(frozen=True, eq=False)
 class EvenStarResult:
-    """Best designs of a search over even stars, best first, and the lower bound of all.
+    """Best designs of a search over even crank stars, best first, and the lower bound of all.
 
     Attributes
     ----------
@@ -115,7 +116,7 @@ def refuse_long(problem: Problem) -> None:
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even stars.
+    """Return the best designs of all even crank stars.
 
     The method is enumeration if the objective depends on single orders or on squares of loads, else cuts of cone
     programs.
@@ -151,7 +152,7 @@ def _differ_by_squares(problem: Problem, families: Sequence[Family]) -> bool:
 
 
 def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
-    """Return the objective of a family as a sum of norms of single orders; None if it has another form (S3)."""
+    """Return the objective of a family as a sum of norms of single load orders; None if it has another form (S3)."""
     if family.fixed or family.is_of_orders:
         return None
     first = phasing.realise(family.candidate(phasing, family.first))

@@ -1,4 +1,4 @@
-"""List the even stars of every bank angle and split pin that a problem allows (S6, S7)."""
+"""List the even crank stars of every bank angle and split pin that a problem allows (S6, S7)."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from laufruhe.problem.problem import Phasing
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Even stars of one bank angle and split pin, or firing orders of cylinders with one throw each (V9).
+    """Even crank stars of one bank angle and split pin, or firing orders of cylinders with one throw each (V9).
 
     Attributes
     ----------
     geometry
         Bank angle and split pin angle [rad]; None if the layout has none.
     fixed
-        Steps of the only star if the firing order is fixed, else None.
+        Steps of the throws of the only star if the firing order is fixed, else None.
     is_of_orders
         True if every firing order is a design; the steps of its star are slots of the cycle.
     """
@@ -68,7 +68,7 @@ class Family:
 
 
 def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
-    """Return families of even stars for every geometry allowed, and the reason if there are none.
+    """Return families of even crank stars for every bank and split pin angle allowed, and the reason if there are none.
 
     If loads depend on the firing order, `by_firing`, every firing order is a design.
     """

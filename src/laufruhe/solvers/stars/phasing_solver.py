@@ -1,4 +1,4 @@
-"""Solve for stars, firing orders and shafts together (S18)."""
+"""Solve for crank stars, firing orders and shafts together (S18)."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MAX_TIMES, ROUNDS = 16, 2
-"""Largest factor of samples for a search that cannot prove its best star, and number of such searches."""
+"""Largest factor of samples for a search that cannot prove its best crank star, and number of such searches."""
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
-"""A star, and its steps if it fires evenly."""
+"""A crank star, and the steps of its throws if it fires evenly."""
 Decide: TypeAlias = Callable[[Problem, float], Result]
 Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResult]
 
@@ -129,7 +129,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
 
 
 def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) -> Result:
-    """Solve the problem of the best even star, and certify it with the bound of all designs (S17)."""
+    """Solve the problem of the best even crank star, and certify it with the bound of all designs (S17)."""
     designs = [(design, entry) for design in search_result.designs if (entry := design.ranking_entry).firing_orders]
     if not designs:
         return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
@@ -175,7 +175,7 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
 
 
 def even_stars(phasing: Phasing) -> list[Star]:
-    """Return the fixed throws, or all even stars including mirror images."""
+    """Return the fixed throws, or all even crank stars including mirror images."""
     if phasing.throws is not None:
         return [(Candidate(phasing.throws, None, *phasing.minimum_geometry), None)]
     pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
@@ -186,12 +186,12 @@ def solve_every_order(
     problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda fixed, _: solve_fixed(fixed),
     maximum: int | None = None,
 ) -> Result:  # fmt: skip
-    """Solve every firing order with its own loads, of every star, with every set of shafts.
+    """Solve every combination of crank star, firing order with loads of its own, and set of shafts.
 
     Parameters
     ----------
     stars
-        Stars with their steps.
+        Crank stars with the steps of their throws.
     decide
         Solver of the other decisions. Its arguments are the problem of a design and the smallest objective so far [SI].
     maximum

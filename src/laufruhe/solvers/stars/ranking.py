@@ -1,4 +1,4 @@
-"""Rank the best stars, and the firing orders of each (S8, S9, S17)."""
+"""Rank the best crank stars, and the firing orders of each (S8, S9, S17)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion
 from laufruhe.problem.problem import Phasing, Problem
 
 ORDERS = (1, 2, 4)
+"""Load orders that a ranking shows."""
 ORDERS_LISTED = 6
+"""Largest number of firing orders that a ranking lists for a crank star."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,7 @@ class RankedOrder:
 
 @dataclass(frozen=True)
 class RankedStar:
-    """Entry of a ranking of stars.
+    """Entry of a ranking of crank stars.
 
     Attributes
     ----------
@@ -75,7 +77,7 @@ class RankedStar:
         |F_h| relative to the force of one throw, and |C_h| relative to that force times the throw spacing, for every
         order in `orders`.
     orders
-        Orders h.
+        Orders h of the loads.
     firing_orders
         Best firing orders of the star, best first.
     order_count
@@ -125,16 +127,16 @@ class TradePoint:
 
 @dataclass(frozen=True)
 class PhasingResult:
-    """Ranking of stars and firing orders, and the method of the search.
+    """Ranking of crank stars and firing orders, and the method of the search.
 
     Attributes
     ----------
     ranking
-        Best stars, best first; the first is the design of the result.
+        Best crank stars, best first; the first is the design of the result.
     places, banks
         Axial positions of the throws [m], and bank angles of the cylinders [rad], for pictures.
     designs
-        Number of stars times number of sets of shafts.
+        Number of crank stars times number of sets of shafts.
     looked_at
         Number of partial and complete stars that the search evaluated, or of cone programs.
     trade
@@ -156,7 +158,7 @@ class PhasingResult:
 def ranked_orders(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Return the firing orders of a star that keep the limits of firing intervals, best first (S8).
+    """Return the firing orders of a crank star that keep the limits of firing intervals, best first (S8).
 
     Parameters
     ----------
@@ -209,7 +211,7 @@ def interval_range(intervals: Sequence[float]) -> str:
 def distinct_orders(
     problem: Problem, phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Return the firing orders of a star that have different loads, best first (S8).
+    """Return the firing orders of a crank star that have different loads, best first (S8).
 
     All orders are returned if a measure depends on the firing order, such as torsion (V6), or if gas acts and firing
     is uneven. Otherwise, only the first is returned. See `ranked_orders`.
@@ -223,7 +225,7 @@ def distinct_orders(
 def ranked_star(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
-    """Build the entry of a star in a ranking. See `RankedStar` and `ranked_orders`."""
+    """Build the entry of a crank star in a ranking. See `RankedStar` and `ranked_orders`."""
     orders = ranked_orders(phasing, candidate, steps)
     places = np.array(phasing.layout_of(candidate).throw_positions)
     # unit force per throw, and unit throw spacing (S1)
@@ -252,6 +254,6 @@ def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int =
 def ranking_result(
     phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
 ) -> PhasingResult:
-    """Build the result of a search over stars whose best design is `best`. See `PhasingResult`."""
+    """Build the result of a search over crank stars whose best design is `best`. See `PhasingResult`."""
     layout = phasing.layout_of(best)
     return PhasingResult(tuple(ranking), layout.throw_positions, layout.banks, designs, looked_at, method)

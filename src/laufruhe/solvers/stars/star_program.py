@@ -1,4 +1,4 @@
-"""Solve the cone program of one star with one set of shafts, and derive a cut for all stars (S13, S14)."""
+"""Solve the cone program of one crank star with one set of shafts, and derive a cut for all stars (S13, S14)."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COARSE, FINER = 48, 4
 
 @dataclass(frozen=True, eq=False)
 class SolvedStar:
-    """Design of one star with one set of shafts, and unbalances at their optimum.
+    """Design of one crank star with one set of shafts, and unbalances at their optimum.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class SolvedStar:
 
 
 def shaft_owners(model: StarModel) -> tuple[int, ...]:
-    """Return for every decision the index of its set of optional shafts, -1 for none."""
+    """Return for every unbalance the index of the set of optional shafts that it belongs to, or -1."""
     shaft_of = {rotor.name: rotor.shaft.name for rotor in model.problem.engine.rotors}
     sets = model.phasing.shafts.optional
     shafts = [shaft_of[decision.rotor_drives[0].rotor] for decision in model.problem.unbalances]
@@ -49,12 +49,12 @@ def shaft_owners(model: StarModel) -> tuple[int, ...]:
 def solve_design(
     model: StarModel, star: tuple[int, ...], built: tuple[int, ...], tolerance: float, zero_level: float = 0.0
 ) -> tuple[SolvedStar | None, Cut | None]:
-    """Find the optimum of one star with one set of shafts, and a cut that bounds all other stars.
+    """Find the optimum of one crank star with one set of shafts, and a cut that bounds all other stars.
 
     Parameters
     ----------
     model
-        Rows of every star.
+        Norms of the objective and limits for every crank star.
     star, built
         Steps of the throws, and indices of the sets of optional shafts that are built.
     tolerance
@@ -116,7 +116,7 @@ def solve_design(
 
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> float:
-    """Return the optimal objective of one star at few samples [SI]; infinite if infeasible. See `solve_design`."""
+    """Return the optimum of one crank star at few samples [SI]; infinite if infeasible. See `solve_design`."""
     affine = _with_shafts(model.at(_sample_counts(model.samples)[0]).at(star), shaft_owners(model), built)
     if not affine.size:
         return affine.objective(np.zeros(0))

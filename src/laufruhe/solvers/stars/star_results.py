@@ -1,4 +1,4 @@
-"""Designs of single stars, and conversion of the best star's result into the result of the search."""
+"""Designs of single crank stars, and conversion of the best star's result into the result of the search."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from laufruhe.solvers.values import DecisionValue, ObjectiveValue
 
 @dataclass(frozen=True, eq=False)
 class StarDesign:
-    """A star and firing order, with the result of its problem.
+    """A crank star and firing order, with the result of its problem.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def with_star(
     problem: Problem, phasing: Phasing, best: Result, candidate: Candidate, certificate: Certificate | None,
     details: PhasingResult,
 ) -> Result:  # fmt: skip
-    """Convert the result of the best star into the result of the search.
+    """Convert the result of the best crank star into the result of the search.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ CRANK, BANK, SPLIT = "crank", "bank angle", "split pin angle"
 
 @dataclass(frozen=True)
 class _MovedCrank:
-    """Function from angles of a crank to the drawing of its engine; the candidate has the start angles."""
+    """Function from angles of a crank to its engine, as a `Drawing`; the candidate has the start angles."""
 
     phasing: Phasing
     candidate: Candidate

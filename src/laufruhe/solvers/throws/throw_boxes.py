@@ -364,11 +364,11 @@ class Mixture:
         self.unbalances, self._orders = columns.matrix.shape[1], orders
         throws, shared_count = len(program.order_sizes), orders.shape[1] - 1
         rows, self._weights = program.reduced, program.order_sizes[:, : len(orders)]
-        is_heavy = self._weights > _NEGLIGIBLE * self._weights.max()
+        is_significant = self._weights > _NEGLIGIBLE * self._weights.max()
         step_limits = (_MAX_STEPS[shared_count],) * throws + (_MAX_SHARED_STEPS[shared_count],) * shared_count
         side_orders = [
-            *(np.where(row, orders[:, 0], 0.0) for row in is_heavy),
-            *np.where(is_heavy.any(axis=0), orders[:, 1:].T, 0.0),
+            *(np.where(row, orders[:, 0], 0.0) for row in is_significant),
+            *np.where(is_significant.any(axis=0), orders[:, 1:].T, 0.0),
         ]
         steps = [
             min(max(math.ceil(float(np.abs(row).max(initial=0.0)) * width / _STEP) + 1, _MIN_STEPS), limit)
@@ -437,7 +437,7 @@ class Mixture:
         slope, constant = np.concatenate(slopes), np.concatenate(constants)
         if not len(slope):
             return []
-        # every remainder lies between 0 and 1
+        # the share of the first angle, which is what the other shares leave, lies between 0 and 1
         grid = Grid(np.ones(len(slope)), len(slope))
         return [(0.5, AffineNorm(NORMS["maximum"], constant[:, None] - 0.5, slope[:, None], grid))]
 

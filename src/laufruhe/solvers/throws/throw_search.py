@@ -43,11 +43,13 @@ from laufruhe.solvers.throws.throw_windows import (
 )
 
 Improve = Callable[[Candidate, bool], StarDesign | None]
-"""Function that returns the local optimum from a candidate (True) or the design at it (False); None if infeasible."""
+"""Function from a candidate to the local optimum near it (True) or to its own design (False); None if infeasible."""
 
+# largest number of boxes after the first box of every window
 MAX_BOXES = 1500
 # share of the tolerance by which a design must improve on the incumbent
 SHARE = 0.5
+# smallest and largest number of samples over the period
 FEWEST_SAMPLES, MAX_SAMPLES = 96, 384
 # largest sampling error of bounds, relative to the best objective
 STEPS_COST = 1e-3
@@ -92,9 +94,12 @@ class Stage:
 
     Attributes
     ----------
-    build, loss, truncation
-        Functions from the number of samples to the programs, to the error of means and peaks of the best design (P7)
-        [SI], and to the largest part of the objective in truncated orders [SI].
+    build
+        Function from the number of samples to the programs.
+    loss
+        Function from the number of samples to the error of means and peaks of the best design (P7) [SI].
+    truncation
+        Function from the number of samples to the largest part of the objective in truncated orders [SI].
     value
         Objective of the best design [SI].
     maximum, target

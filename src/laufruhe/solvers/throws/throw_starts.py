@@ -1,7 +1,7 @@
 """Choose start points for the search of uneven throws (S20, S25).
 
-Start points are ranked even stars, throws within their bounds, or the best cranks of every firing pattern within the
-limits of firing intervals.
+Start points are ranked even crank stars, throws within their bounds, or the best cranks of every firing pattern within
+the limits of firing intervals.
 """
 
 from __future__ import annotations
@@ -25,13 +25,16 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import candidates_of, interval_range, ranked_orders, why_no_order
 
+# firing orders of each ranked crank star that start a search if gas acts
 ORDERS_WITH_GAS = 2
 # largest number of cranks to compare by amplitudes of orders, and by the exact model
 _MAX_CRANKS = 200_000
 _MAX_EVALUATED = 300
+# smallest number of cranks to compare for a firing pattern
 _FEWEST = 8
 # random throws within bounds, if neither their middle nor even stars have a firing order
 _RANDOM_STARS = 4
+# largest number of start cranks
 _STARTS = 12
 # rounding error of firing patterns [rad]
 _ROUNDING = 1e-7
@@ -49,9 +52,9 @@ def start_candidates(phasing: Phasing, even_result: Result | None, with_gas: boo
     Parameters
     ----------
     even_result
-        Result of the even stars, with its ranking; None if there are none or throws have bounds.
+        Result of the even crank stars, with its ranking; None if there are none or throws have bounds.
     with_gas
-        True if gas acts. Firing orders of one star, and both directions of rotation, then have different loads.
+        True if gas acts. Firing orders of one crank star, and both directions of rotation, then have different loads.
     """
     if even_result is not None and even_result.phasing is not None:
         candidates = candidates_of(phasing, even_result.phasing.ranking, ORDERS_WITH_GAS if with_gas else 1)

@@ -24,6 +24,7 @@ from laufruhe.problem.sets import Sector
 from laufruhe.prove.witness import thin_box
 
 MAX_WINDOWS = 6_000
+"""Largest number of firing windows that a search covers."""
 
 
 def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:

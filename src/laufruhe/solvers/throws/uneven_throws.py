@@ -1,6 +1,6 @@
 """Solve for throws that leave the even steps within limits of firing intervals (S19-S21).
 
-From every good even star, a smooth program finds a local optimum with a fixed firing order, so that intervals are
+From every good even crank star, a smooth program finds a local optimum with a fixed firing order, so that intervals are
 linear in the angles. The exact model compares both, so the result is never worse than the even star.
 """
 
@@ -57,12 +57,13 @@ SAME = 1e-6
 SAME_ANGLE = 1e-4
 # searches with tighter limits, margin relative to the violation, and largest violation that a margin may remove
 _ATTEMPTS, _TIGHTENED, _MAX_TIGHTENED = 3, 1.2, 0.2
+# trade-off between objective and uneven firing: shares of the deviation allowed, and start cranks of each
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
 TRADE_STARTS = 3
 
 
 def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None) -> Result:
-    """Return the best local optimum from the even stars, with a lower bound over all throws. See `start_candidates`."""
+    """Return the best local optimum from start cranks, with a lower bound over all throws. See `start_candidates`."""
     starts = start_candidates(phasing, even_result, problem.depends_on_gas)
     if not starts:
         reason, is_proven = why_none_fires(phasing)
@@ -179,9 +180,10 @@ def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | 
 def local_optimum(
     phasing: Phasing, start: Candidate, intervals: Intervals, with_perturbations: bool = True
 ) -> StarDesign | None:  # fmt: skip
-    """Return the local optimum from a start star, or the star itself if nothing is better; None if neither is feasible.
+    """Return the local optimum from a start crank, or that crank if it is no worse; None if neither is feasible.
 
-    `with_perturbations`, it starts from perturbed stars too, because a star may be a saddle point (S20).
+    If `with_perturbations` is True, it starts from perturbed cranks too, because a symmetric crank may be a saddle
+    point (S20).
     """
     best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
