@@ -1,8 +1,8 @@
 """Even firing as a lattice: crank stars that fire evenly, and their firing orders (S6-S8).
 
-Cylinders that fire at equal intervals of turns/n have their dead centres on the R multiples of 1/R of a turn, with R the
-number of steps. As many cylinders have their dead centre on a multiple as the lattice has firings there. So a crank
-star fires evenly if and only if these counts agree.
+Cylinders that fire at equal intervals of turns/n have their dead centres on the R multiples of 1/R of a turn. As many
+cylinders have their dead centre on a multiple as the lattice has firings there. So a crank star fires evenly if and
+only if these counts agree.
 """
 
 from __future__ import annotations

@@ -288,7 +288,7 @@ class Problem:
 
     @property
     def depends_on_firing_order(self) -> bool:
-        """True if a measure depends on a crank star's firing order: torsion, and loads inside the crankcase with gas."""
+        """True if a measure depends on a crank star's firing order: torsion, loads inside the crankcase with gas."""
         if any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]

@@ -1,10 +1,10 @@
 """Open unbalances on throws between bounds, as columns of a cone program (S28).
 
 An unbalance on a throw turns with it; such an unbalance is called a rider. An open size r >= 0 on a throw at theta has
-the load r e^{i theta} times a gain. If theta lies on an arc, r e^{i theta} = sum_j q_j p_j, with p_j the
-corners of a polygon around the arc and weights q_j >= 0 whose sum is r. A complex unbalance U becomes U e^{i m} plus a
-deviation, with m the middle of the arc. The deviation is at most |U| times the distance of the arc from e^{i m}. A single rider whose angle is free does not
-depend on its throw.
+the load r e^{i theta} times a gain. If theta lies on an arc, r e^{i theta} = sum_j q_j p_j, with p_j the corners of a
+polygon around the arc and weights q_j >= 0 whose sum is r. A complex unbalance U becomes U e^{i m} plus a deviation,
+with m the middle of the arc. The deviation is at most |U| times the distance of the arc from e^{i m}. A single rider
+whose angle is free does not depend on its throw.
 """
 
 from __future__ import annotations
