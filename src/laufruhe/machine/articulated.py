@@ -15,6 +15,7 @@ from laufruhe.machine import kinematics
 from laufruhe.machine.bodies import Motion
 from laufruhe.machine.slider_crank import SliderCrank
 
+# largest number of Newton steps to a dead centre, and crank angles at which the lean of the rod is checked
 _ROUNDS = 60
 _STEPS = 720
 
@@ -116,7 +117,7 @@ class ArticulatedCrank(SliderCrank):
 
     @property
     def stroke(self) -> float:
-        """Distance between the dead centres [m]; it differs a little from that of the master."""
+        """Distance between the dead centres [m]; it differs a little from the stroke of the master cylinder."""
         top, bottom = self.dead_centres
         return float(self.travel(np, bottom) - self.travel(np, top))
 

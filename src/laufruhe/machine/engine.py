@@ -136,12 +136,12 @@ class Engine:
         return next((one for one in self.extras if isinstance(one, kind)), None)
 
     def with_extra(self, extra: Extra) -> Engine:
-        """Return the engine with a part of an extension in place of that of its class."""
+        """Return the engine with a part of an extension, which replaces a part of the same class."""
         return replace(self, extras=(*(one for one in self.extras if type(one) is not type(extra)), extra))
 
     @property
     def shafts(self) -> tuple[Shaft, ...]:
-        """Shafts that turn anything, in order of first use."""
+        """Shafts with cranks or rotors, in order of first use."""
         used = [part.shaft for part in self.slider_cranks] + [rotor.shaft for rotor in self.rotors]
         return tuple(dict.fromkeys(used))
 

@@ -21,7 +21,10 @@ class Extra(ABC):
     name: ClassVar[str]
 
     def moved(self, _: Mapping[Any, float], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
-        """Return the part with changes of its numbers, and with other slider-cranks in place of those before."""
+        """Return the part with changes of its numbers.
+
+        The second and third arguments are the slider-cranks before and after the change.
+        """
         return self
 
     def move(self, engine: Any, changes: Mapping[Any, float], before: Sequence[SliderCrank]) -> Any:

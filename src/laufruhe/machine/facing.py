@@ -20,6 +20,7 @@ from laufruhe.numerics.roots import rising_root
 MAX_AHEAD = 0.5 * math.pi
 """Crank angle by which one piston may lead the other to its dead centre: beyond it they hardly compress."""
 STEPS = 720
+"""Number of crank angles at which the distance of two pistons is computed."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def _chamber(part: SliderCrank) -> SharedChamber:
 
 
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
-    """Return the pistons, those that face each other with the chamber that both sweep."""
+    """Return the slider-cranks; pistons that face each other get the chamber that both sweep."""
     pistons = list(parts)
     for k, part in enumerate(parts):
         for other in parts:

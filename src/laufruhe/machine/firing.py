@@ -185,7 +185,7 @@ def order_slots(order: Sequence[int]) -> tuple[int, ...]:
 
 
 def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
-    """Return the turn of the crank at which each cylinder of the order fires, ascending from 0."""
+    """Return the crank angles, in turns, at which the cylinders of a firing order fire, ascending from 0."""
     turns = _dead_centres(layout, tuple(throws))
     start, out = None, []
     previous = -1.0

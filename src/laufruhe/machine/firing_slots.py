@@ -22,13 +22,14 @@ Shape: TypeAlias = tuple[tuple[int, float, float], ...]
 Cover: TypeAlias = tuple[tuple[int, Shape], ...]
 """Assignment of all firings to throws: slot of the first cylinder and shape of every throw."""
 
+# largest number of covers: within the bounds, and with widened bounds; and of steps of the search for them
 _MAX_COVERS = 500
 _MAX_BROKEN = 40
 _MAX_LOOKED_AT = 20_000
 # shares of the unevenness allowed, tried one after the other
 _SHARES = (0.25, 0.5, 0.75, 1.0)
 _SLACK = 1e-9
-# a broken interval counts this often as much as one that is merely uneven
+# weight of the violation of bounds over that of unevenness
 _BROKEN = 1e3
 
 

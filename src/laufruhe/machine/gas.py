@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from laufruhe.errors import ModelError
 
 AMBIENT_PRESSURE = 101_325.0
+# largest values that gas models accept
 MAX_COMPRESSION_RATIO = 1000.0
 MAX_EXPONENT = 5.0
 MAX_HEAT_RATIO = 1.7

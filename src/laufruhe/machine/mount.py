@@ -19,7 +19,7 @@ UPRIGHT: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 @dataclass(frozen=True)
 class Mount:
-    """A spring between engine and ground, or several that are joined in one place.
+    """A spring between engine and ground, or several springs that are joined at one point.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Mount:
 
     @property
     def springs(self) -> tuple[Mount, ...]:
-        """Springs of this place, each as a mount without joined springs."""
+        """Springs of the mount, each as a mount without joined springs."""
         return (replace(self, joined=()), *self.joined) if self.joined else (self,)
 
     @property
@@ -82,7 +82,7 @@ class Mount:
 
     @property
     def depends_on_frequency(self) -> bool:
-        """True if the stiffness of a spring of the place depends on frequency."""
+        """True if the stiffness of a spring of the mount depends on frequency."""
         return any(spring.dynamic for spring in self.springs)
 
     def mapped(self, change: Callable[[Mount], Mount]) -> Mount:

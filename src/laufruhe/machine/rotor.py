@@ -125,7 +125,7 @@ class Bearing:
 
     @property
     def drag(self) -> float:
-        """Coefficient of friction times the speed of the journal over that of the crank [m] (B7)."""
+        """Coefficient of friction times the surface speed of the journal over the crank's angular speed [m] (B7)."""
         if self.diameter is None or self.friction is None:
             raise ModelError(
                 f"bearing '{self.name}' has no diameter or no friction, so its friction power is not known"

@@ -212,7 +212,7 @@ class SliderCrank:
 
     @cached_property
     def star_turn(self) -> Turn:
-        """Local crank angle theta - beta at phi = 0, in turns (C5)."""
+        """Angle of the crank from the cylinder axis, theta - beta, at phi = 0, in turns (C5)."""
         return as_turn(self.throw) - as_turn(self.bank)
 
     def faces(self, other: SliderCrank) -> bool:

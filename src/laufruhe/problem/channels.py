@@ -34,6 +34,7 @@ Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
 """Function that returns the factor on the load of each place, such as 1 / area, shape (places,) or (places, d)."""
 FlywheelFunction: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
+# keys of a measure in a file that may narrow a load, by the place where the load acts
 ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_WEBS = (*ON_BLOCK, "webs")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
@@ -238,7 +239,7 @@ class LoadChannel(Channel):
     is_load: ClassVar[bool] = True
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
-        """Return the size factors at an operating point, shape (places, d or 1); None without such factors."""
+        """Return the `size_factors` at an operating point, shape (places, d or 1); None without such factors."""
         if self.size_factors is None:
             return None
         factors = self.size_factors(engine, point)

@@ -20,6 +20,7 @@ from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.sets import Set, Value
 
+# indices of the fourteen numbers of a spring (E13), and their number
 STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
 LAG, NUMBERS_OF_MOUNT = 13, 14
 
@@ -300,12 +301,12 @@ class Decision:
 
     @property
     def lower(self) -> float:
-        """Lower bound of the size."""
+        """Lower bound of the number along its direction; zero if its angle is open."""
         return self.set.lower
 
     @property
     def upper(self) -> float:
-        """Upper bound of the size."""
+        """Upper bound of the number along its direction, or of its absolute value if its angle is open."""
         return self.set.upper
 
     @property
@@ -367,7 +368,7 @@ def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tup
 
 
 def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
-    """Change numbers in place to these values of the decisions, and return them."""
+    """Change the numbers of an engine in place to these values of the decisions, and return them."""
     for decision, value in zip(decisions, values, strict=True):
         for drive in decision.drives:
             drive.move(numbers, value - decision.start)
@@ -398,7 +399,7 @@ class Domain:
 
     @property
     def scale(self) -> float:
-        """Largest size."""
+        """Largest absolute value of the decision; one if that is zero."""
         return self.decision.set.scale
 
     @property
@@ -446,7 +447,7 @@ def real_bounds(decisions: Sequence[Decision]) -> tuple[Array, Array]:
 
 
 def column_scales(domains: Sequence[Domain]) -> Array:
-    """Return the largest size of each column of the decision vector, shape (columns,)."""
+    """Return the largest absolute value of each column of the decision vector, shape (columns,)."""
     return np.array([d.scale for d in domains for _ in range(d.width)], dtype=float)
 
 

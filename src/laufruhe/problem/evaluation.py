@@ -55,7 +55,7 @@ class Evaluation(EvaluatedDesign):
         return [mount.name for mount in self.engine.mounts]
 
     def rows(self, measure: Measure, samples: int | None = None, kink_angles: Sequence[Array] | None = None) -> Rows:
-        """Return the rows of a measure of loads or masses over the whole cycle.
+        """Return the vectors (rows) whose norm is a measure of loads or masses, over the whole cycle.
 
         `samples` is the number of samples over the cycle, by default that of the evaluation. `kink_angles` has the
         angles of kinks at each operating point [rad], by default those of the signals.

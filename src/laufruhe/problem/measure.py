@@ -160,10 +160,9 @@ class Limit:
     outside: tuple[float, float] | None = None
 
     def slack(self, value: float) -> tuple[float, float, str]:
-        """Return slack, bound and sense of the side of the limit with the smallest slack (E15).
+        """Return slack, bound and sense ("at most" or "at least") of the side with the smallest slack (E15).
 
-        The slack is relative to the bound, and negative if the value violates it. The bound is in SI units, the sense
-        "at most" or "at least".
+        The slack is relative to the bound, and negative if the value violates it. The bound is in SI units.
         """
         sides = []
         if self.minimum > -math.inf:
@@ -207,7 +206,7 @@ def load_rows(
     measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int,
     kink_angles: Sequence[Array] | None = None,
 ) -> Rows:  # fmt: skip
-    """Return the rows of a load: samples at equal steps of its period, and for peaks also values at kinks.
+    """Return the vectors (rows) of a load: samples at equal steps of its period, and for peaks also values at kinks.
 
     Parameters
     ----------
@@ -286,7 +285,7 @@ def counterweight_masses(measure: Measure, parts: Sequence[SliderCrank]) -> list
 
 
 def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderCrank] = ()) -> Rows:
-    """Return the rows of a sum of masses, shape (k, 2) [kg]: unbalance / radius of each counted rotor, and masses.
+    """Return the vectors (rows) of a sum of masses, shape (k, 2) [kg]: unbalance / radius of rotors, and masses.
 
     Without any counted part there is one zero row.
     """

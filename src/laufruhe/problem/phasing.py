@@ -18,7 +18,9 @@ P = TypeVar("P")
 
 SOONEST = 1e-8
 """Firing interval below which two cylinders count as firing together [rad]."""
+# largest number of cylinders whose firing orders are all tried for start cranks
 _MAX_PERMUTED = 7
+# largest number of evenly firing start cranks
 _EVEN_STARS = 3
 
 
@@ -281,7 +283,7 @@ class PhasingOf(Generic[P]):
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
-    """Return start cranks within the bounds of the throws [rad]: the middle, then the nearest evenly firing stars.
+    """Return start cranks within the bounds of the throws [rad]: the middle, then the nearest evenly firing cranks.
 
     For more than seven cylinders without a firing order, only the middle is returned.
     """

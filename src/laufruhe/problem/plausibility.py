@@ -31,7 +31,7 @@ MAX_SAG, MIN_SAG = 0.1, 1e-6
 def plausibility_warnings(
     engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False
 ) -> tuple[Complaint, ...]:
-    """Return warnings about unusual numbers, one for each place; `fires_together` allows firing at once."""
+    """Return warnings about unusual numbers, one for each part; `fires_together` allows cylinders to fire at once."""
     warnings = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
     warnings += [] if fires_together else _of_firing(engine)
     first: dict[str, Complaint] = {}

@@ -30,15 +30,15 @@ class Interval:
 
     @property
     def scale(self) -> float:
-        """Largest size."""
+        """Largest absolute value; one if that is zero."""
         return max(abs(self.lower), abs(self.upper)) or 1.0
 
     def scaled(self, factor: float) -> Interval:
-        """Return the set with all sizes multiplied by a factor."""
+        """Return the set with all values multiplied by a factor."""
         return replace(self, lower=self.lower * factor, upper=self.upper * factor)
 
     def within(self, size: float) -> Interval:
-        """Return the part of the set that is not larger than a size."""
+        """Return the subset of values whose absolute value is at most `size`."""
         return replace(self, lower=max(self.lower, -size), upper=min(self.upper, size))
 
     @property
@@ -86,15 +86,15 @@ class Sector:
 
     @property
     def scale(self) -> float:
-        """Largest size."""
+        """Largest absolute value; one if that is zero."""
         return self.upper or 1.0
 
     def scaled(self, factor: float) -> Sector:
-        """Return the set with all sizes multiplied by a factor."""
+        """Return the set with all values multiplied by a factor."""
         return replace(self, upper=self.upper * factor)
 
     def within(self, size: float) -> Sector:
-        """Return the part of the set that is not larger than a size."""
+        """Return the subset of values whose absolute value is at most `size`."""
         return replace(self, upper=min(self.upper, size))
 
     @property
@@ -104,7 +104,7 @@ class Sector:
 
     @property
     def edges(self) -> Array:
-        """Unit vectors along the two sides, shape (2, 2); shape (0, 2) for a disc."""
+        """Unit vectors along the two straight edges of the sector, shape (2, 2); shape (0, 2) for a disc."""
         if self.free_angle:
             return np.zeros((0, 2))
         low, high = self.angles
@@ -131,9 +131,9 @@ class Sector:
         return v * (self.upper / size) if size > self.upper else v
 
     def margins(self, v: Array) -> tuple[float, ...]:
-        """Return relative distances of a point from the arc and from the two sides, negative outside.
+        """Return relative distances of a point from the arc and the straight edges of the sector, negative outside.
 
-        A disc has no sides.
+        A disc has no straight edges.
         """
         arc = 0.5 * (1.0 - float(v @ v) / self.scale**2)
         sides = zip(self.edges, (1.0, -1.0), strict=False)

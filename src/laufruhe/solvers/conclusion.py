@@ -413,7 +413,7 @@ def unbalance_values(problem: Problem, result: Result) -> list[complex]:
 
 
 def values_of(problem: Problem, result: Result) -> list[Value]:
-    """Return the value of every decision [SI]: that of the result, or the initial value if the result has none."""
+    """Return the value of every decision [SI]: the value in the result, or the initial value if the result has none."""
     sizes = {decision.name: decision.value for decision in result.decisions}
 
     def value(decision: Decision) -> Value:

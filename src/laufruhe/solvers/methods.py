@@ -84,7 +84,7 @@ def _closes_without_places(problem: Problem) -> bool:
 
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
-    """Return the best local optimum of all numbers, with cones for those in which loads are affine."""
+    """Return the best local optimum of all open numbers, with cone programs for those in which loads are affine."""
     return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
 
 

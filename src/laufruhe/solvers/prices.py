@@ -21,6 +21,7 @@ ALIKE = 0.02
 INDEPENDENT, BALANCED = 1e-3, 1e-2
 """Smallest relative singular value of independent slopes, and largest relative residual of their balance."""
 _RESIDUAL_MARGIN = 1e-6
+"""Residual of the balance of slopes that is allowed above the smallest one."""
 ACTIVE = 1e-5
 """Relative distance to a limit, or to a bound of a decision, within which it is active."""
 MAX_VANISHING, _DIRECTIONS, MAX_CORNERS = 64, 8, 256
@@ -62,7 +63,7 @@ class Price:
 
     @property
     def other(self) -> float | None:
-        """Price of tightening; None if it is equal to that of relaxing."""
+        """Price of tightening; None if it is equal to the price of relaxing."""
         return None if self.is_equal or math.isnan(self.relaxed) else self.tightened
 
     def floored(self, minimum: float) -> Price:
@@ -97,7 +98,7 @@ class Slopes:
 
     @property
     def corners(self) -> Array:
-        """Rows of the hull; for a large hull its extreme rows in `MAX_CORNERS` directions.
+        """Gradients that span the hull, shape (m, n); for a large hull the extreme ones in `MAX_CORNERS` directions.
 
         All rows of a signal of constant length may be extreme. A circle with 256 corners has a relative error of 1e-4.
         """
@@ -240,7 +241,7 @@ def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Pric
 def affine_prices(
     problem: AffineProblem, limits: Sequence[Limit], x: Array, bound: Bound
 ) -> tuple[dict[Side, Price], dict[str, Price]]:
-    """Return prices of limits and of the bounds of sizes and angles, at an optimum of affine norms (P19)."""
+    """Return prices of limits, and of bounds of decisions by name, at an optimum x of affine norms (P19)."""
     multipliers = bound.multipliers
     solver = multipliers.shadow_prices(problem)
     prices = {

@@ -119,7 +119,7 @@ class ResultDetails:
 
     @property
     def measured(self) -> Evaluation | None:
-        """Evaluation whose objective the result states; None for that of the final design."""
+        """Evaluation whose objective the result states; None for the evaluation of the final design."""
         return None
 
 

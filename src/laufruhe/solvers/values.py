@@ -64,7 +64,7 @@ class DecisionValue(_Priced):
 
 
 def relevant_decisions(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
-    """Return the decisions without angles of zero sizes."""
+    """Return the decisions without the angles of unbalances that are zero."""
     pairs = pairwise([None, *decisions])
     return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_zero)]
 

@@ -114,5 +114,5 @@ class XEngine(LayoutKind):
     banks = 4
 
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return the places bank by bank."""
+        """Return the layout with cylinders numbered bank by bank."""
         return in_banks(self.name, inputs.cylinders, inputs.spacing(inputs.cylinders // 4), X_BANKS)

@@ -69,7 +69,7 @@ class LayoutInput:
     gas: bool = False
 
     def spacing(self, places: int) -> float:
-        """Return the distance between neighbouring places along the crank [m]; 1 for a single place."""
+        """Return the distance between neighbouring throws along the crank [m]; 1 for a single throw."""
         distance = self.options["cylinder_spacing"]
         if distance is None and places > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
@@ -146,7 +146,7 @@ class LayoutKind(ABC):
 
     @abstractmethod
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return places, banks and pins of the cylinders.
+        """Return the layout: positions, banks and pins of the cylinders.
 
         Raises
         ------
@@ -170,5 +170,5 @@ class Parts(LayoutKind):
     is_free = True
 
     def place(self, inputs: LayoutInput) -> Layout:
-        """Refuse: the list gives every place."""
+        """Raise ModelError: the list of slider-cranks gives every position."""
         raise ModelError(f"a list of {counted(inputs.cylinders, 'slider-crank')} has no layout; fix the throws")

@@ -123,7 +123,7 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
 
 @dataclass(frozen=True)
 class Throw:
-    """Throw of a crankshaft at a place along its axis [m] and an angle at phi = 0 [rad] (C3).
+    """Throw of a crankshaft, at position x along its axis [m] and at `angle` when phi = 0 [rad] (C3).
 
     Attributes
     ----------

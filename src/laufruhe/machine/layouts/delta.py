@@ -57,7 +57,7 @@ class Triangle:
         return away if corner == bank else away + Fraction(1, 2)
 
     def centre(self, corner: int, bank: int) -> Turn:
-        """Return the crank angle of a piston's dead centre with the lower throw upright, in turns."""
+        """Return the crank angle of a dead centre, of a bank's piston on a corner, the lower throw upright, in turns."""
         at: Turn = self.axis(0, 0)
         for k in range(bank):
             # step over to the other piston of bank k, then to the next bank on its crank
@@ -70,7 +70,7 @@ _RATIOS = ((1, 1, 1), (1, -1, -1), (1, -1, 1), (1, 1, -1))
 
 
 class Delta(LayoutKind):
-    """Two-stroke rows of three cylinders in a triangle."""
+    """Two-stroke engine with rows of three cylinders in a triangle."""
 
     name = "delta"
     keys = (
@@ -87,7 +87,7 @@ class Delta(LayoutKind):
     fires_evenly = True
 
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return rows by the throws of the lower crank, banks by the dead centres of their first pistons."""
+        """Return the layout: throws of the lower crank, and banks at the dead centres of their first pistons."""
         triangle = self._triangle(inputs)
         turns = [angle_of(reduced_turn(triangle.centre(bank, bank), 1)) for bank in range(3)]
         return in_banks(self.name, inputs.cylinders, inputs.spacing(inputs.cylinders // 3), turns)

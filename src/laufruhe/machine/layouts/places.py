@@ -10,18 +10,18 @@ from laufruhe.numerics.exact_angles import Turn, as_turn
 
 @dataclass(frozen=True)
 class Layout:
-    """Places of cylinders and throws, without masses.
+    """Positions of cylinders and throws, without masses.
 
     Attributes
     ----------
     positions, banks
-        Place along x [m] and bank angle [rad] of every cylinder.
+        Position along x [m] and bank angle [rad] of every cylinder.
     pins
         Index of the throw that every cylinder works on.
     pin_offsets
         Angle of a cylinder's own pin from its throw [rad], for split pins.
     throw_positions
-        Place along x of every throw [m].
+        Position along x of every throw [m].
     sides
         Share of the angle between the banks at which every cylinder leans; its pin is offset by as much of the
         split pins' angle the other way. Empty without such banks.
@@ -42,7 +42,7 @@ class Layout:
     throws: tuple[float, ...] | None = None
 
     def dead_centre_turn(self, k: int) -> Turn:
-        """Return the crank angle of alpha = 0 of cylinder k with its throw at zero, in turns (C5)."""
+        """Return the crank angle at which cylinder k has alpha = 0 if its throw is at zero, in turns (C5)."""
         return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
@@ -61,5 +61,5 @@ class Layout:
 
 
 def stations(count: int, spacing: float) -> tuple[float, ...]:
-    """Return `count` places at equal spacing, the first at the front, the middle at x = 0 (C2)."""
+    """Return `count` positions along x at equal spacing [m], the first at the front, the middle at x = 0 (C2)."""
     return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))

@@ -15,7 +15,7 @@ from laufruhe.machine.slider_crank import SliderCrank, as_kind
 
 
 class Radial(LayoutKind):
-    """Master rod and articulated rods on one crank pin; cylinder 1 upright, numbers as the crank turns."""
+    """Master rod and articulated rods on one crank pin; cylinder 1 is upright, numbers follow the rotation."""
 
     name = "radial"
     keys = (

@@ -183,7 +183,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return ()
 
     def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Cut slices off the sides of a box in which every position violates a limit on distances."""
+        """Shrink a box by slices at its bounds in which every position violates a limit on distances."""
         lower, upper = lower.copy(), upper.copy()
         for side, is_upper in product(range(len(lower)) if self._envelope else (), (True, False)):
             low, high, width = 0.0, 1.0, upper[side] - lower[side]

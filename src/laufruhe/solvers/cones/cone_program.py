@@ -90,7 +90,7 @@ class ConeRows:
         self.count = 0
 
     def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
-        """Add a block of rows to A and b.
+        """Add a block of constraint rows to the matrix A and the right-hand side b.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class ConeRows:
 
 @dataclass(frozen=True, eq=False)
 class RowBlock:
-    """Columns and rows of one norm in the program.
+    """Columns and constraint rows of one norm in a cone program.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class RowBlock:
 
     @property
     def centres(self) -> NDArray[np.int64]:
-        """Column of the free centre that is subtracted from each number of the rows, shape (k, d); (0, 0) if none."""
+        """Columns of free centres, one subtracted from each number of the norm, shape (k, d); (0, 0) if none."""
         if not self.cones.centred:
             return np.zeros((0, 0), dtype=int)
         k, d = self.norm.constant.shape
@@ -252,7 +252,7 @@ def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
 
 
 def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadratic: Array | None = None) -> Any:
-    """Minimise cost . x + x' quadratic x / 2 subject to rows, by Clarabel.
+    """Minimise cost . x + x' quadratic x / 2 subject to the constraint rows `rows`, by Clarabel.
 
     Parameters
     ----------

@@ -96,7 +96,7 @@ def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
 
 
 def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
-    """Solve with only the rows of limited peaks that are near their limit; add violated rows and repeat.
+    """Solve with only the samples (rows) of limited peaks that are near their limit; add violated ones and repeat.
 
     A peak involves few of a thousand angles. Rows left out have zero multipliers, so bounds hold for all rows.
     """
@@ -130,12 +130,12 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
 
 
 def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Return the indices of rows of a norm whose length at x, shape (n,), exceeds `share` times `maximum` [SI]."""
+    """Return indices of a norm's vectors (rows) whose length at x, shape (n,), exceeds `share` times `maximum` [SI]."""
     return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
 
 
 def restrict_rows(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
-    """Restrict a norm to the rows with these indices."""
+    """Restrict a norm to the vectors (rows) with these indices."""
     return replace(
         norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))
     )

@@ -20,6 +20,7 @@ from laufruhe.solvers.cones.cone_program import project_on_sets
 SAME = 1e-10
 """Relative size under which singular values, and the residual of contradicting equations, count as zero."""
 MAX_PROJECTIONS = 40
+"""Largest number of alternate projections on the equations and on the sets of the decisions."""
 
 
 @dataclass(frozen=True, eq=False)

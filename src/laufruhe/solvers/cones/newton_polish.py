@@ -21,6 +21,7 @@ TARGET_GAP = 1e-6
 REFINEMENT = 16
 """Factor of samples over the cone program."""
 MAX_STEPS = 5
+"""Largest number of Newton steps."""
 DAMPING = (1e-10, 1e-7, 1e-4)
 """Shares of the trace of the curvature on its diagonal; x stays in directions that do not change the objective."""
 CONVERGED = 1e-5
@@ -100,7 +101,7 @@ def _is_smooth(problem: AffineProblem) -> bool:
 
 
 def _newton_steps(problem: AffineProblem, x: Array) -> tuple[Array, tuple[Array, ...]] | None:
-    """Return the end of Newton steps from x and the dual rows of its limits; None if the first step is no better."""
+    """Return the end of Newton steps from x, and the dual rows of limits there; None if the first step is no better."""
     end, is_zero = None, x == 0.0
     for _ in range(MAX_STEPS):
         gradient, curvature = derivatives(problem, x)

@@ -17,6 +17,7 @@ from laufruhe.solvers.cones.conic import solve_cones
 SAME_LOAD = 1e-10
 """Relative change of a load that counts as none."""
 NEGLIGIBLE = 1e-6
+"""Relative load of a decision, or of a remaining sum of loads, that counts as zero."""
 
 
 def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:

@@ -23,6 +23,7 @@ from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.sampling_refinement import sampling_overestimate
 
+# largest number of bounds by all provers, with searches from their lowest boxes in between
 MAX_DIVISIONS = 3
 # share of the problem's largest number of boxes for a test of one set of limits
 CONFLICT_SHARE = 0.1

@@ -29,9 +29,11 @@ from laufruhe.solvers.smooth.program import SmoothProgram
 SLACK = 1e-5
 # relative difference of objectives that counts as none
 SAME = 1e-6
+# largest number of searches with tighter limits from a local optimum
 MAX_MARGINS = 6
 # violation of a limit that a peak between samples may cause
 NEAR = 0.05
+# iterations of a search, and number of local optima from whose neighbourhood searches start again
 ITERATIONS = 100
 MAX_AROUND = 3
 # local optima of a search that are refined with exact simulations

@@ -34,6 +34,7 @@ POOL_TIME = 0.25
 SIMULATED_POOL = 4
 # weight of violations with simulated measures, which most designs violate
 VIOLATION_WEIGHT = 10.0
+# samples per cycle and number of orders for the evaluation of candidates
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 StartPoint: TypeAlias = tuple[list[float], Array | None]

@@ -116,7 +116,7 @@ def spread_starts(problem: Problem) -> list[Array]:
 
 
 def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) -> Array:
-    """Return the best point of up to `starts` local searches from the best of these places, shape (n,) each."""
+    """Return the best end of up to `starts` local searches from the best start points `places`, shape (n,) each."""
     ranked = sorted(until_time_limit(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, POINTS_PER_START))]:

@@ -53,11 +53,11 @@ class BestStars:
 
     @property
     def cut(self) -> float:
-        """Objective that a new star must be below [SI]; infinite while there are fewer than `count` stars."""
+        """Objective that a new crank star must be below [SI]; infinite while fewer than `count` stars are known."""
         return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
 
     def offer(self, stars: Stars, values: Array) -> None:
-        """Add stars that are among the best, without duplicates."""
+        """Add crank stars that are among the best, without duplicates; `values` are objectives [SI], shape (n,)."""
         if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
             return
         best = np.argsort(values, kind="stable")[: 4 * self.count]

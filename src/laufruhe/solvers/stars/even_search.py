@@ -49,7 +49,7 @@ class EvenDesign:
 
     @cached_property
     def candidate(self) -> Candidate:
-        """Throws, geometry and shafts of the star."""
+        """Throws, bank and split pin angle, and shafts of the crank star."""
         return self.family.candidate(self.phasing, self.steps, self.phasing.without(self.built))
 
     @property
@@ -61,7 +61,7 @@ class EvenDesign:
         return ranked_star(phasing, self.candidate, self.steps, self.value, self.bound, self.proven)
 
     def equals(self, other: EvenDesign) -> bool:
-        """Return True if both stars are mirror images of each other with equal objectives (S2)."""
+        """Return True if both crank stars are mirror images of each other with equal objectives (S2)."""
         if self.family is not other.family or self.built != other.built:
             return False
         if abs(self.value - other.value) > 1e-6 * max(self.value, other.value):
@@ -160,7 +160,7 @@ def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
 
 
 def enumeration_result(phasing: Phasing, family: Family, search: StarSearchResult, method: str) -> EvenStarResult:
-    """Convert the result of an enumeration of stars; `method` is its name for the certificate."""
+    """Return the result of an enumeration of crank stars; `method` is its name for the certificate."""
     designs = tuple(
         EvenDesign(phasing, family, tuple(map(int, star)), (), float(value), float(value), search.complete)
         for star, value in zip(search.stars, search.values, strict=True)

@@ -40,29 +40,29 @@ class Family:
 
     @property
     def size(self) -> int:
-        """Number of stars, including mirror images."""
+        """Number of crank stars, including mirror images."""
         return 1 if self.fixed is not None else self.space.size
 
     @property
     def first(self) -> tuple[int, ...]:
-        """Steps of the first star."""
+        """Steps of the throws of the first crank star."""
         return self.space.first if self.fixed is None else self.fixed
 
     @property
     def stars(self) -> Stars:
-        """Steps of all stars, one of each set of mirror images, shape (n, throws)."""
+        """Steps of all crank stars, one of each set of mirror images, shape (n, throws)."""
         if self.fixed is not None:
             return np.array([self.fixed], dtype=np.uint8)
         return np.concatenate(list(self.space.blocks()))
 
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """Return the candidate of a star without the shafts `left_out`, with the first of its firing orders."""
+        """Return the candidate of a crank star without the shafts `left_out`, with the first of its firing orders."""
         if self.is_of_orders:
             return phasing.fired(steps, self.geometry, left_out)
         return phasing.star(steps, self.space.phases, self.geometry, left_out)
 
     def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
-        """Return the model of all stars of the family, or of the stars of `space`."""
+        """Return the model of all crank stars of the family, or of those in `space`."""
         kind = FiringModel if self.is_of_orders else StarModel
         return kind(phasing, space or self.space, self.geometry, self.fixed)
 

@@ -240,7 +240,7 @@ def ranked_star(
 
 
 def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int = 1) -> list[Candidate]:
-    """Return the candidates of a ranking: each star with its first `orders` firing orders."""
+    """Return the candidates of a ranking: each crank star with its first `orders` firing orders."""
     return [
         Candidate(
             star.throws, firing.order, star.bank_angle, star.split_pin,

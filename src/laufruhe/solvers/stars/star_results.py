@@ -42,14 +42,14 @@ class StarDesign:
 
     @cached_property
     def is_feasible(self) -> bool:
-        """True if the star has a design that keeps its limits."""
+        """True if the crank star has a design that keeps its limits."""
         return (
             self.result.status.has_design and self.result.final.violation(self.result.problem.limits) <= FEASIBILITY_TOL
         )
 
     @property
     def is_infeasible(self) -> bool:
-        """True if no design of this star keeps the limits, with fine sampling (P7)."""
+        """True if no design of this crank star keeps the limits, with fine sampling (P7)."""
         result = self.result
         if not result.status.has_design:
             return result.status is Status.INFEASIBLE
@@ -62,7 +62,7 @@ class StarDesign:
 
     @property
     def bound(self) -> float:
-        """Lower bound over all designs of this star [SI]."""
+        """Lower bound of the objective over all designs of this crank star [SI]."""
         return self.result.certificate.lower_bound if self.result.certificate else self.value
 
 

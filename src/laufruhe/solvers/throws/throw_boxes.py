@@ -182,7 +182,7 @@ class ThrowPrograms:
         return columns[self._riders.size :][: self.waves.throws * width].reshape(self.waves.throws, width)
 
     def _rows(self, norm: WaveNorm, laps: tuple[int, ...]) -> AffineNorm:
-        """Return the rows of a norm for given whole turns (laps) of the cylinders."""
+        """Return a norm of waves as an affine norm, for given whole turns (laps) of the cylinders."""
         orders, throws, fixed = self.waves.orders[:, 0], self.waves.throws, norm.fixed
         k, d = fixed.constant.shape
         turned_waves = np.zeros((throws, len(orders), k, d), complex)
@@ -401,7 +401,7 @@ class Mixture:
         self.problem = AffineProblem(terms, (*limits, *ties, *self._share_limits(size)), domains, 1)
 
     def _through(self, norm: AffineNorm, matrix: Array, points: Sequence[Array]) -> AffineNorm:
-        """Return a norm in columns of the box, from its rows in columns of the model."""
+        """Return a norm of the columns of the model as a norm of the columns of the box."""
         k, d, n = norm.slope.shape
         flat, first = norm.slope.reshape(k * d, n), len(matrix)
         shared = flat[:, n - self._shared.shape[1] :] @ self._shared.T

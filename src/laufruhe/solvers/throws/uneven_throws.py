@@ -45,11 +45,13 @@ from laufruhe.solvers.throws.stored_work import with_work_for_search, work_for_b
 from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, start_candidates, why_none_fires
 
+# number of start cranks of a thorough search
 STARTS = 6
 # smallest unit of the objective in a search, relative to the initial objective
 SMALLEST_UNIT = 1e-3
 # relative margin of limits in the smooth program, against rounding
 SOFT_LIMIT = 1e-7
+# softening of norms in the last stage, relative to the unit of the objective (N4)
 SOFTEST = 1e-6
 # relative difference of objectives at which two local optima are equal
 SAME = 1e-6
