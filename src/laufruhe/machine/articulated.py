@@ -190,7 +190,7 @@ class ArticulatedCrank(SliderCrank):
 
 
 def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
-    """Find a zero of a function given with its derivative, by Newton's method."""
+    """Return a zero near `start` by Newton's method; `slope` returns a function and its derivative."""
     angle = start
     for _ in range(_ROUNDS):
         value, derivative = slope(angle)

@@ -59,7 +59,8 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
 def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[Span]:
     """Return the distance from the crank axis that each balancer shaft sweeps to [m], between two engines.
 
-    Every item has the smallest and the largest distance for shaft positions between those of the engines.
+    Every item has the smallest and the largest distance for shaft positions between those of the engines. `names`
+    selects shafts; None selects all.
     """
     low, high, origin = _shafts(lower), _shafts(upper), Shaft("origin")
     out = []

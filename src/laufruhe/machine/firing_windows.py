@@ -247,7 +247,11 @@ class FiringBounds:
     def _with_interval(
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
-        """Return the paths with the bounds of one more interval, or None if infeasible."""
+        """Return the paths with the bounds of the interval between two cylinders, or None if infeasible.
+
+        `before` and `after` are indices of the cylinders, with the whole turns of their firings. `wrapped` is True for
+        the interval from the last firing to the first one of the next cycle.
+        """
         advance = self.advance
         still = math.tau * (lap_after - lap_before) - advance[after] + advance[before]
         still += self.cycle.angle if wrapped else 0.0

@@ -166,5 +166,5 @@ def grade_of(text: str) -> float | None:
 
 
 def permitted_unbalance(grade: float, mass: float, speed: float) -> float:
-    """Return the permitted unbalance of a rotor at its fastest speed in service, summed over its planes [kg m] (R1)."""
+    """Return the unbalance [kg m] that a grade [m/s] permits at the fastest service speed, summed over planes (R1)."""
     return grade * mass / speed

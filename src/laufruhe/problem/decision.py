@@ -418,7 +418,7 @@ class Domain:
         return np.array([u.real, u.imag])
 
     def minimum(self, gradient: Array) -> float:
-        """Return min g . x over the set of allowed values, g the columns of `gradient` (P4)."""
+        """Return the minimum of g . x over the allowed columns x of the decision, g its part of `gradient` (P4)."""
         return self.set.minimum(gradient[self.columns])
 
     def project(self, x: Array) -> Array:

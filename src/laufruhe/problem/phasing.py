@@ -244,7 +244,8 @@ class PhasingOf(Generic[P]):
     ) -> Candidate:  # fmt: skip
         """Return the candidate of a crank star with even firing, with the first of its firing orders.
 
-        The angles of its throws are `steps`, of which one turn has `phases`.
+        The angles of its throws are `steps`, of which one turn has `phases`. `geometry` has bank angle and split pin
+        angle [rad], and `left_out` the shafts that are not built.
         """
         layout = self.layout(*geometry)
         order = self.firing_order or next(even_orders(self.cycle, layout, steps), None)
@@ -253,7 +254,10 @@ class PhasingOf(Generic[P]):
     def fired(
         self, slots: Sequence[int], geometry: tuple[float | None, float | None], left_out: tuple[str, ...] = ()
     ) -> Candidate:
-        """Return the candidate whose cylinders, each on its own throw, fire in these slots of the cycle (S6, V9)."""
+        """Return the candidate whose cylinders, each on its own throw, fire in these slots of the cycle (S6, V9).
+
+        See `star` for `geometry` and `left_out`.
+        """
         steps = slot_steps(self.cycle, slots)
         throws = star_throws(self.layout(*geometry), steps, firing_lattice(self.cycle, self.cylinders).steps)
         return Candidate(throws, slot_order(slots), *geometry, left_out)

@@ -56,7 +56,7 @@ class Interval:
         return (u * self.directions[0].conjugate()).real, self.angle
 
     def minimum(self, g: Array) -> float:
-        """Return min g . x over the points x of the set, for g of shape (1,)."""
+        """Return the minimum of a linear function g . x over the points x of the set, g of shape (1,)."""
         return float(min(g[0] * self.lower, g[0] * self.upper))
 
     def project(self, v: Array) -> Array:
@@ -116,7 +116,7 @@ class Sector:
         return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
 
     def minimum(self, g: Array) -> float:
-        """Return min g . x over the points x of the set, for g of shape (2,): minus the support function of -g (P4)."""
+        """Return the minimum of g . x over the set, g of shape (2,): minus the support function of -g (P4)."""
         if self._inside_cone(-g):
             return -self.upper * float(np.hypot(*g))
         return min(0.0, self.upper * float((self.edges @ g).min()))

@@ -92,7 +92,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
 
 
 def solve_accurately(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Solve, and choose a better fidelity until the optimum is as accurate as the file demands (F11).
+    """Call `solve`, and choose a better fidelity until the optimum is as accurate as the file demands (F11).
 
     The physics that a fidelity leaves out adds a fixed force. This may be a small share of the initial forces and a
     large share of the optimal ones.

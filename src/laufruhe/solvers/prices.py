@@ -158,7 +158,10 @@ def _unique_prices(rows: Array, slope: Array) -> list[float] | None:
 
 
 def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
-    """Return smallest and largest multiplier of every limit and bound, by linear programs over balanced slopes."""
+    """Return smallest and largest multiplier of every limit and bound, by linear programs over balanced slopes.
+
+    `size` is the largest slope of the objective, a unit of the balance. See `prices_of`.
+    """
     shares, count = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)], len(objective)
     sizes = [max(float(np.abs(rows).max(initial=0.0)) for rows in (slopes.hull, slopes.segments)) for slopes in shares]
     scales = [size] * count + [slopes or 1.0 for slopes in sizes[count:]]
@@ -193,7 +196,7 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
 
 
 def _minimum(cost: Array, matrix: Array, right: Array, equal: int) -> float:
-    """Return the minimum of a linear program; -inf if it is unbounded, NaN if the solver failed.
+    """Return the minimum of cost . x in a linear program; -inf if it is unbounded, NaN if the solver failed.
 
     The first `equal` rows of the matrix are equal to the right-hand side, the others are at most that.
     """
@@ -233,7 +236,10 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
 
 
 def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Price]:
-    """Return prices of active bounds of a decision from the gradient of the Lagrangian without them, shape (width,)."""
+    """Return prices of active bounds of a decision at its value `column`, shape (width,).
+
+    `slope` is the gradient of the Lagrangian without these bounds, shape (width,).
+    """
     edges = edges_at(decision, column).items()
     return {name: Price.both(max(-float(slope @ normal) / float(normal @ normal), 0.0)) for name, normal in edges}
 

@@ -37,7 +37,7 @@ tolerances."""
 
 
 def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Solve with more samples until fine sampling confirms limits and gap; the last result has fine sampling."""
+    """Call `solve` with more samples until fine sampling confirms limits and gap; the last result has fine sampling."""
     result = solve(problem)
     for _ in timed_rounds(ROUNDS):
         fidelity = problem.fidelity

@@ -52,12 +52,12 @@ class Triangle:
 
     @staticmethod
     def axis(corner: int, bank: int) -> Turn:
-        """Return the angle of a bank's cylinder axis as seen by the crank at one of its ends, in turns (C5)."""
+        """Return the angle of a bank's cylinder axis in turns, seen from the crank at its end `corner` (C5)."""
         away = Fraction(1, 12) - Fraction(bank, 3)
         return away if corner == bank else away + Fraction(1, 2)
 
     def centre(self, corner: int, bank: int) -> Turn:
-        """Return the crank angle of a dead centre, of a bank's piston on a corner, the lower throw upright, in turns."""
+        """Return the crank angle of a dead centre in turns: of a bank's piston on a corner, lower throw upright."""
         at: Turn = self.axis(0, 0)
         for k in range(bank):
             # step over to the other piston of bank k, then to the next bank on its crank

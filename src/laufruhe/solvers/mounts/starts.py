@@ -50,7 +50,7 @@ def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | No
 
 
 def design_at_start(problem: Problem, start: tuple[list[float], Array]) -> Design | None:
-    """Evaluate the design with these mounts and columns of unbalances; None on an undamped resonance."""
+    """Evaluate the design at a start, mounts and columns of unbalances; None on an undamped resonance."""
     mounts, columns = iter(start[0]), start[1]
     unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
     return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])

@@ -39,7 +39,7 @@ class ConstraintCollector:
     def add(
         self, expression: Any, lower: float, upper: float, name: str, minimum: Slope = None, maximum: Slope = None
     ) -> None:
-        """Constrain every entry of a scalar or column.
+        """Constrain every entry of an expression, a scalar or a column.
 
         Shadow prices of the sides `minimum` and `maximum` follow from multipliers of the lower and upper bound.
         """

@@ -165,11 +165,11 @@ class _Program:
     memory: Any = None
 
     def value(self, y: Array, parameters: Sequence[float]) -> float:
-        """Return the objective at a point."""
+        """Return the objective at scaled variables y and the parameters of a stage."""
         return float(self.solver.get_function("nlp_f")(y, list(parameters)))
 
     def slopes(self, y: Array, parameters: Sequence[float]) -> tuple[float, Array, Array, Array]:
-        """Return objective, constraints, gradient and Jacobian at a point."""
+        """Return objective, constraints, gradient and Jacobian at scaled variables y and the parameters of a stage."""
         f, gradient = self.solver.get_function("nlp_grad_f")(y, list(parameters))
         g, jacobian = self.solver.get_function("nlp_jac_g")(y, list(parameters))
         return float(f), _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float)
@@ -181,6 +181,7 @@ def _compiled_program(
 ) -> _Program:
     """Return the compiled IPOPT solver of a serialised CasADi program; compiling takes as long as several starts.
 
+    See `Task` for `oracle` and `external_model`. If `expand` is True, arrays become scalars where that is faster.
     `stay_near` starts with a small barrier.
     """
     function, external = ca.Function.deserialize(oracle), None

@@ -98,7 +98,8 @@ def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
 
     If n starts found w different optima, the next start finds a new one with probability w (w + 1) / (n (n - 1))
     (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80). The new one is the best of all w + 1 with probability
-    1 / (w + 1). A start without a usable optimum counts as a new optimum.
+    1 / (w + 1). A start without a usable optimum counts as a new optimum. Optima differ if their objectives differ by
+    more than a fraction of `scale`.
     """
     n, best_optima = sum(optimum.starts for optimum in optima), distinct_optima(optima, scale)
     w = len(best_optima) + sum(optimum.starts for optimum in optima if not optimum.usable)

@@ -101,7 +101,7 @@ class LocalProgram:
         return np.ascontiguousarray(np.array(rows).T)
 
     def rank(self, shares: Array) -> tuple[float, float]:
-        """Return the sort key: violation above the tolerance first, then objective."""
+        """Return the sort key at shares: violation above the tolerance first, then objective."""
         return _rank(self.numbers(shares))
 
 
@@ -127,7 +127,7 @@ def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) 
 
 
 def _local_optimum(program: LocalProgram, place: Array) -> Array:
-    """Return a local optimum by SLSQP with derivatives by differences."""
+    """Return a local optimum from the shares `place` by SLSQP with derivatives by differences."""
     from scipy.optimize import minimize
 
     initial = program.numbers(place)

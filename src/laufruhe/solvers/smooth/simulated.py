@@ -55,7 +55,7 @@ class SimulatedVariables:
         return None if self._peaks is None else ExternalValues(self.symbols, self._arguments, self._peaks)
 
     def peaks_at(self, mounts: Sequence[float], columns: Array) -> Array:
-        """Return the peaks of a design, shape (peaks,)."""
+        """Return the peaks at numbers of the mounts and columns of the unbalances, shape (peaks,)."""
         return np.zeros(0) if self._peaks is None else self._peaks.values(np.concatenate([mounts, columns]))
 
     def minimum(self, measure: Measure) -> Any:

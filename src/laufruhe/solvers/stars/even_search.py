@@ -96,7 +96,7 @@ class EvenStarResult:
 
 
 def can_list(problem: Problem, families: Sequence[Family]) -> bool:
-    """Return True if the even stars of a problem, or its firing orders, are few enough to enumerate."""
+    """Return True if the even stars or firing orders of all families are few enough to enumerate."""
     return sum(family.size for family in families) <= MAX_LISTED or _differ_by_squares(problem, families)
 
 
@@ -116,7 +116,7 @@ def refuse_long(problem: Problem) -> None:
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even crank stars.
+    """Return the best designs of all even crank stars in `families`.
 
     The method is enumeration if the objective depends on single orders or on squares of loads, else cuts of cone
     programs.
