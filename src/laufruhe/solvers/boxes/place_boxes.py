@@ -115,9 +115,9 @@ class Relaxation:
     def _fixed_unbalances(self, nodes: Sequence[Array]) -> tuple[list[Rotor], list[Decision]]:
         """Return rotors and decisions of fixed unbalances, whose loads are linear in the position within a cell.
 
-        A cell lies between two bounds or inner bearings of a box that are neighbours. Each decision is the share of a
-        cell that the position has covered. The relaxation drops the condition that a
-        position covers a whole cell before it enters the next.
+        A cell is the range of a position between neighbouring bounds or inner bearings of the box. Each decision is the
+        share of a cell that the position has covered. The relaxation drops the condition that a position covers a whole
+        cell before it enters the next.
         """
         rotors: list[Rotor] = []
         decisions: list[Decision] = []
