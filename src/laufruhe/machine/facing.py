@@ -1,7 +1,7 @@
 """Shared chamber of two pistons that face each other, on cranks that need not be in step (G18).
 
-Both pistons sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. It is least between the dead
-centres of the two, and from there its charge counts the angle.
+Both pistons sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. The volume V is smallest
+between the dead centres of the two pistons, and the angle of the gas cycle counts from there.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
 
 
 def minimum_room(part: SliderCrank, other: SliderCrank) -> float:
-    """Return the least distance between the pins of two facing pistons [m]; infinite for Scotch yokes."""
+    """Return the smallest distance between the piston pins of two facing pistons [m]; infinite for Scotch yokes."""
     distance = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
     reach = part.crank_radius + part.rod_length + other.crank_radius + other.rod_length
     if math.isinf(reach):

@@ -301,9 +301,9 @@ def affine_prices(
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """Return all subgradients of a norm at x, times its weight; None if unknown, or if too many rows are zero.
+    """Return all subgradients of a norm at x, times `weight`; None if unknown, or if too many rows are zero.
 
-    `z` has known dual rows of the norm, shape (k, d).
+    `z` has dual rows of the norm, shape (k, d); None for those of a subgradient.
     """
     rows = norm.rows(x)
     kinks = norm.norm.subdifferential(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)

@@ -68,7 +68,7 @@ Change = Callable[[Candidate, float], Candidate | None]
 class EvaluatedPoint:
     """Design evaluated by the exact model: its objective, and the largest relative violation of a limit.
 
-    The upper violation includes the sampling error.
+    `upper_violation` is the largest violation plus sampling error.
     """
 
     point: Point

@@ -47,7 +47,7 @@ def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
 class _Program:
     """Scaled convex program in cvxpy.
 
-    If relaxed, the largest relative violation of the limits is added to the objective.
+    If `relaxed` is True, the objective includes the largest relative violation of the limits.
     """
 
     def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:

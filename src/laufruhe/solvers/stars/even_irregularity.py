@@ -30,8 +30,8 @@ def flywheel_measures(problem: Problem) -> list[Measure]:
 def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
     """Choose among even crank stars without the flywheel's measures, which are equal for all of them (S35).
 
-    All even stars of equal cylinders have the same dead centres, and so the same torque. The problem without measures
-    of the flywheel is left to `solve`.
+    All even stars of equal cylinders have the same dead centres, and so the same torque. `solve` solves the problem
+    without measures of the flywheel.
     """
     initial = evaluate(problem)
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
