@@ -38,7 +38,7 @@ from laufruhe.numerics.budget import timed_rounds
 if TYPE_CHECKING:
     from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 
-# rounds in which root bounds of a mean narrow each other; smallest share of the mean of a root to narrow
+# rounds in which bounds of the roots of a mean narrow each other; smallest share of the mean of a root to narrow
 ROUNDS, SMALL = 2, 0.03
 # smallest share of a mean lost to loose bounds of odd multiples that makes narrowing worthwhile
 LARGE = 0.03
@@ -47,7 +47,7 @@ WORTH = 0.25
 
 
 class BoxRelaxation:
-    """Relaxation of a norm on a box, valid for designs with a norm up to `upper_norm` alone.
+    """Relaxation of a norm of mount force or travel on a box, for designs with a norm up to `upper_norm` alone.
 
     Attributes
     ----------
@@ -57,13 +57,13 @@ class BoxRelaxation:
     Parameters
     ----------
     search
-        Relaxation of the problem.
+        Relaxation of the whole problem, with its limits and root box.
     query
-        Norm with its orders.
+        Measure of force or travel, with its orders.
     ends
         Norm up to which bounds hold (`upper_norm`), and the bound from which the box is fathomed (`cutoff`).
     lower, upper
-        Box, shape (n,).
+        Ends of the sides of the box, shape (n,) each.
     """
 
     roots: Array
@@ -85,10 +85,11 @@ class BoxRelaxation:
         )
 
     def bound(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> tuple[float, Array]:
-        """Return a lower bound of the norm on the box, and branching scores.
+        """Return a lower bound of the norm on the box, and branching scores, shape (n,).
 
-        Several variables are bounded one by one. The chords of their roots between lower and upper bounds are then
-        bounded together (E54). On the root box, the lower bounds of its roots are written to `root_bounds`.
+        Several epigraph variables are bounded one by one. The chords of their roots between lower and upper bounds are
+        then bounded together (E54). `root_bounds`, shape (variables,), are lower bounds of the roots on the root box;
+        if the box is the root box, its new bounds are written there.
         """
         scores = np.zeros(len(self.lower))
         self.roots = root_bounds
@@ -113,6 +114,7 @@ class BoxRelaxation:
         return result
 
     def _bound_mean(self, variables: Sequence[EpigraphVariable], roots: Array) -> tuple[float, Array]:
+        """Return a lower bound of a mean by the sum of its roots (E58), and branching scores, shape (n,)."""
         mean = self._mean(variables, roots)
         if mean.floor >= self.cutoff:
             return mean.floor, np.zeros(len(self.lower))
@@ -130,7 +132,7 @@ class BoxRelaxation:
         return bound, joint_scores(scores, multiple_scores, self.upper_norm - bound)
 
     def _narrow_roots(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> Array:
-        """Return lower bounds of each root, given that the norm of the whole stays below its upper bound (E58).
+        """Return lower bounds of the root of each variable, given that the mean is at most `upper_norm` (E58).
 
         Upper bounds of odd multiples are narrowed too. All programs of a round have the same constraints, so that they
         may be solved concurrently.
@@ -166,7 +168,7 @@ class BoxRelaxation:
         return mean_bound(variables, self._multiple_bounds[key], roots, self.upper_norm, self.mounts.numbers)
 
     def hides_mean(self, variables: Sequence[EpigraphVariable]) -> bool:
-        """Return True if loose bounds of odd multiples hide enough of the mean to narrow them."""
+        """Return True if loose bounds of odd multiples of orders hide more of the mean than the share LARGE."""
         size = sum(variable.share * variable.unit for variable in variables)
         mean = self._mean(variables, np.array([variable.unit for variable in variables]))
         return float(mean.prices.sum()) + mean.constant < (1.0 - LARGE) * size
@@ -200,7 +202,7 @@ class BoxRelaxation:
     def _solve(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[float, Array]:
-        """Return the proven least sum of priced variables or roots, and branching scores."""
+        """Return the proven minimum of the sum of prices times variables or times roots, and branching scores."""
         # the solver works best if prices add up to one
         scale = float(prices.sum())
         program, responses = self._program(variables, prices / scale, mean)
@@ -213,7 +215,7 @@ class BoxRelaxation:
         return scale * proven_bound(program, solution.multipliers), scores
 
     def cut_off(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> SdpProgram:
-        """Return the program of designs in the box with a norm up to its upper bound."""
+        """Return the semidefinite program of designs in the box with a norm up to `upper_norm`."""
         if _is_single(variables):
             uppers = [(v.root_bound(self.upper_norm / v.share) / v.unit) ** 2 for v in variables]
             program, _ = self._program(variables, np.zeros(len(variables)))
@@ -226,9 +228,10 @@ class BoxRelaxation:
     def _program(
         self, variables: Sequence[EpigraphVariable], prices: Array, mean: MeanBound | None = None
     ) -> tuple[SdpProgram, list[Response]]:
-        """Return the program of variables at prices, and the responses to their orders, then to those of limits alone.
+        """Return the semidefinite program of variables at prices, and the responses of all its orders.
 
-        Limits bound further epigraph variables above, or the squares of forces by those at rest (E61).
+        Orders of the variables come first, then orders of limits alone. Limits bound further epigraph variables above,
+        or the squares of forces by the squares of forces at rest (E61).
         """
         quadratics: list[QuadraticBound] = []
         responses: list[Response] = []
@@ -277,7 +280,11 @@ class BoxRelaxation:
         return program, responses
 
     def _branching_scores(self, orders: Sequence[Order], responses: Sequence[Response], solution: Solution) -> Array:
-        """Return scores by side: violation of the products by s at the optimum, over the forces in the norm."""
+        """Return a branching score of each side of the box, shape (n,).
+
+        It adds up squared violations of the products with s at the optimum, over the squared signal in the norm. Sides
+        of modes have priced violations.
+        """
         scores, s = np.zeros(len(self.lower)), solution.s
         for order, response, moments in zip(orders, responses, solution.moments, strict=False):
             size = float(np.sum(squared(self.query.signal(response) / response.unit) * moments)) or 1.0
@@ -310,7 +317,10 @@ def _is_single(variables: Sequence[EpigraphVariable]) -> bool:
 
 
 def joint_scores(scores: Array, multiple_scores: Array, missing_bound: float) -> Array:
-    """Return the larger of two scores: relaxation scores over their largest, multiple scores over the missing bound."""
+    """Return the larger of two branching scores of each side of a box, shape (n,).
+
+    Scores of the relaxation are over their largest, scores of odd multiples over a share of the missing bound.
+    """
     unit = max(WORTH * missing_bound, 1e-100 * float(multiple_scores.max()), 1e-300)
     return np.maximum(scores / max(float(scores.max()), 1e-300), multiple_scores / unit)
 

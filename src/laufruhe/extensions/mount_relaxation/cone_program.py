@@ -52,7 +52,7 @@ _SETTINGS = {
     "max_step_fraction": 0.95,
 }
 
-# seconds of relaxations after which worker processes start: such searches often need dozens
+# seconds of relaxations after which worker processes start: longer searches often need dozens of bounds
 START_SECONDS = 0.25
 
 ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"
@@ -61,7 +61,7 @@ Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 
 class ConeProgram:
-    """Rows of cones of an `SdpProgram`.
+    """Cone program of an `SdpProgram`, built up row by row of its cones.
 
     The variables are, in this order: epigraph variables, blocks of their quadratic bounds, roots and their lengths, s,
     and moments of each order and of each mode. `tolerances` are those of gap and feasibility.
@@ -108,7 +108,7 @@ class ConeProgram:
         self.cones.append((cone, name))
 
     def _add_mode(self, number: int, mode: ModeConstraints) -> None:
-        """Add the rows of E56 for one mode."""
+        """Add the rows of the constraints E56 of one natural mode."""
         numbers, entries = self.program.numbers, _entries(6)
         mode_columns = np.arange(self.modes[number], self.modes[number + 1])
         corners = mode_columns[::entries]
@@ -148,7 +148,7 @@ class ConeProgram:
         return np.arange(self.ends[order], self.ends[order + 1])
 
     def _add_linear(self) -> None:
-        """Add ranges of s, sets of unbalances, linear limits, bounds of variables, and traces below variables."""
+        """Add the rows of ranges of s, sets of unbalances, linear limits, bounds of variables, and traces of blocks."""
         program, numbers = self.program, self.program.numbers
         for sign in (1.0, -1.0):
             self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, right=np.ones(numbers))
@@ -168,7 +168,7 @@ class ConeProgram:
             block_number += len(quadratic.blocks)
 
     def _add_quadratic(self, quadratic: QuadraticBound, block_number: int) -> None:
-        """Add S - F(M) positive semidefinite; the blocks of S are variables from block number `block_number` on."""
+        """Add the rows of S - F(M) >= 0 (E54); the blocks of S are variables from block number `block_number` on."""
         i, j, factor = triangle(quadratic.size)
         columns, blocks = [], []
         for order, rows in quadratic.rows:
@@ -190,7 +190,10 @@ class ConeProgram:
         self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX, "quadratics")
 
     def _add_root(self, number: int, root: RootTerm) -> None:
-        """Add that a root is above its chord and above the sum of its lengths, each above that of its vector."""
+        """Add the rows of a root, which is above its chord and above the sum of its length variables (E58).
+
+        Each length variable is above the length of its vector.
+        """
         at, end = int(self.roots[number]), int(self.roots[number + 1])
         ends = np.array([number, at])
         self._add(np.array([[root.slope, -1.0]]), ends, SIDES, "chords", np.array([-root.offset]))
@@ -343,7 +346,7 @@ class Objectives:
         return bounds
 
     def prefetch(self, objectives: Iterable[tuple[Hashable, Array | int]]) -> None:
-        """Start objectives that may follow, the most likely first."""
+        """Start to bound objectives ahead that are likely next, the most likely first."""
         if self._ahead is not None:
             self._ahead.prefetch(
                 ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives

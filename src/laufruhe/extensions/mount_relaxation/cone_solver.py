@@ -3,10 +3,11 @@
     minimum q'x   with   b - A x in K,   the matrices X_k of x positive semidefinite
     minimum b'z   with   A_o' z = -q_o,   q_k + A_k' z positive semidefinite for each X_k,   z in the dual of K
 
-A_k are the columns of X_k and A_o all others: X_k and x_o are multipliers of the second program. In the first program
-an entry of X_k is a column and a row of the solver, in the second a row; rows of all other cones are columns and rows
-of the second. The program is chosen in which the larger matrices take less space. Both are scaled like the first: rows
-and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001-034), rows of one cone alike.
+K is a product of cones. A_k are the columns of X_k, A_o all others: X_k and x_o are multipliers of the second program.
+In the first program an entry of X_k is a column and a row of the solver, in the second a row; rows of all other cones
+are columns and rows of the second. The program is chosen in which the larger matrices take less space. Both are scaled
+like the first: rows and columns by the roots of their largest entries, repeatedly (Ruiz, RAL-TR-2001-034), rows of one
+cone alike.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ class ConeSolver:
         self._solver: Any = None
 
     def solve(self, cost: Array) -> tuple[Array, Array]:
-        """Return x and z whatever the solver's status."""
+        """Return the primal point x and the multipliers z, whatever the solver's status."""
         scaled = self._column_scales * cost
         size = float(np.abs(scaled).max(initial=0.0))
         factor = float(np.clip(1.0 / size, _MIN_SCALE, _MAX_SCALE)) if size > 0.0 else 1.0
@@ -139,7 +140,7 @@ def _zero_cone(size: int) -> Any:
 
 
 def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]]) -> tuple[Array, Array]:
-    """Return scales of rows, shape (m,), and columns, shape (n,), as if each entry of a matrix had a row too."""
+    """Return scales of rows, shape (m,), and columns, shape (n,), as if each entry of a matrix X_k had a row too."""
     count, width = rows.shape
     entries = np.concatenate([columns for columns, _ in matrices])
     row = np.append(rows.row, count + np.arange(len(entries)))

@@ -1,11 +1,11 @@
 """Constraints on the moments of an order that each design of a box satisfies (E43, E52, E53).
 
-A matrix M stands for (1, v)(1, v)', where v are the products of E42 and the unbalances. If a matrix P(s), linear in the
-shared numbers s, is positive semidefinite, so is
+The moment matrix M of an order stands for (1, v)(1, v)', where v are the unbalances and the products of E42. Let y be a
+motion or deflection, and let a matrix P(s), affine in the shared numbers s, be positive semidefinite. Then so is
 
     [1 V]' P(s) [1 V],    V = [Re y, Im y]                                              (E43)
 
-and where P y is affine in v this is linear in s and M.
+with the unit matrix 1. Where P y is affine in v this is affine in s and M.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ ROUNDING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class MomentConstraint:
-    """Matrix, linear in s and M, that is positive semidefinite.
+    """Positive semidefinite matrix, affine in the shared numbers s and the moment matrix M of one order.
 
     Attributes
     ----------
     order
-        Number of the order.
+        Index of the order in the program.
     constant
         Matrix at s = 0 and M = 0, shape (p, p).
     slopes
@@ -46,19 +46,19 @@ class MomentConstraint:
 
     @property
     def size(self) -> int:
-        """Rows p of the matrix."""
+        """Count p of rows of the matrix."""
         return len(self.moments)
 
 
 def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentConstraint]:
-    """Return all constraints on the moments of one order, which has the number 0."""
+    """Return all constraints on the moments of one order, with order index 0."""
     numbers, constraints = mounts.numbers, list[MomentConstraint]()
     for spring, (deflection, force) in zip(mounts.springs, response.springs, strict=True):
         constraints += _spring_constraints(numbers, spring, deflection, force)
     for place, (loads, shifted) in zip(mounts.places, response.places, strict=True):
         constraints += _place_constraints(numbers, place, loads, shifted)
     unit, unturned_motions = mounts.highest, mounts.unturned_motions
-    # A - L and U - A; where places are open, only in motions without turns about them
+    # stiffness A less a floor, and a ceiling less A; where places are open, only in motions without turns about them
     for sign, matrix in [*((1.0, floor) for floor in mounts.floors), *((-1.0, ceiling) for ceiling in mounts.ceilings)]:
         image = sign * (response.carried - matrix @ response.motion) / unit
         constant, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
@@ -75,7 +75,10 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
 def _spring_constraints(
     numbers: int, spring: SpringTerm, deflection: ComplexArray, force: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return the constraints that an open stiffness, and its product, lie between their bounds (E53)."""
+    """Return the constraints that an open stiffness, and its product with deflection, lie between bounds (E53).
+
+    Deflection u and force t are coefficients of (1, v), shape (b, d) each (E42).
+    """
     slopes = spring.slopes(numbers) / spring.size
     constraints = [
         product_constraint(
@@ -108,14 +111,14 @@ def _of_moments(numbers: int, moments: Array, scale: float) -> MomentConstraint:
 
 
 def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: ComplexArray) -> MomentConstraint:
-    """Return constraint E43 for P = constant + sum s_j slopes_j.
+    """Return constraint E43 for the matrix P = constant + sum s_j slopes_j.
 
     Parameters
     ----------
     constant, slopes
         Shapes (p, p) and (numbers, p, p).
     y, image
-        Coefficients of (1, v) in y and in P y, shape (p, d) each.
+        Coefficients of (1, v) in the motion or deflection y and in P y, shape (p, d) each.
     """
     p, d = y.shape
     size = float(np.abs(y).max()) or 1.0
@@ -134,7 +137,10 @@ def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: C
 def _place_constraints(
     numbers: int, place: PlaceTerm, loads: ComplexArray, shifted: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return 1 + s and 1 - s, bordered by the turns and moments that s multiplies, as constraints (E52)."""
+    """Return the constraints that the number s of an open place lies between -1 and 1 (E52).
+
+    The turns and moments `loads`, which s multiplies, border 1 + s and 1 - s; `shifted` are their products with s.
+    """
     size = np.abs(loads).max(axis=1, keepdims=True)
     size = np.where(size > 0.0, size, 1.0)
     plain, products = (np.concatenate([part.real, part.imag]) for part in (loads / size, shifted / size))

@@ -1,7 +1,7 @@
 """Limits of norms of force and travel, and of transmissibility, in the relaxation (E61).
 
-A norm is at least its epigraph variables (E45, E54), so that its limit bounds them above. Transmissibility of an order
-is an inequality between the squares of its forces and of the forces at rest under the same load.
+A norm is at least its epigraph variables (E45, E54), so that its limit bounds them above. A limit of transmissibility
+is an inequality between the squares of forces in an order and of the forces at rest under the same load.
 """
 
 from __future__ import annotations
@@ -31,12 +31,13 @@ from laufruhe.prove.mounts.ranges import SLACK
 
 # a limit enters only if the best design has more than this share of it
 NEAR_LIMIT = 0.7
+# bound that excludes no response
 UNBOUNDED = ResponseBound((), math.inf, False)
 
 
 @dataclass(frozen=True, eq=False)
 class NormLimit:
-    """Upper bound of a norm."""
+    """Upper bound of a norm of mount force or travel, and so of the epigraph variables that bound it below."""
 
     query: MeasureOrders
     variables: tuple[EpigraphVariable, ...]
@@ -45,14 +46,14 @@ class NormLimit:
 
 @dataclass(frozen=True, eq=False)
 class RatioLimit:
-    """Upper bound of the root sum of squares of forces in some orders, over the same at rest."""
+    """Upper bound of transmissibility: root sum of squares of mount forces in some orders, over the same at rest."""
 
     orders: tuple[Order, ...]
     upper: float
 
     @cached_property
     def orders_at_rest(self) -> tuple[Order, ...]:
-        """The orders without motion, under the same loads."""
+        """The same loads at rest, with angular frequency zero."""
         return tuple(replace(order, omega=0.0) for order in self.orders)
 
 
@@ -65,7 +66,7 @@ class Limits:
 
     @property
     def loads(self) -> list[ComplexArray]:
-        """Loads of all orders per column of the unbalances, shape (columns, k) each."""
+        """Change of the load of each order by each column of the unbalances, shape (columns, k) each."""
         orders = [order for limit in self.norms for order in limit.query.orders]
         orders += [order for limit in self.ratios for order in limit.orders]
         return [order.loads[1:] for order in orders]
@@ -86,16 +87,18 @@ def limits_of(
     problem: Problem, evaluation: Evaluation,
     orders_of: Callable[[Measure, Sequence[OpenMounts]], MeasureOrders], parts: Sequence[OpenMounts],
 ) -> Limits:  # fmt: skip
-    """Return the limits that the best design comes near; transmissibility is limited in all motions (E57).
+    """Return the limits that the best design comes near.
+
+    Transmissibility is limited in all motions together, without a split by symmetry (E57).
 
     Parameters
     ----------
     evaluation
         The best design.
     orders_of
-        Return the orders of a measure in some parts of the motions.
+        Function that returns the orders of a measure, given the mounts for some motions.
     parts
-        Mounts for all motions, then for each symmetry if there is one.
+        Mounts for all motions; if they are symmetric, then for symmetric and for antisymmetric motions.
     """
     norms: list[NormLimit] = []
     for limit in problem.limits:

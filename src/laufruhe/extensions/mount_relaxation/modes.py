@@ -1,9 +1,10 @@
 """Natural modes required by limits of decoupling (E56).
 
-A motion has a mode of its own if some v with A v = l v has a' v b' v >= s |v|^2, where a and b are its displacement and
-momentum (E7). Scaled to b' v = 1, these v are a ball: v = V (1, w) with |w| <= 1. For a fixed v all designs that have
-this mode are convex, because A(s) v = l v is linear in s and l. So boxes are divided over w as well as over the mounts.
-On a box the moments Z = (1, w)(1, w)', Z_j = s_j Z stand for all designs,
+A motion of the block has a natural mode of its own if an eigenvector v of the stiffness matrix A, A v = l v, has
+a' v b' v >= s |v|^2. Here a and b are displacement and momentum of the motion (E7); s is its least share of kinetic
+energy. Scaled to b' v = 1, these v are a ball: v = V (1, w) with |w| <= 1. For a fixed v the designs with this mode are
+a convex set, because A(s) v = l v is linear in the shared numbers s_j and in l. So boxes are divided over w as well as
+over the mounts. On a box the moments Z = (1, w)(1, w)', Z_j = s_j Z stand for all designs,
 
     V^-1 (A_c V Z + sum H_j V Z_j) = l Z,    symmetric, between least and largest square, Z + Z_j, Z - Z_j >= 0   (E56)
 """
@@ -27,7 +28,7 @@ NO_SIZE = 1e-8
 
 @dataclass(frozen=True, eq=False)
 class ModeConstraints:
-    """Constraints on the moments Z, Z_1 ... of a mode on a box.
+    """Constraints on the moments Z_0 = Z, Z_1 ... of a natural mode on a box (E56).
 
     Attributes
     ----------
@@ -45,7 +46,10 @@ class ModeConstraints:
 
 
 def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
-    """Return V of each motion with a limit of decoupling, shape (6, 6) each; () if places of mounts are open."""
+    """Return the basis V of modes of each motion with a limit of decoupling, shape (6, 6) each.
+
+    If places of mounts are open, return ().
+    """
     if mounts.places:
         return ()
     shares: dict[int, float] = {}
@@ -57,7 +61,17 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
 
 
 def mode_basis(root: Array, motion: int, share: float) -> Array:
-    """Return V of the ball |v - a / 2 s| <= |a| / 2 s, b' v = 1, in coordinates of unit mass, shape (6, 6)."""
+    """Return the basis V, shape (6, 6), of the ball |v - a / 2 s| <= |a| / 2 s, b' v = 1 of modes v.
+
+    Parameters
+    ----------
+    root
+        Transposed map from motion in coordinates of unit mass, shape (6, 6).
+    motion
+        Index of the motion with displacement a and momentum b.
+    share
+        Least share s of the kinetic energy of a mode in this motion.
+    """
     displacement, momentum = root[:, motion], np.linalg.inv(root)[motion]
     length = float(momentum @ momentum)
     middle = displacement / (2.0 * share) + momentum * (1.0 - 0.5 / share) / length
@@ -69,7 +83,7 @@ def mode_basis(root: Array, motion: int, share: float) -> Array:
 
 
 def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Array) -> ModeConstraints:
-    """Return the constraints of a mode on a box of mounts, for `lower` <= w <= `upper`, shape (5,) each."""
+    """Return the constraints of a mode V (1, w) on a box of mounts, for `lower` <= w <= `upper`, shape (5,) each."""
     inverse, count, d = np.linalg.inv(basis), mounts.numbers, 6
     unit = float(np.linalg.norm(mounts.middle, 2))
     stiffness = inverse @ (np.array([mounts.middle, *mounts.slopes]) / unit) @ basis

@@ -1,9 +1,11 @@
 """Lower bound of a mean over operating points as a sum of roots, less odd multiples of their orders (E54, E58, E62).
 
-With one loss factor eta and A <= a < W^2, the work of the springs is y* A y <= r* A r / (W^2 - a)^2, mode by mode. The
-force of a spring is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any t > 0; traces and r* A r are
-linear in s. For a free mass y0 = r / W^2, so that each entry of K u0 is linear in s and lies below a chord on a box.
-The change by springs has (y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 - a))^2 r* A r / W^4.
+Let a load r with angular frequency W cause the motion y of the block on springs with the stiffness matrix A and one
+loss factor eta. With A <= a < W^2, the work of the springs is y* A y <= r* A r / (W^2 - a)^2, mode by mode. The force
+of a spring with stiffness K and deflection u is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any t >
+0; traces and r* A r are linear in the shared numbers s. For a free mass y0 = r / W^2, so that each entry of K u0 is
+linear in s and lies below a chord on a box. The change by springs has (y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 -
+a))^2 r* A r / W^4.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 
 @dataclass(frozen=True, eq=False)
 class LinearUpperBound:
-    """Upper bound constant + slopes' s for all designs of a box, and upper bound `upper` for better designs alone.
+    """Upper bound constant + slopes' s over a box with numbers s, and upper bound `upper` for better designs alone.
 
     Attributes
     ----------
@@ -59,13 +61,13 @@ class LinearUpperBound:
         return self if self.at_reference < self.upper else constant_bound(self.upper, self.slopes)
 
     def times(self, factor: float) -> LinearUpperBound:
-        """Return the bound of a multiple; `factor` is not negative."""
+        """Return the bound of the bounded number times `factor`, which is not negative."""
         upper = factor * self.upper if factor else 0.0
         return LinearUpperBound(factor * self.constant, factor * self.slopes, upper, factor * self.at_reference)
 
 
 def constant_bound(upper: float, slopes: Array) -> LinearUpperBound:
-    """Return a bound without slopes."""
+    """Return the bound `upper` for all s, with zero slopes in the shape of `slopes`."""
     return LinearUpperBound(upper, np.zeros_like(slopes), upper, upper)
 
 
@@ -76,11 +78,11 @@ class HighOrder:
     Attributes
     ----------
     load
-        r, shape (k,).
+        Load r, shape (k,).
     omega
         Angular frequency [rad/s].
     reference
-        s of a design at which the bounds are tight, shape (numbers,).
+        Numbers s of a design at which the bounds are tight, shape (numbers,).
     """
 
     mounts: OpenMounts
@@ -127,7 +129,7 @@ class HighOrder:
 
     @cached_property
     def chords(self) -> list[Chord]:
-        """Components of spring forces on a free mass, along the motion and across it."""
+        """Components of the spring forces that the motion of a free mass causes, along its deflections and across."""
         load = self.load * np.exp(-0.5j * float(np.angle(np.sum(self.load * self.load))))
         chords = []
         for m in range(len(self.mounts.motions)):
@@ -151,7 +153,7 @@ class HighOrder:
         return chords
 
     def looseness(self, s: Array) -> Array:
-        """Return the excess of the chords over the components at s, shape (numbers,)."""
+        """Return the excess of the chords over the components at the numbers s, shared among s, shape (numbers,)."""
         return sum((chord.looseness(s) for chord in self.chords), np.zeros(self.mounts.numbers))
 
 
@@ -171,7 +173,7 @@ class Chord:
         return LinearUpperBound(constant, slopes, math.inf, constant + float(slopes @ reference))
 
     def looseness(self, s: Array) -> Array:
-        """Return the excess of the chord at s, shared in proportion to the slopes, shape (numbers,)."""
+        """Return the excess of the chord at the numbers s, shared in proportion to the slopes, shape (numbers,)."""
         reach = np.abs(self.slopes)
         excess = self.bound(s).at_reference - abs(self.constant + float(self.slopes @ s))
         return np.asarray(max(excess, 0.0) * reach / max(float(reach.sum()), 1e-300))
@@ -185,7 +187,7 @@ def _place_deflections(mounts: OpenMounts, m: int, load: ComplexArray) -> list[C
 
 
 def linear_sum(mounts: OpenMounts, weights: Array, reference: Array) -> LinearUpperBound:
-    """Return the bound of sum <W, K> over springs, which is exact; `weights` W of shape (springs, 3, 3)."""
+    """Return the sum of <W, K> over springs of stiffness K as a bound affine in s; W is `weights`, (springs, 3, 3)."""
     slopes = np.zeros(mounts.numbers)
     for spring in mounts.springs:
         for j, matrix in spring.terms:
@@ -195,7 +197,10 @@ def linear_sum(mounts: OpenMounts, weights: Array, reference: Array) -> LinearUp
 
 
 def work_weight(mounts: OpenMounts, number: int, load: ComplexArray) -> Array:
-    """Return W, shape (3, 3), with r* G' K G r <= <W, K> for a spring at any of its open places."""
+    """Return the matrix W, shape (3, 3), with r* G' K G r <= <W, K> for the load r and any open place of a spring.
+
+    K is the stiffness of the spring and G its map from motion to deflection; `number` is the index of the spring.
+    """
     place_deflections = _place_deflections(mounts, number, load)
     deflection = mounts.motions[number] @ load
     weight = np.real(np.outer(deflection, deflection.conj()))
@@ -209,7 +214,7 @@ def work_weight(mounts: OpenMounts, number: int, load: ComplexArray) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class MeanBound:
-    """Lower bounds of a mean: prices' roots + slopes' s + constant, and `floor`.
+    """Two lower bounds of a mean over operating points: prices' roots + slopes' s + constant, and `floor`.
 
     Attributes
     ----------
@@ -248,7 +253,7 @@ def mean_bound(
     norm
         Upper bound of the mean.
     numbers
-        Count of s.
+        Count of shared numbers s.
     """
     shares, units = (np.array([getattr(variable, name) for variable in variables]) for name in ("share", "unit"))
     options = []

@@ -56,9 +56,9 @@ class OpenMounts:
     springs, places
         Open terms of springs and dampers, and open places.
     decisions
-        For each s, the numbers of the decisions that it follows.
+        For each shared number s, the indices of the open numbers that it follows.
     floors, ceilings
-        Lower and upper bounds of the stiffness A by limits (E31, E43), within the tolerance of limits.
+        Lower and upper bounds of the stiffness matrix A by limits (E31, E43), within the tolerance of limits.
     bands
         Ranges (a, b) of squared angular frequencies without a natural frequency.
     minimum, maximum
@@ -96,7 +96,7 @@ class OpenMounts:
 
     @property
     def numbers(self) -> int:
-        """Count of s."""
+        """Count of shared numbers s."""
         return len(self.decisions)
 
     @property
@@ -106,12 +106,12 @@ class OpenMounts:
 
     @cached_property
     def lowest(self) -> float:
-        """Lower bound of the eigenvalues of A."""
+        """Lower bound of the eigenvalues of the stiffness matrix A."""
         return max(float(np.linalg.eigvalsh(matrix)[0]) for matrix in (self.minimum + self.at_rest, *self.floors))
 
     @cached_property
     def highest(self) -> float:
-        """Upper bound of the eigenvalues of A."""
+        """Upper bound of the eigenvalues of the stiffness matrix A."""
         return min(float(np.linalg.eigvalsh(matrix)[-1]) for matrix in (self.maximum + self.at_rest, *self.ceilings))
 
     @property
@@ -171,7 +171,7 @@ class OpenMounts:
 
     @cached_property
     def slopes(self) -> Array:
-        """Slopes of A by each s without places, shape (numbers, k, k)."""
+        """Slopes of the stiffness matrix A by each number s, zero for places, shape (numbers, k, k)."""
         slopes = np.zeros((self.numbers, self.size, self.size))
         for spring in self.springs:
             arms = spring.axes.T @ self.motions[spring.mount]

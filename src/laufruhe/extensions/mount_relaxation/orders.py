@@ -28,7 +28,7 @@ from laufruhe.prove.mounts.box_response import is_travel
 OMITTED, MAX_ORDERS = 1e-6, 12
 # largest loss to other orders, over the strongest order, at which the sampled bound of the order is used
 MAX_LOSS = 0.03
-# factor of a mean that its bound by the cosine of an order keeps
+# share of the amplitude of an order that a mean is at least, by an average weighted with the cosine of the order
 COSINE = 0.5
 # largest share of a norm that may be omitted with one symmetry of the motions
 OMITTED_SYMMETRY = 0.005
@@ -137,7 +137,7 @@ class MeasureOrders:
 
     @property
     def points(self) -> list[int]:
-        """Operating points with a load."""
+        """Numbers of the operating points with a load."""
         return sorted({order.point for order in self.orders})
 
 
@@ -151,8 +151,10 @@ def measure_orders(
     ----------
     reference
         The best design.
+    basis
+        Basis of the unbalances, to which `loads` of the orders refer.
     parts
-        Mounts for all motions, then for each symmetry if there is one.
+        Mounts for all motions; if they are symmetric, then for symmetric and for antisymmetric motions.
     """
     wrench_map = moved_wrench(NUMBERS, mounting_in(problem.engine).block.centre_of_gravity)
     base = problem.engine.cycle.base_order
@@ -240,13 +242,13 @@ class EpigraphVariable:
     unit
         Unit of the root: about its value in the best design.
     loss
-        Upper bound of what other orders may take off.
+        Upper bound of the amount by which other orders may reduce the norm.
     is_largest
         True to bound each mount by itself, False for their mean.
     factor
         Factor of the order's amplitude in the root.
     multiples, phases
-        For a mean, the odd multiples of its order, and samples per period (E58).
+        For a mean, its orders at odd multiples with these multiples, and samples per period (E58).
     """
 
     orders: tuple[Order, ...]
@@ -259,7 +261,10 @@ class EpigraphVariable:
     phases: int = 0
 
     def root_bound(self, norm: float) -> float:
-        """Return an upper bound of the root over designs with a norm up to `norm`; of a mean, by its cosine."""
+        """Return an upper bound of the root over designs with a norm up to `norm`.
+
+        With odd multiples, it follows from an average weighted with the cosine of the order.
+        """
         return norm * self.factor / COSINE if self.multiples else norm + self.loss
 
     @property
@@ -270,7 +275,7 @@ class EpigraphVariable:
     def quadratic_bounds(
         self, number: int, query: MeasureOrders, responses: Sequence[Response], order_numbers: Sequence[int]
     ) -> list[QuadraticBound]:
-        """Return the bounds of variable `number` by the responses of its orders, numbered `order_numbers`."""
+        """Return the bounds of epigraph variable `number` by the responses of its orders, numbered `order_numbers`."""
         norm, mounts = query.measure.norm, len(query.mounts)
         signals = [query.signal(response) * (self.factor / self.unit) for response in responses]
         if norm.is_euclidean:
@@ -306,7 +311,7 @@ class EpigraphVariable:
 
 
 def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> list[EpigraphVariable]:
-    """Return the variables that bound a norm from below: one, or one for each operating point (E45)."""
+    """Return the epigraph variables that bound a norm from below: one, or one for each operating point (E45)."""
     norm = query.measure.norm
     if not query.orders:
         return []
@@ -328,7 +333,7 @@ def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> lis
 
 
 def _strongest(query: MeasureOrders, point: int, parts: Sequence[OpenMounts]) -> EpigraphVariable:
-    """Return the variable of the strongest order of an operating point in a norm of lengths (E45, E58).
+    """Return the epigraph variable of the strongest order of an operating point in a norm of lengths (E45, E58).
 
     A signed average over half periods of the order contains only its odd multiples. An average weighted with its cosine
     contains the order alone.

@@ -1,4 +1,6 @@
-"""Maps from the shared numbers s to springs, dampers and places of mounts (E42, E52, E63, E66).
+"""Maps from numbers s to springs, dampers and places of mounts (E42, E52, E63, E66).
+
+The numbers s lie between -1 and 1 on a box; all orders share them.
 
 A mount that turns in a plane has the stiffnesses k1 and k2; b is the angle of its first axis from the first of axes
 that do not turn. With p = (k1 + k2) / 2 and d = (k1 - k2) / 2 its matrix is
@@ -45,7 +47,7 @@ ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class SpringTerm:
-    """Open part of a spring or damper along some axes: sum of s_j times a matrix, added to its middle.
+    """Open part of a spring or damper along some axes: sum of s_j times matrices, added to its value at the middle.
 
     Attributes
     ----------
@@ -54,11 +56,11 @@ class SpringTerm:
     axes
         Unit vectors, shape (3, b).
     terms
-        Number j and matrix, shape (b, b) [N/m or N s/m].
+        Pairs of a number j and its matrix, shape (b, b) [N/m or N s/m].
     sides
-        Matrices C and signs: C + sign * sum is positive semidefinite.
+        Pairs of a matrix C and a sign: C + sign * sum is positive semidefinite.
     spans
-        Matrices C and D: (C + sum)(D - sum) is positive semidefinite.
+        Pairs of matrices C and D: (C + sum)(D - sum) is positive semidefinite.
     size
         Size of the sum [N/m or N s/m].
     elastic, viscous
@@ -75,7 +77,7 @@ class SpringTerm:
     viscous: float = 0.0
 
     def slopes(self, numbers: int) -> Array:
-        """Return the matrices by s, shape (numbers, b, b)."""
+        """Return the matrix of each shared number s, shape (numbers, b, b)."""
         slopes = np.zeros((numbers, *self.terms[0][1].shape))
         for j, matrix in self.terms:
             slopes[j] += matrix
@@ -93,7 +95,7 @@ class SpringTerm:
 
 @dataclass(frozen=True, eq=False)
 class PlaceTerm:
-    """Open place along an axis: mounts move by s_j times their reach.
+    """Open position of mounts along an axis: they move by s_j times their reach.
 
     Attributes
     ----------
@@ -132,7 +134,7 @@ class PlaceTerm:
 
 
 class ParameterMaps:
-    """Maps from s to stiffness, damping and places of each mount.
+    """Maps from the shared numbers s to stiffness, damping and places of each mount.
 
     Parameters
     ----------
@@ -167,19 +169,19 @@ class ParameterMaps:
 
     @property
     def decisions(self) -> tuple[tuple[int, ...], ...]:
-        """For each s, the numbers of the decisions that it follows."""
+        """For each shared number s, the indices of the open numbers that it follows."""
         return tuple(decisions for _, decisions in self._numbers.values())
 
     def middle(self, m: int) -> Array:
-        """Return the middles of the ranges of all numbers of a spring, shape (14,)."""
+        """Return the middles of the ranges of all numbers of spring `m`, shape (14,)."""
         return np.asarray(0.5 * (self.low[m] + self.high[m]))
 
     def reach(self, m: int) -> Array:
-        """Return half the ranges of all numbers of a spring, shape (14,)."""
+        """Return half the ranges of all numbers of spring `m`, shape (14,)."""
         return np.asarray(0.5 * (self.high[m] - self.low[m]))
 
     def springs(self, m: int) -> tuple[Array, Array, list[SpringTerm]]:
-        """Return stiffness and damping at the middle, shape (3, 3) each, and the open terms of both (E66)."""
+        """Return stiffness and damping of spring `m` at the middle, shape (3, 3) each, and their open terms (E66)."""
         axes, turning = self._turning(m)
         fixed_axes = [i for i in range(3) if i not in turning]
         stiffness, fixed_terms = self._along(m, axes, fixed_axes)
@@ -199,7 +201,7 @@ class ParameterMaps:
         return stiffness + turned_stiffness, damping + turned_damping, [*fixed_terms, *terms]
 
     def _turning(self, m: int) -> tuple[Array, list[int]]:
-        """Return the axes of a mount, shape (3, 3), and the indices of those that turn."""
+        """Return the axes of spring `m`, shape (3, 3), and the indices of the axes that turn."""
         middle, is_turned = self.middle(m), self.reach(m)[TURNED] > 0.0
         if np.count_nonzero(is_turned) == 1:
             middle[TURNED] = self._frames[m, TURNED]
@@ -213,7 +215,7 @@ class ParameterMaps:
         return axes, [i for i in range(3) if i not in fixed_axes]
 
     def _damping_line(self, m: int, turning: Sequence[int]) -> tuple[float, float] | None:
-        """Return a and b of E66, or None if the dampers do not follow stiffness."""
+        """Return intercept a and slope b of dampers over stiffness (E66), or None if the dampers do not follow it."""
         dampers = self.low[m, DAMPING][turning]
         if np.ptp(dampers) == 0.0:
             return float(dampers[0]), 0.0
@@ -359,7 +361,7 @@ class PlaneStiffness:
     low, high
         Ranges of k1 and k2 [N/m], shape (2,) each.
     angles
-        Smallest and largest b [rad].
+        Smallest and largest angle b of the first axis [rad].
     reference
         k1 and k2 of the design that defines the fixed axes [N/m].
     """

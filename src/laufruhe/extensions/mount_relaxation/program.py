@@ -38,7 +38,7 @@ class QuadraticBound:
     variable
         Number of the epigraph variable.
     rows
-        For each order in the sum, its number and R of each part, shape (parts, k, d).
+        For each order in the sum F(M), its number and the matrices R, shape (summands, k, d).
     blocks
         Sizes of the blocks of S; () if S is the variable times the identity.
     """
@@ -49,16 +49,16 @@ class QuadraticBound:
 
     @property
     def size(self) -> int:
-        """Rows k of S."""
+        """Count k of rows of the matrix S."""
         return int(self.rows[0][1].shape[1])
 
     @property
     def block_slices(self) -> list[slice]:
-        """Rows of each block of S."""
+        """Range of the rows of each block of S."""
         return [slice(int(a), int(b)) for a, b in pairwise(np.cumsum((0, *self.blocks)))]
 
     def price_of(self, multiplier: Array) -> float:
-        """Return the price of the variable that a multiplier of shape (k, k) needs."""
+        """Return the price of the epigraph variable that a multiplier of shape (k, k) needs."""
         if not self.blocks:
             return float(np.trace(multiplier))
         return max(float(np.linalg.eigvalsh(multiplier[part, part])[-1]) for part in self.block_slices)
@@ -96,7 +96,7 @@ class RootTerm:
 
 @dataclass(frozen=True, eq=False)
 class ObjectiveLimit:
-    """Upper bound of the sum of priced roots and of slopes' s.
+    """Upper bound of the sum of prices times roots and of slopes' s, with the shared numbers s.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class SdpProgram:
     reaches
         For each order, upper bounds of the squares of the entries of v, shape (d - 1,).
     numbers, columns
-        Counts of s and of unbalance columns.
+        Counts of shared numbers s and of unbalance columns.
     prices, uppers
         Coefficients of the epigraph variables in the objective, and their upper bounds, infinite for none.
     quadratics, constraints, linear
@@ -213,7 +213,7 @@ class ModeMultipliers:
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Solver output: multipliers, s, and moments of orders and modes."""
+    """Solver output: multipliers, shared numbers s, and moments of orders and of modes."""
 
     multipliers: SdpMultipliers
     s: Array
@@ -223,6 +223,7 @@ class Solution:
 
 def proven_bound(program: SdpProgram, multipliers: SdpMultipliers) -> float:
     """Return the lower bound that multipliers prove; it is valid for any multipliers (E44)."""
+    # coefficients of the moments of each order in the Lagrangian
     remainders, bound = [np.zeros((d, d)) for d in program.sizes], 0.0
     objective, mode_objectives = program.slopes
     slopes = np.array(objective, dtype=float)
@@ -303,7 +304,10 @@ def _mode_remainder(mode: ModeConstraints, multipliers: ModeMultipliers) -> Arra
 
 
 def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, moments: Array) -> tuple[Array, Array]:
-    """Return branching scores by s, shape (numbers,), and by w, shape (5,): priced violations of products."""
+    """Return branching scores by the numbers s, shape (numbers,), and by w of the mode, shape (5,).
+
+    A score is the violation of products at the optimum, times its multipliers.
+    """
     remainder, z = _mode_remainder(mode, multipliers), moments[0][0]
     violations = moments[1:] - s[:, None, None] * moments[0]
     priced = np.abs(np.einsum("jab,jab->jb", remainder[1:], violations))
@@ -341,7 +345,7 @@ def _least_quadratic(matrix: Array, reaches: Array) -> float:
 
 
 def _least_with_shift(matrix: Array, reach: float) -> float:
-    """Return the largest lower bound of (1, v)' matrix (1, v) over |v|^2 <= reach among the shifts."""
+    """Return the largest lower bound of (1, v)' matrix (1, v) over |v|^2 <= reach by diagonal shifts."""
     symmetric = _symmetric(matrix)
     if len(symmetric) == 1:
         # no open entry

@@ -36,9 +36,9 @@ from laufruhe.prove.witness import Witness, thin_box
 
 # relative gaps to prove, one after the other
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
-# relaxations by default; a further level starts only while AHEAD times those spent are left
+# most relaxations by default; a further level starts only if at most 1 / AHEAD of them are spent
 MAX_RELAXED, AHEAD = 100, 3
-# the same where odd multiples loosen the bound of a mean, so that halving gains little
+# further first gaps, and most relaxations, where odd multiples loosen the bound of a mean: halving gains little
 FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 40
 # first relative gap of a design that is one of many, because bounds of the others limit the total bound
 IN_BATCH = 0.04
@@ -61,7 +61,7 @@ def is_bounded(problem: Problem) -> bool:
 
 
 def bounds(question: Question) -> Iterator[BoxResult]:
-    """Yield bounds; if stiffness alone is open, yield the bound of the root box first."""
+    """Yield lower bounds of the objective; if stiffness alone is open, the bound of the root box comes first."""
     stiffness_alone = is_stiffness_problem(question.problem)
     for root_only in (True, False) if stiffness_alone else (False,):
         result = spring_bound(
@@ -94,7 +94,7 @@ def spring_bound(
     gap_tolerance
         Absolute difference of objectives that counts as none [SI].
     reference
-        Values of the decisions of a good design; units of the relaxation follow it.
+        Values of the decisions of a good design, which sets the units of the relaxation.
     in_batch
         True if the bounds of several problems count together: a slightly weaker bound comes first.
     root_only
@@ -128,7 +128,10 @@ def spring_bound(
 def _prove_levels(
     relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, witness: Witness | None
 ) -> BoxResult:
-    """Prove lower bounds of the objective that rise level by level towards the best design (E59)."""
+    """Prove lower bounds of the objective that rise level by level towards the best design (E59).
+
+    `shares` are the relative gaps to prove one after the other; `maximum` is the most relaxations.
+    """
 
     def level_of(share: float) -> float:
         return relaxation.value - max(share * relaxation.value, GAP_SAFETY * gap_tolerance)
@@ -163,8 +166,8 @@ def _prove_levels(
             places = result.places
             break
     if witness is not None and 0.0 < bound < relaxation.cutoff:
-        # at the last level the best design checked the bounds of its boxes
-        # a thin box around the numbers of its mounts, all mode shapes in it
+        # at the last level the best design checked the bounds of its boxes; now it checks a thin box around it,
+        # with all mode shapes
         lower, upper, sides = root_search.lower.copy(), root_search.upper.copy(), slice(0, len(witness.place))
         lower[sides], upper[sides] = thin_box(witness.place, lower[sides], upper[sides])
         thin = root_search.up_to(witness.upper_value * (1.0 + EXCESS)).bound(lower, upper)[0]
@@ -210,7 +213,10 @@ class _Narrowing(BoxBisection):
         return has_all_modes and super().contains_witness(Box(box.lower[mount_sides], box.upper[mount_sides], 0))
 
     def narrow(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | FathomedPart:
-        """Return the bound and the narrowed box, or `FathomedPart` if it has no better design."""
+        """Return the bound and the narrowed box, or `FathomedPart` if it has no better design.
+
+        With `narrows` False the box is bounded once, and not narrowed.
+        """
         previous = best = -math.inf
         while True:
             part = self._search.contracted(lower, upper)
@@ -239,7 +245,7 @@ class _Narrowing(BoxBisection):
         return [self.narrow(*half, box.narrows) for box in boxes for half in halves(box)]
 
     def branch(self, nodes: Sequence[OpenNode[Box]]) -> BoundedParts[Box]:
-        """Return the halves of nodes; relaxations solved count as boxes seen."""
+        """Return the bounded halves of nodes; each relaxation solved counts as a node."""
         parts = [*super().branch(nodes)]
         self.node_count = self.spent
         return parts
@@ -266,7 +272,7 @@ def narrowed(
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
     variables, side_indices = np.array(sides, dtype=np.intp).reshape(-1, 2).T
     objectives, units, solved = Objectives(program, search.ahead), np.eye(numbers + len(lower) - count), 0
-    # lower ends and negative upper ends; `nearest`: the points of the relaxation nearest to these
+    # lower ends and negative upper ends; `nearest`: the nearest point of the relaxation to each end
     ends, nearest = np.array([lower, -upper]), np.array([upper, -lower])
     new_ends = ends.copy()
     candidates = [(*pair, k) for pair in sides if scores[pair[1]] > MIN_SCORE * scores.max() for k in (0, 1)]

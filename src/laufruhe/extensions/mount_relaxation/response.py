@@ -2,8 +2,10 @@
 
 An open stiffness adds the force t = kappa(s) u to that of the middle, where u is the spring's deflection. A mount with
 an open place s h sees s h (theta x e) more of the block's turn theta, and has the further moment s h e x f. An open
-damper adds i W t, t = (C - C(c)) u; if it follows an open stiffness, i W b t. The variables w are these products: t,
-s theta and s f, with f without loss and the forces of dampers over i W each by itself. With them and the unbalances u,
+damper adds i W t at angular frequency W, t = (C - C(c)) u; if it follows an open stiffness, it adds i W b t. The
+variables w are these products: t, s theta and s f, with f without loss and the forces of dampers over i W each by
+itself. With the dynamic stiffness D(c) at the middle c of the box, the load r0, and its change R u by unbalances u, the
+motion y of the block has
 
     D(c) y = r0 + R u - (terms linear in w)                                                 (E42)
 
@@ -30,22 +32,22 @@ MIN_UNIT = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Response of an order over a box, as complex coefficients of (1, v), shapes (..., d), in units of a motion.
+    """Response of an order over a box: complex coefficients of (1, v), shapes (..., d), in units of a motion (E42).
 
     Attributes
     ----------
     columns
         Count of unbalance columns in v.
     motion, carried
-        y and A y in coordinates of unit mass, shape (k, d).
+        Motion y and elastic load A y, with the stiffness matrix A, in coordinates of unit mass, shape (k, d) each.
     members
         For each mount of the relaxation, the numbers of the problem's mounts that it represents.
     deflections, forces
         Deflection and force of one member of each mount, shape (mounts, 3, d).
     springs
-        For each spring, u and t, shape (b, d) each.
+        For each open spring, deflection u and force t, shape (b, d) each.
     places
-        For each place, turns and moments, and s times these, shape (4, d) each.
+        For each open place, turns and moments, and s times these, shape (products, d) each.
     reaches
         Upper bounds of the squares of v over all designs of the box, shape (d - 1,).
     unit
@@ -99,7 +101,7 @@ def response_of(
     Parameters
     ----------
     loads
-        r, and its change per unit of each unbalance column, shape (1 + columns, k).
+        Load r, and its change per unit of each unbalance column, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
     reference_motions
@@ -240,7 +242,7 @@ def response_bound(mounts: OpenMounts, loads: ComplexArray, omega: float, travel
     Parameters
     ----------
     loads
-        r, and its change by the largest unbalance of each column, shape (1 + columns, k).
+        Load r, and its change by the largest unbalance of each column, shape (1 + columns, k).
     omega
         Angular frequency [rad/s].
     travel
@@ -262,7 +264,7 @@ def response_bound(mounts: OpenMounts, loads: ComplexArray, omega: float, travel
 
 
 def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> float:
-    """Return an upper bound of |y| over the box, by the energy lost in damping or by the inertia above resonance."""
+    """Return an upper bound of the motion |y| over the box, by energy lost in damping or inertia above resonance."""
     loss = mounts.loss_at(omega)
     uniform_loss = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(mounts.size)
     if not mounts.dynamic:
@@ -277,18 +279,18 @@ def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> floa
 
 
 def in_parts(functions: ComplexArray) -> Array:
-    """Return real parts, then imaginary parts, shape (2 n, d) from (n, d)."""
+    """Return the real parts of n complex functions, then their imaginary parts, shape (2 n, d)."""
     rows = functions.reshape(-1, functions.shape[-1])
     return np.concatenate([rows.real, rows.imag])
 
 
 def squared(functions: ComplexArray) -> Array:
-    """Return the coefficients of the sum of squares in the moments of (1, v), shape (d, d)."""
+    """Return the coefficients of the sum of squared amplitudes of functions in the moments of (1, v), shape (d, d)."""
     rows = in_parts(functions)
     return np.asarray(rows.T @ rows)
 
 
 def product(first: ComplexArray, second: ComplexArray) -> Array:
-    """Return the coefficients of Re first* second in the moments of (1, v), shape (d, d)."""
+    """Return the coefficients of Re (first* second), summed, in the moments of (1, v), shape (d, d)."""
     products = in_parts(first).T @ in_parts(second)
     return np.asarray(0.5 * (products + products.T))

@@ -64,13 +64,13 @@ class SdpRelaxation:
     lower, upper
         Root box, shape (n,): open numbers of mounts, stiffness entries of planes (E63), and coordinates of modes.
     reference
-        The best design in these coordinates without those of modes.
+        The best design as a point of the root box, without the coordinates of modes.
     modes, mode_sides
         Basis of each mode, shape (6, 6), and the slice of its coordinates in a box.
     multiple_uppers
-        Upper bounds of odd multiples over better designs, by the id of their order.
+        Upper bounds of the mean amplitude of odd multiples of orders over better designs, by the id of the multiple.
     ahead
-        Speculative executor; None to compute everything in this process.
+        Executor that computes likely bounds ahead; None to compute everything in this process.
     """
 
     def __init__(
@@ -152,7 +152,10 @@ class SdpRelaxation:
         return lower, upper
 
     def reference_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
-        """Return s of the design of the box nearest to the best, shape (numbers,); zero for entries of matrices."""
+        """Return the shared numbers s of the design of the box nearest to the best, shape (numbers,).
+
+        Numbers that are entries of matrices are zero.
+        """
         s = np.zeros(mounts.numbers)
         for j, side in enumerate(mounts.single_decisions):
             if side is not None and upper[side] > lower[side]:
@@ -168,7 +171,7 @@ class SdpRelaxation:
 
     @property
     def has_loose_mean(self) -> bool:
-        """True if odd multiples of its orders loosen the bound of a mean (E58)."""
+        """True if odd multiples of orders loosen the bound of the first term, a mean (E58)."""
         if not any(variable.multiples for variable in self._variables[0]):
             return False
         return self._box(0, self.lower, self.upper).hides_mean(self._variables[0])
@@ -218,7 +221,10 @@ class SdpRelaxation:
         return BoxRelaxation(self, query, limits, lower, upper)
 
     def cut_off(self, lower: Array, upper: Array) -> tuple[SdpProgram, OpenMounts]:
-        """Return the program of designs in a box with a first term up to its value, and the mounts of the box."""
+        """Return the program of designs in a box, and the mounts of the box.
+
+        The first term of the objective is at most what the objective `value` leaves it.
+        """
         box = self._box(0, lower, upper)
         # root bounds of the last box hold in each part of that box
         low, high, roots = self._last_box
@@ -252,7 +258,7 @@ class SdpRelaxation:
         return relaxation
 
     def response(self, mounts: OpenMounts, order: Order, bound: ResponseBound, lower: Array, upper: Array) -> Response:
-        """Return the response to an order over a box; units follow the design of the box nearest to the best."""
+        """Return the response to an order over a box; the design of the box nearest to the best sets its units."""
         count = len(self._reference)
         design = [float(v) for v in np.clip(self._reference, lower[:count], upper[:count])]
         mounting = mounting_in(self.problem.design(design, self.problem.mount_decisions))

@@ -2,7 +2,7 @@
 
 Where block, mounts and their open numbers are alike on both sides of the plane y = 0, a mirror R commutes with mass,
 stiffness and damping of each design. The response then is the sum of the responses to (f + R f) / 2 and (f - R f) / 2.
-No norm that treats the sides alike is below that of either part.
+A norm that treats both sides alike is at least its value for either of the two responses.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from laufruhe.physics.elastic_mounts import DynamicSprings
 
 # relative difference that counts as none
 REL_TOL = 1e-12
+# mirror at the plane y = 0: of a vector, and of a motion with its turns
 ACROSS = np.diag([1.0, -1.0, 1.0])
 MOTION = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
@@ -37,7 +38,7 @@ def split_mounts(mounts: OpenMounts) -> tuple[OpenMounts, ...]:
 
 
 def split_signal(signal: ComplexArray, members: Sequence[tuple[int, ...]]) -> tuple[ComplexArray, ComplexArray]:
-    """Return the symmetric and the antisymmetric part of a signal, shape (mounts, 3) each."""
+    """Return symmetric and antisymmetric signals, shape (mounts, 3) each; `members` are mirrored pairs of mounts."""
     image = np.empty_like(signal)
     for pair in members:
         image[list(pair)] = signal[list(pair[::-1])] @ ACROSS
@@ -45,7 +46,10 @@ def split_signal(signal: ComplexArray, members: Sequence[tuple[int, ...]]) -> tu
 
 
 def _images(mounts: OpenMounts, mirror: Array) -> list[int] | None:
-    """Return the index of each spring's mirror image, or None if the mounting is not symmetric."""
+    """Return the index of each spring's mirror image, or None if the mounting is not symmetric.
+
+    The matrix `mirror`, shape (6, 6), mirrors a motion in coordinates of unit mass.
+    """
     elastic_terms, viscous_terms = (np.zeros((len(mounts.motions), mounts.numbers, 3, 3)) for _ in range(2))
     for spring in mounts.springs:
         for j, matrix in spring.terms:
@@ -84,7 +88,10 @@ def _is_same(first: Array, second: Array, scale: float | None = None) -> bool:
 
 
 def _part(mounts: OpenMounts, images: list[int], basis: Array) -> OpenMounts:
-    """Return the mounts reduced to motions of a basis, shape (6, k)."""
+    """Return the mounts for the motions that the columns of `basis` span, shape (6, k).
+
+    `images` are the indices of the mirror images of all springs.
+    """
     retained = [m for m, k in enumerate(images) if m <= k]
     lengths = np.sqrt([1.0 if images[m] == m else 2.0 for m in retained])
     root = basis.T @ mounts.root

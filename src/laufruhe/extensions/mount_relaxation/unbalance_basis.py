@@ -18,14 +18,14 @@ ZERO_LEVEL = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class UnbalanceBasis:
-    """Unbalances as (1, u) with |u_k| <= 1.
+    """Unbalances as a vector (1, u), with entries u_k from -1 to 1.
 
     Attributes
     ----------
     domain_map, middles
         Map from u to the columns of the domains, less their middles, shape (columns, domain columns), and the middles.
     reference
-        u of the best design, shape (columns,).
+        Vector u of the best design, shape (columns,).
     sets
         Matrices C with <C, (1, u)(1, u)'> <= 0 for all allowed unbalances.
     domains
@@ -44,7 +44,9 @@ class UnbalanceBasis:
         return len(self.reference)
 
     def reduced(self, loads: Sequence[ComplexArray]) -> tuple[UnbalanceBasis, Array]:
-        """Return the basis reduced to what loads (columns, k) distinguish, and the map to it, shape (fewer, columns).
+        """Return the basis of the combinations of u that change loads, and the map to it, shape (fewer, columns).
+
+        `loads` are the changes of the load of each order by the columns of u, shape (columns, k) each.
 
         The columns of each domain have squares that add up to at most one, so that the reduced u lies in a ball.
         """
@@ -68,7 +70,7 @@ class UnbalanceBasis:
 
 
 def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> UnbalanceBasis:
-    """Return the basis of all columns of domains, with a design's unbalances in it."""
+    """Return the basis of all columns of the unbalance domains; `values` are the unbalances of the best design."""
     low, high = column_bounds(domains)
     middles, reaches = 0.5 * (low + high), 0.5 * (high - low)
     reference = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)
