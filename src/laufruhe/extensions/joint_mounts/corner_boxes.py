@@ -1,7 +1,8 @@
 """Lower bounds over boxes of mounts with any unbalances, by multipliers at the vertices of boxes (E69).
 
 Multipliers Z_k at the mounts of vertex k bound the objective for all unbalances, and on other mounts this bound is
-affine in the unbalances too (P4). Multilinear weights b_k(s) >= 0 with sum one mix the multipliers of all vertices:
+affine in the unbalances too (P4). Multilinear weights b_k(s) >= 0 with sum one mix the multipliers of all vertices, for
+a norm N of the rows V at numbers s of the mounts and unbalances u:
 
     N(V(s, u)) >= sum_k b_k(s) <Z_k, V(s, u)> = a(s) + g(s) . u
 
@@ -60,9 +61,8 @@ ExactObjective: TypeAlias = Callable[[Array, Array], float]
 class Corner:
     """Optimal unbalances for the mounts at a vertex, shape (columns,), and their lower bound for any mounts.
 
-    If the limits contradict each other, the unbalances have the smallest violation. On an undamped resonance there is
-    no
-    bound.
+    If the limits contradict each other, the unbalances have the smallest violation. An undamped resonance has no bound,
+    and `pairing` is None.
     """
 
     columns: Array
@@ -212,7 +212,9 @@ class DesignBoxes:
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
     def expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, centre: Array) -> tuple[Array, Array]:
-        """Return the bound about `centre` by (1, s, s s') and columns, (1 + columns, p), and its remainder.
+        """Return the bound by multipliers of a vertex, about unbalances `centre`, and its remainder.
+
+        The bound has coefficients of (1, s, s s') for 1 and each column of unbalances, shape (1 + columns, p).
 
         The remainder has the shape (w, 1 + columns).
         """
@@ -228,7 +230,7 @@ class DesignBoxes:
         return powers, remainder
 
     def minimum(self, slopes: Array, centre: Array) -> float:
-        """Return min g . (u - centre) over the sets of unbalances."""
+        """Return the minimum of slopes . (u - centre) over the sets of unbalances u."""
         return float(sum(domain.minimum(slopes) for domain in self.loads.domains) - slopes @ centre)
 
 
@@ -277,7 +279,7 @@ class _BalancedLoop:
 
 
 class _LoadedLoop:
-    """Feedback loop under loads: z0 of each column, and the remainder of its series (E68)."""
+    """Feedback loop under loads: channel inputs z0 of each load, and the remainder of its series (E68)."""
 
     def __init__(self, balanced_loop: _BalancedLoop, loads: ComplexArray) -> None:
         self.loop, self.loads, self.count = balanced_loop.loop, loads, balanced_loop.count
@@ -338,7 +340,10 @@ def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | 
 
 
 def priced(values: Array, violations: list[Array]) -> Array:
-    """Return values plus limits at prices that maximise the minimum, shape (v,); infinite if a limit is violated."""
+    """Return coefficients of a bound plus limits at prices that raise the least coefficient, shape (v,).
+
+    `values` and each violation are Bernstein coefficients over a box. The result is infinite if a limit is violated.
+    """
     if any(float(violation.min()) > 0.0 for violation in violations):
         return np.full_like(values, math.inf)
     for _ in range(ROUNDS if len(violations) > 1 else 1):

@@ -1,7 +1,7 @@
 """Linear lower bounds over boxes of mounts, unbalances and throws (E71, E72).
 
-The response of an order is a series in the numbers s of the mounts from -1 to 1 (E37, E68), and affine in the
-unbalances, u = u_c + h t with t from -1 to 1:
+The response f of an order to a load r is a series in the numbers s of the mounts from -1 to 1 (E37, E68). It is affine
+in the unbalances u = u_c + h t with t from -1 to 1, whose columns q have the loads r_q:
 
     f(s, t) = f(s; r_c) + sum_q t_q h_q f(s; r_q)
 

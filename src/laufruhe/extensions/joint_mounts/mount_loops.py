@@ -1,7 +1,7 @@
 """Block on mounts as a feedback loop through its open numbers: exact, and linear except for these numbers (E68).
 
-The open numbers are s from -1 to 1 about the middle of a box. Each product with an open number is a channel z with the
-feedback w = s z:
+The open numbers are s from -1 to 1 about the middle of a box. Each product with an open number is a channel with the
+input z and the feedback w = s z. Under a load r, the motion y and the forces and travel f of the mounts have
 
     D y + M w = r,    z = C y + F w,    f = V y + E w,    w_i = s_j(i) z_i
 
@@ -46,9 +46,9 @@ class Loop:
     numbers
         Index of the open number of each channel, shape (m,).
     forces, travels
-        V D^-1, shape (w, 3 mounts, 6), and P, shape (w, 3 mounts, m).
+        Map V D^-1 from the load, shape (w, 3 mounts, 6), and map P from the feedback, shape (w, 3 mounts, m).
     inputs, gain
-        Map from r to z0, shape (w, m, 6), and G, shape (w, m, m).
+        Map from the load r to z0, shape (w, m, 6), and loop gain G, shape (w, m, m).
     """
 
     numbers: Indices

@@ -28,6 +28,8 @@ from laufruhe.prove.mounts.ranges import SLACK
 class Pairing:
     """Lower bound of the objective by multipliers: constant + slopes . u + Re sum of conj(Z) f over orders.
 
+    u are the columns of unbalances, and f the forces and travel of the mounts.
+
     Attributes
     ----------
     forces, travels
@@ -48,7 +50,7 @@ class MountedLoads:
     Attributes
     ----------
     samples
-        Samples of the rows over their period.
+        Count of samples of each signal over its period.
     domains
         Domains of the open unbalances.
     """
@@ -94,7 +96,7 @@ class MountedLoads:
 
     @property
     def rows(self) -> int:
-        """Count of rows of all measures on mounts."""
+        """Count of sampled rows of all measures on mounts."""
         problem = self.problem
         measures = [*(t.measure for t in problem.load_terms), *(limit.measure for limit in problem.load_limits)]
         places = [mount.name for mount in problem.engine.mounts]
@@ -184,7 +186,7 @@ class MountedLoads:
 
 
 def coarser(problem: AffineProblem, factor: int) -> AffineProblem:
-    """Return a program with every `factor`-th sample."""
+    """Return a program whose norms have every `factor`-th sample."""
 
     def coarser_norm(norm: AffineNorm) -> AffineNorm:
         # masses have no samples

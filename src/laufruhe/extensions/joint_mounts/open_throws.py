@@ -1,6 +1,7 @@
 """Loads of throws between bounds as linear functions over a box (E72).
 
-Order h of a throw has the load c e^{i h theta}. Over theta = m + t d with t from -1 to 1 and a = h d at most pi this is
+Order h of a throw at the angle theta has the load c e^{i h theta}. Over theta = m + t d with t from -1 to 1 and a = h d
+at most pi this is
 
     c e^{i h m} ((1 + cos a) / 2 + i t sin a)
 

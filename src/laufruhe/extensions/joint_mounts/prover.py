@@ -66,7 +66,7 @@ def throw_answers(question: Question) -> Iterator[BoxResult]:
 
 
 def _witness(question: Question) -> Witness | None:
-    # place of the known design: numbers of mounts, then columns of unbalances
+    # the known design as a point: numbers of mounts, then columns of unbalances
     witness, problem = question.witness, question.problem
     if witness is None:
         return None

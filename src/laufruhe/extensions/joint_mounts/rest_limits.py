@@ -1,7 +1,8 @@
 """Limits on sag, frequencies and stiffness over a box of mounts, as polynomials that multipliers can add (E70).
 
-For all open numbers of mounts, a quadratic form y' A y is a quadratic in s plus a remainder (E68). The Rayleigh
-quotient of any y lies between the squares of the lowest and the highest frequency, and for any y
+Let s be the open numbers of mounts, from -1 to 1 on a box, and A the stiffness matrix of the block on its mounts. For
+any motion y, y' A y is a quadratic in s plus a remainder (E68). The Rayleigh quotient of y lies between the squares of
+the lowest and the highest frequency, and for the weight p of the block
 
     p' A^-1 p >= 2 p' y - y' A y,
 
@@ -47,9 +48,10 @@ def corners_of(count: int) -> Array:
 
 @lru_cache(maxsize=8)
 def mixed(count: int) -> Array:
-    """Return the map from quadratics by (1, s, s s') at vertices to coefficients of their multilinear mixture.
+    """Return the map from quadratics in `count` numbers s, one at each vertex, to their multilinear mixture.
 
-    Its shape is (4^n, 2^n, 1 + n + n^2), and the coefficients are those of Bernstein polynomials.
+    A quadratic has coefficients of (1, s, s s').
+    The mixture has Bernstein coefficients. The map has the shape (4^n, 2^n, 1 + n + n^2).
     """
     unit = np.eye(count, dtype=int)
     powers = [np.zeros(count, dtype=int), *unit, *(first + second for first in unit for second in unit)]

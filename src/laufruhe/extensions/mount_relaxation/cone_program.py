@@ -52,7 +52,7 @@ _SETTINGS = {
     "max_step_fraction": 0.95,
 }
 
-# seconds of relaxations after which worker processes start: longer searches often need dozens of bounds
+# seconds spent on relaxations after which worker processes start; shorter searches need none
 START_SECONDS = 0.25
 
 ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"

@@ -2,10 +2,10 @@
 
 Let a load r with angular frequency W cause the motion y of the block on springs with the stiffness matrix A and one
 loss factor eta. With A <= a < W^2, the work of the springs is y* A y <= r* A r / (W^2 - a)^2, mode by mode. The force
-of a spring with stiffness K and deflection u is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any t >
-0; traces and r* A r are linear in the shared numbers s. For a free mass y0 = r / W^2, so that each entry of K u0 is
-linear in s and lies below a chord on a box. The change by springs has (y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 -
-a))^2 r* A r / W^4.
+of a spring with stiffness K and deflection u is |1 + i eta| |K u| <= |1 + i eta| (t tr K + u* K u / t) / 2 for any
+t > 0; traces and r* A r are linear in the shared numbers s. A free mass has y0 = r / W^2 and deflections u0, so that
+each entry of K u0 is linear in s and lies below a chord on a box. The change by springs has
+(y - y0)* A (y - y0) <= (|1 + i eta| a / (W^2 - a))^2 r* A r / W^4.
 """
 
 from __future__ import annotations

@@ -60,7 +60,7 @@ class RunBoxes:
         return tuple(runs)
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes of shape (boxes, open numbers), all or those of a mask.
+        """Return linear lower bounds of a measure on boxes of shape (boxes, open numbers); `mask` selects some of them.
 
         The remainder is infinite if no bound is known.
         """
@@ -199,7 +199,11 @@ class _RunBounds:
         return self._best(size, slopes, second_terms, remainder)
 
     def _best(self, size: Array, slopes: Array, second_order: Array, remainder: Array) -> LinearBound:
-        """Return the largest bound over all places and times."""
+        """Return the largest bound over all places and times.
+
+        `size` is the length of the signal at the middle of the box, shape (boxes, places, times). The other arrays are
+        its first and second orders by open numbers, and the bound of its remainder.
+        """
         bound = size - np.abs(slopes).sum(axis=1) - second_order.sum(axis=1) - remainder
         finite_bound = np.nan_to_num(bound, nan=-np.inf)
         boxes = np.arange(len(size))

@@ -28,17 +28,19 @@ from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import smallest_conflict
 from laufruhe.solvers.result import Result, Status
 
+# most rounds that gather time steps, samples of their programs, and most solutions after them
 _ROUNDS, _COARSE, _AGAIN = 40, 48, 4
 Decide = Callable[[Problem], Result]
+"""Function that solves a problem without run-ups, or with known rows in place of them."""
 NEAR = 0.98
-"""Share of a limit above which a row joins the program."""
+"""Share of a limit, or of a maximum, above which a time step joins the program."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunRows:
-    """Rows of each step of run-up and shut-down, affine in the unbalances.
+    """Signals of each time step of run-up and shut-down, as rows affine in the n columns of unbalances.
 
-    By measure, constants have the shape (steps, places, d), and slopes the shape (steps, places, d, n).
+    For each measure, constants have the shape (steps, places, d), and slopes the shape (steps, places, d, n).
     """
 
     constants: dict[Measure, Array]
@@ -46,7 +48,7 @@ class RunRows:
 
     @classmethod
     def from_problem(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
-        """Return the rows of measures; None if run-ups are not linear in the loads."""
+        """Return the rows of measures of run-ups; None if run-ups are not linear in the loads."""
         count = sum(domain.width for domain in domains_of(problem.unbalances))
         signals = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
         if signals is None:
@@ -59,11 +61,11 @@ class RunRows:
         return cls(constants, slopes)
 
     def worst(self, measure: Measure, x: Array) -> float:
-        """Return the largest length of a row at unbalances `x`, shape (n,)."""
+        """Return the largest length of a row of a measure at unbalances `x`, shape (n,)."""
         return float(self._lengths(measure, x).max())
 
     def near(self, measure: Measure, x: Array, height: float) -> NDArray[np.intp]:
-        """Return flat indices of the longest row of each interval and place, if above NEAR times `height` at `x`."""
+        """Return flat indices of the longest row in each interval and place, if above NEAR * `height` at `x`."""
         sizes = self._lengths(measure, x)
         interval_length = -(-len(sizes) // (2 * STRETCHES))
         places = []
@@ -75,7 +77,7 @@ class RunRows:
         return np.concatenate(places)
 
     def known(self, measure: Measure, places: NDArray[np.intp]) -> KnownRows:
-        """Return the rows with these flat indices."""
+        """Return the rows of a measure with the flat indices `places`."""
         constant, slope = self.constants[measure], self.slopes[measure]
         d, n = slope.shape[2:]
         return KnownRows(constant.reshape(-1, d)[places], slope.reshape(-1, d, n)[places])
@@ -87,7 +89,10 @@ class RunRows:
 def solve_run_cones(
     problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows, decide: Decide
 ) -> Result:  # fmt: skip
-    """Return the optimal unbalances with their proof."""
+    """Return the optimal unbalances with their proof.
+
+    `limits` and `terms` are the limits and objective terms of run-ups; `rows` are all their time steps.
+    """
     steps = _Steps(problem, limits, terms, rows)
     if not steps.gather():
         names = [limit.name for limit in steps.problem.load_limits]
@@ -112,7 +117,7 @@ def solve_run_cones(
 
 
 class _Steps:
-    """Steps of the runs near the limits, or near the maximum of an objective, in any design so far."""
+    """Time steps of the runs near the limits, or near the maximum of an objective, in any design so far."""
 
     def __init__(self, problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows) -> None:
         self._problem, self._limits, self._terms, self._rows = problem, limits, terms, rows
@@ -120,7 +125,7 @@ class _Steps:
 
     @property
     def problem(self) -> Problem:
-        """Problem with rows of these steps; limits without such steps are omitted."""
+        """Problem with the rows of these steps; limits of run-ups without such steps are omitted."""
         rows_of_steps = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
         limits = [x for x in self._problem.limits if not x.measure.channel.simulation or x.measure in rows_of_steps]
         return replace(self._problem, known_rows=rows_of_steps, limits=tuple(limits))

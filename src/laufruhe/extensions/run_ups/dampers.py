@@ -1,14 +1,14 @@
 """Maps of a block on its mounts in time over boxes of stiffness, with the viscous damping of E26 (E65).
 
-A signal is P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the stiffness A of the
-block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero to infinity. In the modes of the middle of a
-box, with E the difference of A from its value there and w the natural frequencies,
+A signal of the motion y is P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the
+stiffness A of the block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero to infinity. In the modes
+of the middle of a box, with E the difference of A from its value there and w the natural frequencies,
 
     S_ab = 1/w (a = b) + f[a,b] E_ab + sum_c f[a,c,b] E_ac E_cb - ...                              (E65)
 
 with divided differences f of k^{-1/2} at the squares of w. With R = (w^2 + s^2)^{-1}, the remainder after the first
 order is 2/pi times the integral of R E (A + s^2)^{-1} E R, and after the second that of -R E R E (A + s^2)^{-1} E R.
-As A >= (1 - t) w^2, Cauchy-Schwarz bounds their entries by products of two lengths.
+As A >= (1 - t) w^2 with some t < 1 on the box, Cauchy-Schwarz bounds their entries by products of two lengths.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class LinearMaps:
-    """Matrices P (`position`), L (`lossy`) and D (`drag`)."""
+    """Matrices P (`position`), L (`lossy`) and D (`drag`) of a signal P y + (L S + D) y' of the motion y."""
 
     position: Linear
     lossy: Linear
@@ -65,14 +65,14 @@ class Roots:
 
 @dataclass(frozen=True, eq=False)
 class Maps:
-    """Signal P y + Q y' over boxes, by open numbers from -1 to 1.
+    """Signal P y + Q y' of the motion y over boxes, by open numbers from -1 to 1.
 
     Attributes
     ----------
     position, positions
-        P at the middle and its slopes, shapes (boxes, r, n) and (boxes, open numbers, r, n).
+        Matrix P at the middle and its slopes, shapes (boxes, r, n) and (boxes, open numbers, r, n).
     rate, rates, bends
-        Q at the middle, its slopes, and its second-order terms by pairs j <= l, shape (boxes, pairs, r, n).
+        Matrix Q at the middle, its slopes, and its second-order terms by pairs j <= l, shape (boxes, pairs, r, n).
     remainder
         Bound of the remainder of the entries of Q, shape (boxes, r, n).
     """
@@ -145,7 +145,7 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
 
 
 def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
-    """Return the maps of boxes, in the modes of their middles.
+    """Return the maps from motion to a signal over boxes, in the modes of their middles.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots
     above, halves
         Middles above the lower bounds, and half widths, shape (boxes, open numbers).
     turn
-        Matrix from the coordinates of the modes, shape (boxes, n, n).
+        Matrix from coordinates of the modes to those of the motion, shape (boxes, n, n).
     s
         Roots S of the boxes.
     of_motion

@@ -2,8 +2,8 @@
 
     z' = A z + b(t),   z_{k+1} = e^{A h} z_k + integral of e^{A (h - s)} b(t_k + s) ds
 
-in the modes of A, with b a polynomial through its values at the Gauss points of each step. All loads have the same
-steps, so that the response is linear in them to rounding.
+with time steps h, in the modes z of the rate matrix A, and with b a polynomial through its values at the Gauss points
+of each step. All loads have the same steps, so that the response is linear in them to rounding.
 """
 
 from __future__ import annotations
@@ -22,8 +22,11 @@ from laufruhe.physics.time_model import TimeModel
 Loads: TypeAlias = Sequence[tuple[Array, ComplexArray]]
 """Orders and their wrenches, shape (n, 6); the first set is in proportion to the squared speed (E28)."""
 
+# Gauss points of a time step, and points of the quadrature of their polynomials
 NODES, FINE = 4, 64
+# largest rate times step, and largest condition number of the modes, at which modes give the motion
 _STIFFEST, _DEFECTIVE = 200.0, 1e8
+# time steps whose wrenches are computed at once, and steps that are followed together
 _AT_ONCE, BLOCK = 20_000, 64
 
 
@@ -118,7 +121,7 @@ class LinearRun:
 
     @cached_property
     def modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Rates, shape (m,), shapes for real parts, (2 n, m), and map from loads, (m, n); of conjugate modes one."""
+        """Rates, (m,), shapes for real parts, (2 n, m), and map from loads, (m, n), of one mode per conjugate pair."""
         upper = self._rates.imag >= 0.0
         rates = self._rates[upper]
         shapes = self._shapes[:, upper] * np.where(rates.imag > 0.0, 2.0, 1.0)
@@ -200,7 +203,7 @@ def step_moments(count: int) -> Array:
 
 @lru_cache
 def largest_share() -> float:
-    """Return the largest value over a step of a polynomial, over its largest value at the Gauss points.
+    """Return the largest ratio of a polynomial over a step to its largest value at the Gauss points.
 
     The sum of |L_i| is largest at the ends of the step.
     """

@@ -1,7 +1,7 @@
 """Motion of run-up and shut-down over boxes of stiffness: two orders in their sides, and a remainder (E65).
 
-With d from -1 to 1 in each side of a box, z' = A z + B p(t) with A = A0 + sum d_j A_j + sum d_j d_k A_jk + rest,
-and p the loads of the exact model. Motion at the middle and its orders solve
+With d from -1 to 1 in each side of a box, the state z has z' = A z + B p(t) with A = A0 + sum d_j A_j + sum d_j d_k
+A_jk + rest, and p the loads of the exact model. Motion at the middle and its orders solve
 
     z0' = A0 z0 + B p,   z_j' = A0 z_j + A_j z0,   z_jk' = A0 z_jk + A_j z_k + A_k z_j + A_jk z0     (j < k)
 
@@ -46,11 +46,11 @@ class MotionEquations:
     maps
         Maps from motion to its restoring force.
     matrix, first, second
-        A0, A_j and A_jk, shapes (boxes, 2 n, 2 n), (boxes, open numbers, ...), (boxes, pairs, ...).
+        Matrices A0, A_j and A_jk, shapes (boxes, 2 n, 2 n), (boxes, open numbers, ...), (boxes, pairs, ...).
     load
-        B, shape (boxes, 2 n, 6).
+        Matrix B from a wrench to the rate of the state, shape (boxes, 2 n, 6).
     softest
-        K at the lower vertex, shape (boxes, n, n).
+        Stiffness K at the lower vertex, shape (boxes, n, n).
     growth_rates
         Largest growth rate of a motion by negative damping [1/s], shape (boxes,).
     known, count
@@ -107,7 +107,7 @@ class RunMotion:
     Attributes
     ----------
     middle, first, second
-        z0, z_j and z_jk, shapes (boxes, 2 n, times), (boxes, open numbers, ...) and (boxes, pairs, ...).
+        States z0, z_j and z_jk, shapes (boxes, 2 n, times), (boxes, open numbers, ...) and (boxes, pairs, ...).
     remainder
         Bound of the remainder |r|, shape (boxes, times).
     """

@@ -30,7 +30,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 STEP, MIN_SHARE = 1e-5, 0.1
-"""Relative step of a difference, and smallest scale of it as a share of the range of a number."""
+"""Relative step of a difference quotient, and its smallest scale as a share of the range of an open number."""
 
 
 class RunPeaks:
@@ -53,7 +53,7 @@ class RunPeaks:
 
     @property
     def is_known(self) -> bool:
-        """True if the count of steps allows a run."""
+        """True if the runs have few enough time steps to be computed."""
         return bool(self.sweeps)
 
     @property
@@ -80,9 +80,9 @@ class RunPeaks:
         return self._at(point)[2]
 
     def rows(self, points: Sequence[Array]) -> list[dict[Measure, Array]] | None:
-        """Return the signals of measures at each step and place of both runs, for each point.
+        """Return the signals of measures at each step and place of both runs, for each point of open numbers.
 
-        None if signals are not linear in the loads, as with bump stops.
+        Return None if signals are not linear in the loads, as with bump stops.
         """
         designs = [] if self.has_stops else self._signals(points)
         resolved = [run_signals for run_signals in designs if run_signals is not None]
@@ -125,7 +125,7 @@ class RunPeaks:
         return _peaks(base, interpolates), np.column_stack([(high - low) / width for low, high, width in pairs])
 
     def _sides(self, point: Array, k: int) -> tuple[Array, Array]:
-        """Return two points about one, which differ in number k by a small step within its bounds."""
+        """Return points on both sides of `point`, which differ in open number k by a small step within its bounds."""
         count = len(self._decisions)
         if k < count:
             decision = self._decisions[k]

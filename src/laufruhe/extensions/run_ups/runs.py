@@ -33,6 +33,7 @@ MAX_SWINGS = 2e3
 COARSEST = 4.0
 """Largest factor by which steps may be longer than usual."""
 STEPS_PER_PERIOD = 24
+"""Time steps in a period of the highest order at the highest speed."""
 MIN_STEPS, MAX_STEPS = 16, 4000
 """Fewest and most steps in an interval of the envelope."""
 
@@ -160,7 +161,9 @@ def run_through(
     duration
         Time of the run [s].
     stretches
-        Intervals of the envelope.
+        Count of intervals of the envelope.
+    method, tolerance
+        Integrator of SciPy, and its relative tolerance.
 
     Raises
     ------

@@ -34,7 +34,10 @@ def runs_up(result: Result) -> bool:
 
 
 def run_of(result: Result) -> Run:
-    """Return the run of the problem; by default one of SECONDS each way, beyond all critical speeds near the points."""
+    """Return the run-up and shut-down of the problem.
+
+    The default takes SECONDS each way, beyond all critical speeds that are near the operating points.
+    """
     run = result.problem.engine.extra(Run)
     if run is not None:
         return run

@@ -2,9 +2,9 @@
 
     z_{k+1} = e^{A h} z_k + b_k + integral of e^{A (h - s)} f(s) ds,   f the force of the stops on the block
 
-b_k is the contribution of the loads, as on mounts without stops (E28a). While no stop is touched, it is the only one,
-and many steps are computed at once. Otherwise f is linear from its value at the start of the step to that at a first
-guess of its end (second order in h).
+z are the modes of the mounts with rates A, and h is the time step. b_k is the contribution of the loads, as on mounts
+without stops (E28a). While no stop is touched, it is the only one, and many steps are computed at once. Otherwise f is
+linear from its value at the start of the step to that at a first guess of its end (second order in h).
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ QUICKEST = 0.5
 
 @dataclass(frozen=True, eq=False)
 class _DesignBatch:
-    """Modes of several designs, computed together; of conjugate modes one, as two real numbers.
+    """Modes of several designs, computed together; one of each conjugate pair, as two real numbers.
 
     Attributes
     ----------
     decays
-        e^{rate h}, shape (designs, modes).
+        Factor e^{rate h} of each mode over a step of length h, shape (designs, modes).
     travel_map
         Map from modes to travel along the axes of springs with stops, shape (designs, springs, 2 modes).
     first, second
@@ -47,7 +47,7 @@ class _DesignBatch:
     stops: Array
 
     def pressed(self, z: ComplexArray) -> Array:
-        """Return the forces of the stops on the block along their axes, shape (designs, springs, 1)."""
+        """Return the forces of the stops on the block along their axes, shape (designs, springs, 1), at modes `z`."""
         travel = np.matmul(self.travel_map, z.view(float)[..., None])
         stop_force = np.minimum(np.maximum(travel, -self.gaps), self.gaps)
         stop_force -= travel
@@ -71,7 +71,9 @@ class _DesignBatch:
 def responses_to(
     models: Sequence[TimeModel | None], sweep: Sweep, wrenches: Sequence[Array]
 ) -> list[RunResponse | None]:  # fmt: skip
-    """Return the motion of each design under wrenches of `Sweep.wrenches`; None if steps fail.
+    """Return the motion of each design under its wrenches from `Sweep.wrenches`; None if steps fail.
+
+    A design that has no time model is None in `models`.
 
     With bump stops all designs are computed together, so that all are None if one fails.
     """

@@ -1,8 +1,8 @@
 """Affine lower bounds of measures over boxes of sizes (Z12, Z13, Z14).
 
-At any rod length <Z, V> is affine in the columns of a size model: for one measure with Z its subgradient, or for all
-terms and limits with multipliers of a cone program. Each group of rows has its factors of sizes, so that one set of
-multipliers bounds any box.
+At any rod length, the product <Z, V> of multipliers Z and rows V is affine in the columns of a size model: for one
+measure with Z its subgradient, or for all terms and limits with multipliers of a cone program. Each group of rows has
+its factors of sizes, so that one set of multipliers bounds any box.
 """
 
 from __future__ import annotations
@@ -50,17 +50,20 @@ class SizeReach(NamedTuple):
 
 
 Monotonicity: TypeAlias = Array
+"""For each size 1 if a factor rises with it, -1 if it falls, 0 if it is constant; shape (sizes,)."""
 
 
 def minimum_of(nodes: Array, terms: Array, remainder: Array, reach: SizeReach) -> Array:
-    """Return lower bounds of functions on a box, shape (t,): linear part at the rod length's ends, less other terms.
+    """Return lower bounds of functions of rod length and columns on a box, shape (t,).
+
+    A bound is the least linear part of the series at both ends of the rod length, less the largest other terms.
 
     Parameters
     ----------
     nodes
-        Values of each function at the nodes, shape (t, n, 1 + columns).
+        Coefficients of 1 and each column at the nodes of the rod length, shape (t, n, 1 + columns).
     terms
-        Matrix from these to the series between the rod lengths of the box, shape (n, n).
+        Matrix from the nodes to the series between the rod lengths of the box, shape (n, n).
     remainder
         Bound of the remainder of the series, shape (1 + columns,).
     """
@@ -71,7 +74,7 @@ def minimum_of(nodes: Array, terms: Array, remainder: Array, reach: SizeReach) -
 
 
 class Bundle:
-    """Affine lower bounds of a norm over the columns: its tangents so far (P4)."""
+    """Affine lower bounds of the norm of a piece over the columns: its tangents so far (P4)."""
 
     def __init__(self, lengths: RodSeries) -> None:
         self.piece, self.lengths = lengths.piece, lengths
@@ -90,7 +93,7 @@ class Bundle:
 
 @dataclass(frozen=True, eq=False)
 class GroupedRows:
-    """Products <Z, V> of a piece, summed over groups of rows with one factor of sizes each.
+    """Products <Z, V> of multipliers and rows of a piece, summed over groups of rows with one factor each.
 
     Attributes
     ----------
@@ -121,7 +124,7 @@ class GroupedRows:
         return cls(lengths, tuple(groups), price)
 
     def with_factors(self, factors: Sequence[Array]) -> tuple[Array, float]:
-        """Return the function with other factors, shape (n, 1 + columns), and the largest ratio to initial factors."""
+        """Return <Z, V> with other factors, shape (n, 1 + columns), and their largest ratio to the initial factors."""
         if not factors:
             return np.asarray(self.groups[0][:, 0, 0]), 1.0
         ratios = [factor / initial for factor, initial in zip(factors, self.lengths.piece.initial_factors, strict=True)]

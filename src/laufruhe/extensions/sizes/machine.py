@@ -118,7 +118,7 @@ class RunningGear(Extra):
     Attributes
     ----------
     elastic_modulus
-        [Pa].
+        Elastic modulus of all parts [Pa].
     density
         Density of the steel [kg/m3]; None if sizes add no masses.
     webs, rod, piston_pin, bolts

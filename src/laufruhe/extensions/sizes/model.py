@@ -40,7 +40,7 @@ BETWEEN, MARGIN, SAME = 7, 0.02, 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Rows of a measure that share their factors.
+    """Sampled rows of a measure that share their factors of sizes.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Piece:
     initial_factors: tuple[Array, ...]
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
-        """Return the ratio of all factors to the initial ones, or None if the ratios differ."""
+        """Return the ratio of factors at other sizes to the initial ones, or None if their ratios differ."""
         if not factors:
             return 1.0
         pairs = zip(factors, self.initial_factors, strict=True)
@@ -65,7 +65,7 @@ class Piece:
         return float(ratios[0]) if np.all(ratios == ratios[0]) else None
 
     def scaled(self, factors: Sequence[Array]) -> AffineNorm:
-        """Return the norm with other factors."""
+        """Return the norm with the factors of other sizes."""
         ratios = self.ratios(factors)
         return replace(self.affine, constant=self.affine.constant * ratios, slope=self.affine.slope * ratios[..., None])
 
@@ -80,7 +80,7 @@ class Piece:
         return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
 
     def pruned(self, low: Array, high: Array) -> Piece:
-        """Return the piece of a maximum without rows that are largest for no columns between `low` and `high`."""
+        """Return the piece of a maximum without the rows that are largest for no columns between `low` and `high`."""
         affine_rows, reach = self.affine, 0.5 * (high - low)
         size = lengths(affine_rows.rows(low + reach))
         change = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
@@ -161,7 +161,10 @@ class SizeModel:
         return _cached(self._engines, x, lambda: resized(self.problem.engine, self._sizes(x)))
 
     def engine_at(self, x: Array, monotonicity: Array) -> Engine:
-        """Return the engine with sizes `x`, shape (sizes,), or the initial one if no size changes the factors."""
+        """Return the engine with sizes `x`, or the initial one if all entries of `monotonicity` are zero.
+
+        Both have the shape (sizes,).
+        """
         return self.engine(x) if np.any(monotonicity) else self.problem.engine
 
     def _sizes(self, x: Array) -> dict[Size, float]:

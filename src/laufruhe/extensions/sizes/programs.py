@@ -29,7 +29,7 @@ ProposeMultipliers: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | No
 
 @dataclass(frozen=True, eq=False)
 class CombinedMultipliers:
-    """<Z, V> of all terms and limits, less limits times their prices (P4).
+    """Products <Z, V> of multipliers and rows of all terms and limits, less limits times their prices (P4).
 
     Attributes
     ----------

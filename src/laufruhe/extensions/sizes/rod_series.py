@@ -69,7 +69,7 @@ class RodSeries:
         return replace(self, constant=self.constant * ratios, slope=self.slope * ratios[..., None], remainder=remainder)
 
     def pulled(self, z: Array) -> Array:
-        """Return <Z, V> at the nodes: for the constant, then for each column, shape (n, 1 + columns)."""
+        """Return products of multipliers `z` and rows at the nodes: constant, then columns, shape (n, 1 + columns)."""
         flat, count = z.ravel(), len(self.constant)
         columns = flat @ self.slope.reshape(count, z.size, -1)
         return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], columns], axis=1)

@@ -78,7 +78,7 @@ class SizeProgram(LocalProgram):
         return np.array([value, *margins, *self.edges(shares)])
 
     def place(self, values: Array) -> Array:
-        """Return the point with these sizes [m] and the best unbalances for them."""
+        """Return the shares of the bounds for sizes `values` [m] and the best unbalances for them."""
         problem, decisions = self.problem, self.model.sizes
         if not self.model.domains:
             return self.shares(values)
