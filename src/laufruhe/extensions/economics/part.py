@@ -241,7 +241,7 @@ class Economics(Part):
 
 
 def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
-    """Return the point of an engine with more cylinders, at the power of the whole one."""
+    """Return the point of an engine with more cylinders, at the power of the reference engine."""
     problem = scenes.problem(Point(case))
     cylinders = len(reference.engine.slider_cranks)
     if shafts_of(problem):

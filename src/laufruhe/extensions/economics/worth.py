@@ -49,11 +49,18 @@ _TOLERANCE_WORDS = f"tolerance {100.0 * PRINTED_FALL:.0f} points: effect of the 
 
 
 class FrontPoint(NamedTuple):
-    """Least objective under a limit on the shaft mass, its lower bound and gap.
+    """Least objective of an engine under a limit on the shaft mass.
 
-    Mass used on the shafts [kg], and the fall of the objective per kilogram more [SI / kg]; that is zero where the
-    limit does not bind, and at no mass at all, where the solver's price has nothing to vary. The counterpart is the
-    objective of the same design with its static part where it is alternating, else without.
+    Attributes
+    ----------
+    force, lower_bound, gap
+        Least objective and its lower bound [SI], and the relative gap.
+    mass
+        Mass used on the shafts [kg].
+    price
+        Fall of the objective per kilogram of a higher limit [SI / kg]; zero if the limit does not bind or is zero.
+    counterpart
+        Objective of the same design with its static part if it is alternating, otherwise without.
     """
 
     force: float
@@ -95,8 +102,16 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
 class Worth:
     """Effect of one set of shafts, and the judgement by W3.
 
-    Shares that it takes off the plain engine's force, and off the least of any smaller number of
-    shafts; its force over that of the first plain engine with more cylinders at equal power.
+    Attributes
+    ----------
+    build
+        Name of the set of shafts.
+    fall, further_fall
+        Relative fall of the force from the plain engine, and from the best engine with fewer shafts.
+    beside_next
+        Force over that of the first plain engine with more cylinders at equal power.
+    worth, why
+        True if the shafts are worth building, and the reason.
     """
 
     build: str

@@ -1,10 +1,10 @@
-"""Objectives of even stars as convex functions of their couples (S3, S5, S48).
+"""Objectives of even crank stars as convex functions of their couples (S3, S5, S48).
 
-Even stars of one pattern have the same forces, so that two of them differ by what couples load:
-V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose loads the exact model gives. Averages of V
-over shifts by s are no more, in a norm that no shift changes. With the weights 2 cos(h s), of mean size 4 / pi, one
-order V_h is left. With 1 + cos(h s - psi) over firing intervals all that no couple changes is left, and half of that
-order at any phase.
+Even crank stars of one pattern have the same forces. So the signals V and V' of two of them differ by what their
+couples C_h and C'_h of order h load: V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose
+loads the exact model gives. Averages of V over shifts by s are no more, in a norm that no shift changes. With the
+weights 2 cos(h s), of mean size 4 / pi, one order V_h is left. With 1 + cos(h s - psi) over firing intervals all that
+no couple changes is left, and half of that order at any phase.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class StarAmplitudes(AmplitudeObjective):
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of the dominant order for stars below a value; None if no star is below it (S5)."""
+        """Return the window of couples of the dominant order for crank stars below a value; None if none is (S5)."""
         shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
         place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
         if room < 0.0:
@@ -92,7 +92,7 @@ class CoupleTerm:
     unit_norms: Array
 
     def values(self, couples: Array) -> Array:
-        """Return values [SI], shape (n,), from real and imaginary couples by order, shape (n, 2 orders)."""
+        """Return values of the term [SI], shape (n,), from real and imaginary couples by order, shape (n, 2 orders)."""
         size, values = self.constant.size, np.empty(len(couples))
         flat, step = self.couples.reshape(len(self.couples), -1), max(1, _AT_ONCE // size)
         for start in range(0, len(couples), step):
@@ -126,7 +126,7 @@ class CoupleNorms:
     terms: tuple[CoupleTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); above `maximum` a lower bound instead of the value."""
+        """Return values of many crank stars, shape (n,); above `maximum` a lower bound instead of the value."""
         couples = star_sums(stars, space.phases, space.places, self.orders)[:, :, 1]
         parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
         if maximum == math.inf:
@@ -164,7 +164,7 @@ class CoupleNorms:
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of the dominant order for stars below a value; None if no star is below it (S48)."""
+        """Return the window of couples of the dominant order for crank stars below a value; None if none is (S48)."""
         del pattern
         minimum = self.lower_bound(space)
         if value < minimum:
@@ -181,7 +181,10 @@ class CoupleNorms:
         return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
 
     def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
-        """Return the largest couple of an order whose half is below a value at any phase (S48)."""
+        """Return the largest couple, in the order with index `place`, of a crank star with at most a value (S48).
+
+        Half of this couple must not exceed the value at any phase. `maximum` is a known bound of the couple.
+        """
         order, levers = self.orders[place], float(np.abs(space.places).sum())
         aliased = [
             k for k, other_order in enumerate(self.orders)
@@ -202,7 +205,7 @@ class CoupleNorms:
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
-    """Return the objective of even stars as a function of their couples; None if it depends on more.
+    """Return the objective of even crank stars as a function of their couples; None if it depends on more.
 
     Nothing but the phasing of the problem may be open. `stars` are the problems of `three_stars`.
     """
@@ -218,7 +221,7 @@ def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -
 
 
 def three_stars(space: StarSpace) -> Stars:
-    """Return a star, one with two neighbouring steps exchanged, and one that checks the model of couples."""
+    """Return a crank star, one with two neighbouring steps exchanged, and one that checks the model of couples."""
     first = np.array(space.first, dtype=np.uint8)
     second, third = first.copy(), first.copy()
     throw = int(np.flatnonzero(first == 1)[-1])
@@ -229,7 +232,7 @@ def three_stars(space: StarSpace) -> Stars:
 
 @dataclass(frozen=True, eq=False)
 class _Spread:
-    """Loads of even stars: the part common to all stars, and the loads of a unit couple in every order.
+    """Loads of even crank stars: the signal common to all of them, and the signal of a unit couple in every order.
 
     Attributes
     ----------
@@ -287,7 +290,7 @@ class _Spread:
         return cls(problem, designs[0], selected, rest, {c: [u[used] for u in values] for c, values in units.items()})
 
     def term(self, weight: float, measure: Measure) -> CoupleTerm:
-        """Return one term with rows sampled as in results; means are averaged (P7)."""
+        """Return one term of the objective with rows sampled as in results; means are averaged (P7)."""
         rest, norm = self.rest[measure.load], measure.norm
         bends = kinks_of(measure, rest, self.design.engine)
         constant, grid = self._rows(measure, rest, bends)

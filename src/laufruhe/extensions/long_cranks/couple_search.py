@@ -1,8 +1,8 @@
-"""Exact search for the best stars by their couples, from stars with little couple (S5, S47).
+"""Exact search for the best crank stars by their couples, from stars with little couple (S5, S47).
 
 No star is better than the best one known unless its couple of every order lies in a window. A good star makes it
-narrow, and halves of the throws meet in it (`laufruhe.extensions.long_cranks.throw_halves`). Good stars are drawn with
-what cancels built in, then improved.
+narrow, and halves of the throws meet in it (`laufruhe.extensions.long_cranks.throw_halves`). Good starts are drawn from
+stars in which groups of throws cancel each other, then improved.
 """
 
 from __future__ import annotations
@@ -48,16 +48,16 @@ def search_stars(
     space: StarSpace, objective: CoupleObjective, count: int = 1, time_limit: float = math.inf,
     known: Stars | None = None,
 ) -> StarSearchResult:  # fmt: skip
-    """Return the best stars, proven if their halves are few enough to enumerate (S5).
+    """Return the best crank stars, proven if the arrangements of their halves can be enumerated (S5).
 
     Parameters
     ----------
     count
-        Number of distinct stars.
+        Number of distinct stars to return.
     time_limit
         Time after which the search stops, incomplete [s].
     known
-        Good stars to start from; sought when left out.
+        Good stars to start from; by default they are generated.
     """
     with limit_time(time_limit):
         best = best_starts(space, objective, count, known)
@@ -68,7 +68,7 @@ def search_stars(
 
 
 def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known: Stars | None = None) -> BestStars:
-    """Return the best starting stars, given or generated, improved by all swaps of two throws."""
+    """Return the best `count` starting stars, given or generated, and their neighbours by swaps of two throws."""
     best = BestStars(count, space.throws)
     stars = good_starts(space, objective) if known is None or not len(known) else known
     best.offer(space.canonical(stars), objective.values(space, space.canonical(stars)))
@@ -79,10 +79,10 @@ def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known:
 
 
 def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars) -> tuple[int, bool]:
-    """Search all pieces in rounds, and improve the best stars; return the number of stars, and True if all are done.
+    """Search all stars in rounds, and improve the best; return the number of arrangements, and True if all are done.
 
-    Each piece, some divisions of a pattern, starts from the best stars of earlier rounds. Pieces and rounds do not
-    depend on the workers, so the result does not either.
+    Each piece of the search, some divisions of a pattern, starts from the best stars of earlier rounds.
+    Pieces and rounds do not depend on the workers, so the result does not either.
     """
     if best.cut <= NEGLIGIBLE * objective.upper_bound(space):
         return 0, True
@@ -117,7 +117,7 @@ def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars
 def _search_piece(
     piece: tuple[tuple[int, ...], Counts], space: StarSpace, objective: CoupleObjective, known: BestStars
 ) -> tuple[BestStars, int, bool]:
-    """Return the best stars of a pattern's divisions, the number of evaluated stars, and True if time sufficed."""
+    """Return the best stars of a pattern's divisions, the count of arrangements and stars, and True if complete."""
     (pattern, shares), looked_at = piece, 0
     free, best = Free.from_pattern(pattern), BestStars(known.count, space.throws)
     best.offer(known.stars, known.values)
@@ -177,7 +177,7 @@ def swaps(star: Stars) -> Stars:
 
 
 def _rearrange(space: StarSpace, objective: CoupleObjective, star: Stars, throws: Sequence[int]) -> Stars:
-    """Return the best star over all arrangements of these throws, by halves that meet (S5)."""
+    """Return the best star over all arrangements of the steps of `throws`, by halves that meet (S5)."""
     free, value = Free.from_throws(star, throws), float(objective.values(space, star[None])[0])
     pattern = tuple(map(int, np.bincount(star, minlength=space.phases)))
     for share in until_time_limit(shares_of(space, free)):

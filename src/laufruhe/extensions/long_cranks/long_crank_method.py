@@ -1,4 +1,4 @@
-"""Row of the table of methods that long cranks add."""
+"""Method for long cranks, one row of the table of methods."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ def solve_long_cranks(problem: Problem) -> Result:
 
 
 def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even stars, by the method for this objective and crank length (S18)."""
+    """Return the best designs of all even crank stars, by the method for this objective and crank length (S18)."""
     if can_list(problem, families):
         return search_even(problem, phasing, families)
     simple = [(family, objective) for family in families if (objective := _amplitudes(phasing, family)) is not None]
@@ -102,7 +102,7 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
 def _evaluate_stars(
     problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
 ) -> EvenStarResult:  # fmt: skip
-    """Return stars with their values; complete if the best one meets the bound over all even stars (S40)."""
+    """Return crank stars with their values; complete if the best one meets the bound over all even stars (S40)."""
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
         realised = phasing.realise(family.candidate(phasing, steps))
@@ -130,7 +130,7 @@ def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
 
 
 def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best star reached by exchanges of throws, with a bound from its dual rows (S44, S14)."""
+    """Return the best crank star reached by exchanges of throws, with a bound from its dual rows (S44, S14)."""
     zero_level = numerical_zero(problem)
     answers = []
     for family in families:
@@ -156,7 +156,7 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
 
 
 def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the best star reached by exchanges, with all other decisions optimal at few samples (S44)."""
+    """Return the best crank star reached by exchanges, with all other decisions optimal at few samples (S44)."""
     value = coarse_value(model, star, built)
     while not is_time_over():
         neighbours = ((coarse_value(model, x, built), x) for x in until_time_limit(exchanges(star)))
@@ -168,7 +168,7 @@ def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) ->
 
 
 def exchanges(star: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """Yield stars in which two or three throws exchange their steps; the first throw keeps its own."""
+    """Yield crank stars in which two or three throws exchange their steps; the first throw keeps its own."""
     yielded = {star}
     for i in range(1, len(star)):
         for j in range(1, i):

@@ -1,6 +1,6 @@
-"""Stars whose couple of one order lies in a window, by halves of their throws that meet in the middle (S5).
+"""Crank stars whose couple of one order lies in a window, by halves of their throws that meet in the middle (S5).
 
-The couple of a star is a sum over throws: that of its front half and that of the back. For every way to share the
+The couple of a crank star is the sum of the couples of its front half and its back half. For every way to share the
 steps between the halves, the arrangements of the front are sorted by their couple. Each arrangement of the back finds
 among them those that bring the sum into the window. Two halves of m throws cost m! each where whole stars are (2 m)!
 (E. Horowitz, S. Sahni, Computing partitions with applications to the knapsack problem, Journal of the ACM 21, 1974,
@@ -36,7 +36,7 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Free:
-    """Throws of a star whose steps may be rearranged, in two halves; the star has steps of all throws."""
+    """Throws of a crank star whose steps may be rearranged, in two halves; `star` has the steps of all throws."""
 
     star: Stars
     front: tuple[int, ...]
@@ -66,7 +66,10 @@ class Free:
 
 
 def shares_of(space: StarSpace, free: Free) -> Counts:
-    """Return all divisions of the steps: throws of the front half by step, shape (n, phases), without images (S2)."""
+    """Return all divisions of the steps between the halves: front throws on each step, shape (n, phases).
+
+    Divisions of mirror images are left out (S2).
+    """
     counts, front = free.counts(space.phases), len(free.front)
     shares = np.zeros((1, 0), dtype=np.uint8)
     for step, maximum in enumerate(counts):
@@ -86,7 +89,7 @@ def shares_of(space: StarSpace, free: Free) -> Counts:
 
 
 def work_of(space: StarSpace) -> int:
-    """Return the number of arrangements of halves over all stars."""
+    """Return the number of arrangements of halves over all crank stars of a space."""
     total = 0
     for pattern in space.patterns:
         free = Free.from_pattern(pattern)
@@ -99,7 +102,7 @@ def work_of(space: StarSpace) -> int:
 
 
 def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iterator[Stars]:
-    """Yield blocks of stars whose couple lies in the window, shape (n, throws); some repeat.
+    """Yield blocks of crank stars whose couple lies in the window, shape (n, throws); some repeat.
 
     The division `share` has the number of throws of the front on every step, shape (phases,).
     """
@@ -146,7 +149,7 @@ def _couple_sums(waves: ComplexArray, places: Array) -> ComplexArray:
 
 @lru_cache(maxsize=16)
 def _chosen(count: int) -> tuple[NDArray[np.int8], ...]:
-    # of what is left the one that each throw takes, throw by throw, for every beginning of an order
+    # for each throw, which of the remaining items it takes, for every choice of the throws before it
     rest, out = np.arange(count, dtype=np.int8)[None, :], []
     for _ in range(count):
         out.append(rest.reshape(-1))

@@ -1,7 +1,7 @@
 """A small language over the numbers and results of a replication: arithmetic, comparisons, a few named functions.
 
 Values are numbers, texts, lists and labelled arrays; `mean["with shaft"]` is what a case gave. Python evaluates
-them, after all but what `_PARTS` and `FUNCTIONS` list is refused: no attribute can be reached.
+them, after everything that `_PARTS` and `FUNCTIONS` do not list is refused: no attribute can be reached.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ def checks_in(
 ) -> Iterator[tuple[Place, Any, Callable[[str], None]]]:
     """Yield every text with expressions in a table: its place, the text, and a function that checks it.
 
-    `known` are names with the values that each is repeated for, `places` dimensions, which the `x` of a curve knows
-    too.
+    `known` are names with the values that each is repeated for. `places` are dimensions, which are also names in the
+    `x` of a curve. `at` is the place of the table.
     """
     if isinstance(entry, Table):
         known_here = {**known, **getattr(entry, "loops", {})}
@@ -183,7 +183,7 @@ def fill_in(text: Any, names: Mapping[str, Any]) -> Any:
 def filler(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
     """Return a function that fills a text, list or table with names; None without expressions.
 
-    What holds no expression is shared by all that is filled.
+    All results share the entries without expressions.
     """
     if isinstance(text, dict):
         inside = {key: fill for key, value in text.items() if (fill := filler(value)) is not None}

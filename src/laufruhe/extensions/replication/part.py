@@ -86,7 +86,7 @@ class Replication(Part):
         yield from checks_in(self.picture_, known, cases, places, ("picture",))
 
     def by_reading(self) -> list[Part]:
-        """Return this part, which shows all readings side by side."""
+        """Return this part, which shows all readings (interpretations of the source) side by side."""
         return [self]
 
     def settings(self) -> dict[str, Any]:

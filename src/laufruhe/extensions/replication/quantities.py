@@ -36,7 +36,7 @@ DIMENSIONS = (
     "angle", "axis", "bearing", "cylinder", "direction", "firing", "mode", "motion", "mount", "number", "order",
     "section", "turns", "web",
 )  # fmt: skip
-"""Along which quantities may lie."""
+"""Names of the dimensions of quantities."""
 
 
 class QuantityQuery(QuantityTable):

@@ -54,7 +54,7 @@ class Assembly(Extra):
 
 
 def assemble(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
-    """Return the engine with these parts, each added to the drawing by its difference from the mean of its lot."""
+    """Return the engine with the chosen parts, each by its difference from the mean of its lot."""
     differences = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
     drawing = [
         AddedDrive(

@@ -181,7 +181,7 @@ class _Search(BranchAndBound[Chosen]):
         return bound
 
     def around(self, chosen: Chosen) -> Chosen:
-        """Return the node of assemblies that differ from one in the last FREE cylinders alone."""
+        """Return the node of assemblies that differ from `chosen` in the last FREE cylinders of the order alone."""
         free = set(self.order[-FREE:])
         return tuple(
             tuple(-1 if (lot, k) in free else part for k, part in enumerate(parts)) for lot, parts in enumerate(chosen)
@@ -222,7 +222,7 @@ class _Search(BranchAndBound[Chosen]):
         return value
 
     def bound(self, node: Chosen) -> float:
-        """Return a lower bound over the assemblies of a node; assignments on the way are tried."""
+        """Return a lower bound over the assemblies of a node; assignments on the way are tried as assemblies."""
         if all(part >= 0 for parts in node for part in parts):
             return self._try(node)
         point, best = self._middle(node), -math.inf

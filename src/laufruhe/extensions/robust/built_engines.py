@@ -148,7 +148,10 @@ class WorstCaseAdversary:
     tolerance: float
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
-        """Return the worst engines of a design by branch and bound."""
+        """Return the worst engines of a design, given by the values of its decisions, by branch and bound.
+
+        Without `proven`, the search stops after few nodes.
+        """
         built_at = cache(partial(BuiltEngines, self.problem, values))
         engines = built_at(self.samples)
         columns, maximum = tolerances_of(self.problem).columns, MAX_NODES if proven else QUICK
@@ -189,12 +192,12 @@ class SampledEngines:
     problems: list[Problem] = field(default_factory=list)
 
     def subset(self, indices: NDArray[np.intp]) -> SampledEngines:
-        """Return the engines with these indices."""
+        """Return the set of the engines with the given indices."""
         problems = [self.problems[k] for k in indices] if self.problems else []
         return SampledEngines(self.problem, self.errors[indices], self.samples, problems)
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:  # noqa: ARG002
-        """Return the worst engines of a design, exactly."""
+        """Return the worst engines of a design, given by the values of its decisions, exactly."""
         objectives = self.objectives(values)
         errors, limits = [self.errors[int(np.argmax(objectives))]], []
         for limit in load_limits_of(self.problem):

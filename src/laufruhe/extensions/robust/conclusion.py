@@ -79,11 +79,11 @@ class RobustDesign:
     bound
         Lower bound of the objective over all designs [SI].
     active
-        Error sets that determine the design.
+        Sets of errors that determine the design.
     scenarios, angles
         Counts of error sets and of samples in the program.
     samples
-        Samples over the cycle for engines.
+        Samples over the cycle for evaluations of engines.
     margin
         Share by which limits were lowered, because peaks lie between samples.
     conflict

@@ -103,12 +103,12 @@ class Mark:
 
     @property
     def is_share(self) -> bool:
-        """True if it is in percent."""
+        """True if the tolerance is in percent."""
         return self.size.endswith("%")
 
     @property
     def error(self) -> float:
-        """Largest error in the unit of the number, or as a share."""
+        """Largest error in the unit of the number, or as a share of the number."""
         if self.is_share:
             share = self._parsed(self.size[:-1].strip() or "?", "") / 100.0
             if share >= 1.0:
@@ -201,7 +201,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
 
 
 def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Population:
-    """Return the engines of the objective: the worst case, or a share."""
+    """Return the population of engines that the objective covers: the worst case, or a share."""
     if not tolerances:
         raise Refused("robust", None, "has no tolerances", 'give one to a number, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
@@ -259,7 +259,7 @@ def _pins(mark: Mark, engine: Engine) -> _Errors:
 
 
 def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
-    """Return the error of the size of a counterweight or a balancer, which is a share."""
+    """Return the relative error of the size of a counterweight or a balancer."""
     table = tables[str(mark.path[0])][mark.path[1]]
     if mark.path[0] == "counterweights":
         name = str(table["name"])

@@ -118,7 +118,7 @@ class RobustResult(ResultDetails):
 
 @dataclass(frozen=True)
 class Place:
-    """Parts of one cylinder.
+    """Measured parts that one cylinder takes.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class AssemblyResult(ResultDetails):
     Attributes
     ----------
     kinds
-        Kinds of the lots.
+        Kind of each lot: piston or rod.
     assemblies, random
         Counts of all assemblies, and of random ones.
     looked_at

@@ -32,7 +32,7 @@ class Law(StrEnum):
 
 
 class Scope(StrEnum):
-    """Extent of an error: one for each piece, or one for the batch."""
+    """Extent of an error: one for each part that has the tolerance, or one for all parts of the batch."""
 
     PIECE = "piece"
     BATCH = "batch"
@@ -40,7 +40,7 @@ class Scope(StrEnum):
 
 @dataclass(frozen=True)
 class PistonDrive:
-    """Error of the reciprocating mass of one slider-crank: mass += gain x error (L2, L3)."""
+    """Effect of an error on the reciprocating mass of one slider-crank: mass += gain x error (L2, L3)."""
 
     cylinder: int
     gain: float
@@ -57,7 +57,7 @@ class PistonDrive:
 
 @dataclass(frozen=True)
 class AddedDrive:
-    """Unbalance gain x error, added to those of the drawing (L1)."""
+    """Effect of an error as a further unbalance gain x error, at the position `x` along the shaft [m] (L1)."""
 
     name: str
     x: float
@@ -76,7 +76,7 @@ class AddedDrive:
 
 @dataclass(frozen=True)
 class ShareDrive:
-    """Relative error of an unbalance and of the drives of its decisions: factor 1 + share x error (R3)."""
+    """Effect of an error on an unbalance, and on the drives of its decisions: factor 1 + share x error (R3)."""
 
     rotor: str
     share: float
@@ -103,7 +103,7 @@ class ShareDrive:
 
 @dataclass(frozen=True)
 class FileDrive:
-    """Error of a number of the problem file: number += gain x error; the problem is built again from the file.
+    """Effect of an error on a number of the problem file: number += gain x error; the file builds the problem again.
 
     Attributes
     ----------
@@ -132,19 +132,19 @@ class FileDrive:
 
 
 ErrorDrive: TypeAlias = PistonDrive | AddedDrive | ShareDrive | FileDrive
-"""Part of an engine that an error changes; `is_affine` if all loads are affine in it and all other affine errors."""
+"""Effect of an error on an engine; `is_affine` if all loads are affine in it and all other affine errors."""
 
 
 @dataclass(frozen=True)
 class Error:
-    """Independent error.
+    """Independent error of a built engine, in units of its largest size.
 
     Attributes
     ----------
     name
-        Part that has the error.
+        Name of the part that has the error.
     drives
-        Changes by the error.
+        Effects of the error on the engine.
     width
         1 for a real number, 2 for an unbalance of any angle.
     """
@@ -172,11 +172,11 @@ class Tolerance:
     size
         Largest error [SI].
     errors
-        One for each piece, or one for the batch.
+        One error for each part, or one for the batch.
     law, scope
         Distribution and extent of the errors.
     scale
-        Factor of its size, for prices.
+        Factor of the size, which is varied for shadow prices.
     """
 
     name: str
@@ -215,7 +215,7 @@ class Population:
     engines
         Count of random engines, if the objective needs them.
     seed
-        Seed of these engines; those of the comparison have another.
+        Seed of these engines; the engines of the comparison have another seed.
     """
 
     share: float | None = None
@@ -269,7 +269,7 @@ class Tolerances:
         return np.concatenate([half, -half])
 
     def with_errors(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
-        """Return the drawing with errors, shape (columns,); numbers of the file are rebuilt from it."""
+        """Return the drawing with errors, shape (columns,); `rebuild` builds it again for errors of file numbers."""
         moves: list[tuple[ErrorDrive, complex]] = []
         columns = iter(self.columns)
         for tolerance in self.tolerances:

@@ -66,12 +66,12 @@ def value_at(terms: Terms, errors: Array) -> float:
 
 
 def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MAX_NODES) -> WorstCase:
-    """Return the maximum of a weighted sum of norms N(V0 + E z) over intervals and discs.
+    """Return the maximum of a weighted sum of norms N of rows V0 + E z over intervals and discs of the errors z.
 
     Parameters
     ----------
     terms
-        Weights and norms, affine in the errors z.
+        Weights and norms, with rows affine in z.
     columns
         Slice of each error: one column for an interval from -1 to 1, two for the unit disc.
     tolerance
@@ -170,7 +170,7 @@ def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float
 
 @dataclass(frozen=True, eq=False)
 class ErrorBlock:
-    """Free error with local numbers, each in an interval from -1 to 1 or together in the unit disc.
+    """Error that is free in a node, by local numbers: each from -1 to 1, or together in the unit disc.
 
     Attributes
     ----------
@@ -192,7 +192,7 @@ class ErrorBlock:
         return self.arc is None and len(self.spans) > 1
 
     def parts(self, centre: Array) -> list[tuple[Array, ErrorBlock | None]]:
-        """Return centres and free blocks that together contain all extreme points."""
+        """Return centres and free blocks that together contain all extreme points of this block."""
         if len(self.spans) == 1:
             ends = [centre.copy(), centre.copy()]
             for end, sign in zip(ends, (1.0, -1.0), strict=True):
@@ -372,14 +372,14 @@ def _over_majorants(
 
 
 def _over_balls(slopes: Array, curvature: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array]:
-    """Return upper bounds of a . u + u . H u / 2 over all u with each u_b of length one (R6a).
+    """Return upper bounds of a . u + u . H u / 2 over vectors u whose part in each ball has length one (R6a).
 
     Parameters
     ----------
     slopes
         Vectors a, shape (s, n).
     curvature
-        H, shape (n, n).
+        Matrix H, shape (n, n).
     firsts
         Index of the first number of each ball.
 

@@ -29,9 +29,9 @@ class RotaryUnit(SliderCrank):
     rotor_radius
         Distance from the rotor's centre to its apexes [m]; `crank_radius` is the eccentricity.
     rotor_width
-        Along the shaft [m].
+        Width of the rotor along the shaft [m].
     rotor_inertia
-        About the rotor's centre [kg m2].
+        Moment of inertia about the rotor's centre [kg m2].
     """
 
     rotor_radius: float

@@ -214,7 +214,7 @@ def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, 
 
 @_answered
 def front(source: Source, state: PageState, across: str, k: int) -> dict[str, Any]:
-    """Return point k of the front against another measure; {"done": True} after the last."""
+    """Return point k of the front against the measure `across`; {"done": True} after the last."""
     pareto, simpler = _front(source, state, across)
     maximum = next(islice(places(*pareto.ends()), k, None), None)
     if maximum is None:

@@ -30,9 +30,9 @@ _NARROW, _WIDE, _STEPS = 0.25, 2.0, 200
 
 @dataclass(frozen=True)
 class Control:
-    """A number with a slider, which an edit of this way and name moves; `unit` is that of a file.
+    """Number with a slider: an edit of the kind `way` with the name `name` moves it; `unit` is that of the file.
 
-    An open number is decided unless the page fixes it. A limit has its name.
+    A number that is `open` is decided, unless the page fixes it. `limit` is the name of the limit that has the number.
     """
 
     way: str

@@ -48,7 +48,7 @@ class FileWatcher:
         return self._closed.is_set()
 
     def later(self, version: int, seconds: float) -> int:
-        """Wait until the version changes, and return it."""
+        """Wait until the version differs from `version`, at most some seconds, and return it."""
         with self._changed:
             self._changed.wait_for(lambda: self.version != version or self.is_closed, seconds)
             return self.version

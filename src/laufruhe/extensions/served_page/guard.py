@@ -27,8 +27,8 @@ HEADERS = {
 class Guard:
     """Token of one run, and checks of a request's headers.
 
-    The token is in the part of an address that browsers send to nobody. What a browser is started with other users of
-    the machine may see, so that holds a ticket, which is good for one exchange.
+    The token is in the part of an address that browsers send to nobody. Other users of the machine may
+    see the address with which a browser is started. So it holds a ticket, which is good for one exchange.
     """
 
     def __init__(self, port: int) -> None:
@@ -64,7 +64,7 @@ class Guard:
         return hmac.compare_digest((token or "").encode("utf-8", "replace"), self.token.encode())
 
     def exchanged(self, ticket: str) -> str | None:
-        """Return the token for the ticket, once."""
+        """Return the token for the right ticket, once; None for any other."""
         with self._lock:
             good = bool(self._ticket) and hmac.compare_digest(ticket.encode("utf-8", "replace"), self._ticket.encode())
             if good:

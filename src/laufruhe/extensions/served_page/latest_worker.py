@@ -26,7 +26,7 @@ class Late(SolverError):
 class LatestWorker:
     """Runs the newest request in its own process; older waiting requests are dropped.
 
-    A newer request waits `patience` seconds for one at work, before that is ended with its process.
+    A newer request waits `patience` seconds for the request at work, which is then ended with its process.
     """
 
     def __init__(self, patience: float) -> None:
@@ -40,7 +40,7 @@ class LatestWorker:
     def ask(self, seconds: float, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
         """Run the work in the process and return its result.
 
-        Raise `Superseded` if a newer request came before the answer, and `Late` if the work exceeds some seconds.
+        Raise `Superseded` if a newer request came before the answer, and `Late` if the work exceeds `seconds`.
         """
         request_number, workers = self._turn()
         try:

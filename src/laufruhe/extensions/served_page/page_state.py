@@ -36,9 +36,9 @@ class PageState:
     Attributes
     ----------
     fixed
-        Open numbers that stay where the last whole solution had them, while what is affine follows a slider.
+        Edits that fix open numbers at their values in the last whole solution, while affine decisions follow a slider.
     has
-        Key of the model that the page has; `LATER` where it wants none yet.
+        Key of the model that the page has; `LATER` if it wants no model yet.
     position
         Number that the page gives its settings; claims about them carry it.
     """
@@ -138,4 +138,4 @@ _WAYS: Mapping[str, Callable[[Tables, str, Any], dict[str, Any]]] = {
 }
 LATER = "later"
 STAR, CRANK, OBJECTIVE = "star", "crank", "objective"
-"""Names of what is changed as a whole."""
+"""Names of edits that change more than one number."""

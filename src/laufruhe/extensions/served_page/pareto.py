@@ -36,7 +36,7 @@ def partners(problem: Problem) -> dict[str, Measure]:
 
 
 class ParetoFront:
-    """Pareto front, computed point by point."""
+    """Pareto front between the objective and the measure `across`, computed point by point."""
 
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
@@ -61,7 +61,7 @@ class ParetoFront:
 
 
 def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:
-    """Yield the ends and then always the midpoints, so that the front is visible early."""
+    """Yield `count` values from `low` to `high`: the ends, then midpoints, so that the front is visible early."""
     if high - low <= _NARROW * abs(high):
         yield high
         return

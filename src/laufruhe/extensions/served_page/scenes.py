@@ -62,7 +62,7 @@ class PageScene:
                 self.follower = None
 
     def evaluated(self, followed: SliderOptimum | None) -> Evaluation:
-        """Return the exact evaluation of the followed design; of the given one if there is none."""
+        """Return the exact evaluation of the followed design, or of the initial one if there is none."""
         if followed is None or followed.conflict:
             return self.initial
         return evaluate(self.problem.fixed_at(followed.values))
@@ -99,7 +99,7 @@ class PageScene:
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
     def simpler(self, fixed_kinds: Collection[Kind]) -> Simplification:
-        """Return what is neglected while sliders move, and what is fixed; the page fixes some kinds of open numbers."""
+        """Return what is fixed and what is left out while sliders move; the page fixes numbers of `fixed_kinds`."""
         problem = self.full_problem
         kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
         if problem.phasing is not None:
@@ -123,7 +123,10 @@ _scenes: dict[str, PageScene] = {}
 
 
 def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageScene:
-    """Return the scene of a problem from a small cache; values of limits and files with equal content do not matter."""
+    """Return the page scene of a problem, from a small cache.
+
+    Values of limits do not distinguish scenes; `content` is the hash of all files that the problem names.
+    """
     limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
     text = json.dumps([content, {**tables, "constraints": limits}], sort_keys=True, default=str)
     key = hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -30,15 +30,17 @@ P = ParamSpec("P")
 USUAL_PORT = 8537
 """Default port, so that old links keep working."""
 FOLLOWED, GRACE = 30.0, 60.0
-"""Seconds for an answer while a slider moves, and beyond those that a search may take."""
+"""Seconds for an answer while a slider moves, and further seconds after the time limit of a search."""
 HEARTBEAT = 1.0
+"""Most seconds between two lines of events."""
+# seconds that a newer request waits for a slider's answer, and for a search or a front
 _HASTE, _PATIENCE = 5.0, 1.0
 
 
 class Page:
-    """A server of a problem file with its worker processes; without a port at the usual one, or a free one.
+    """Server of a problem file with its worker processes.
 
-    The time limit of a search is in seconds.
+    Without `port` it takes USUAL_PORT, or a free port. `seconds` is the time limit of a search.
     """
 
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:

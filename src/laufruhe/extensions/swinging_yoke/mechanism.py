@@ -35,7 +35,7 @@ class SwingingYoke(SliderCrank):
     ram_height
         Height of the ram's path above where the lever's end touches at mid-stroke [m].
     lever_mass, lever_centre, lever_inertia
-        [kg], centre of gravity from the pivot towards the end [m], inertia about it [kg m2].
+        Mass of the lever [kg], its centre of gravity from the pivot towards the end [m], and inertia about it [kg m2].
     lever_weight, lever_weight_radius
         Weight behind the pivot [kg] and its distance from the pivot [m].
     """

@@ -50,9 +50,9 @@ class _Excitation:
     highest
         Highest multiple of the lowest order, including orders that are left out.
     torques
-        Shape (orders, discs and rings).
+        Torques on discs and rings, shape (orders, discs and rings) [N m].
     mean
-        Torque of order zero, shape (discs,).
+        Torque of order zero on each disc, shape (discs,) [N m].
     middle, sides
         Dynamic stiffness in the middle of the bounds, and its slope by each coordinate, shapes (orders, n, n) and
         (coordinates, orders, n, n).
@@ -95,7 +95,7 @@ class TwistBoxes:
     problem
         Problem with nothing but numbers of the crankshaft open.
     evaluation
-        Evaluation of the design as given.
+        Evaluation of the initial design.
     """
 
     what = "boxes of discs and shafts"
@@ -223,7 +223,11 @@ class TwistBoxes:
         return series(centre[None], half[None], inverse[None], along, excitation.inside, angles[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> LinearBound:
-        """Return a linear lower bound of an RMS over orders, sections and operating points."""
+        """Return a linear lower bound of an RMS over orders, sections and operating points.
+
+        `chains` are those at the lower corner, the centre and the upper corner of the box, and `twists` the series of
+        the response at each operating point.
+        """
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
         chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)

@@ -18,14 +18,14 @@ class TwistCoordinates:
     Attributes
     ----------
     lower, upper
-        Bounds, shape (n,).
+        Bounds of the coordinates, shape (n,) each.
     owners
-        Which coordinate moves which section, shape (n, sections), zeros and ones.
+        One where a coordinate changes the stiffness or diameter of a section, else zero, shape (n, sections).
     """
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self._chain = problem, chain_of(problem.engine)
-        # of every decision names of parts of the crankshaft, and of the number of each
+        # for each decision, pairs of the name of a part of the crankshaft and the name of its number
         self._keys: list[tuple[tuple[str, str], ...]] = [decision.keys(TORSION) for decision in problem.decisions]
         self.lower = self.from_decisions(np.array([decision.lower for decision in problem.decisions]))
         self.upper = self.from_decisions(np.array([decision.upper for decision in problem.decisions]))
@@ -44,14 +44,14 @@ class TwistCoordinates:
         return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 
     def from_decisions(self, values: Array) -> Array:
-        """Return the coordinates for given decisions, shape (n,)."""
+        """Return the coordinates for given values of the decisions, shape (n,)."""
         coordinates = np.array(values, dtype=float)
         for k, section in self._round:
             coordinates[k] = section.moved(section.stiffness, float(values[k])).stiffness
         return coordinates
 
     def decisions(self, coordinates: Array) -> Array:
-        """Return the decisions for given coordinates, shape (n,)."""
+        """Return the values of the decisions for given coordinates, shape (n,)."""
         values = np.array(coordinates, dtype=float)
         for k, section in self._round:
             diameter = section.diameter or 0.0

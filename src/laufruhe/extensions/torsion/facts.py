@@ -74,7 +74,7 @@ class Barred:
 
 @dataclass(frozen=True, eq=False)
 class TorsionFacts:
-    """Torsional numbers of one design.
+    """Torsional vibration of one design in numbers.
 
     Attributes
     ----------

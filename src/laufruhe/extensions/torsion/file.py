@@ -110,13 +110,13 @@ class TorsionTable(Table):
 
 
 class _OpenNumbers:
-    """Numbers as they are given, and the decisions about those that are open."""
+    """Reader of numbers that may be open, which collects the decisions about those that are."""
 
     def __init__(self) -> None:
         self.decisions: list[Decision] = []
 
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
-        """Return the number of some parts, or its start if it is open."""
+        """Return the number `key` of all `parts` of a name, or its start if it is open, which adds a decision."""
         number = Open.from_value(value)
         drives = (NumberDrive(TORSION, (part, key)) for part in parts)
         self.decisions += number.decisions(f"torsion.{name}.{key}", unit, *drives)
@@ -126,7 +126,7 @@ class _OpenNumbers:
 def _chain(
     table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]
 ) -> tuple[Torsion, list[Decision]]:
-    """Return the chain from front to rear, and what of it is open."""
+    """Return the chain from front to rear, and the decisions about its open numbers."""
     for part in parts:
         if part.shaft != CRANKSHAFT:
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"

@@ -110,11 +110,11 @@ class Absorber:
     on
         Name of its disc.
     inertia
-        Of the ring, or of a pendulum's mass about the crank axis [kg m2].
+        Inertia of the ring, or of a pendulum's mass about the crank axis [kg m2].
     stiffness, loss_factor
         Stiffness [N m/rad] and loss of its rubber.
     damping
-        Viscous, between disc and ring [N m s/rad].
+        Viscous damping between disc and ring [N m s/rad].
     order
         Order that a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
     damping_ratio
@@ -153,20 +153,20 @@ class Absorber:
 
 @dataclass(frozen=True)
 class Torsion(Extra):
-    """A chain of discs from front to rear, with absorbers on it.
+    """Chain of discs and shafts from front to rear, with absorbers on it.
 
     Attributes
     ----------
     discs
         Discs from the front (C3).
     sections
-        Shafts from each disc to the next, one fewer.
+        Shafts from each disc to the next, one fewer than discs.
     absorbers
-        On any of the discs.
+        Absorbers on any of the discs.
     output
         Name of the disc where the load takes its torque.
     speeds
-        Least and largest crank speed that it is looked at [rad/s]; about the operating points where none are given.
+        Least and largest crank speed of tables and pictures [rad/s]; None for a range about the operating points.
     """
 
     discs: tuple[Disc, ...]
@@ -269,7 +269,7 @@ def stiffness_of(pieces: Sequence[tuple[float, float, float]], shear_modulus: fl
     Parameters
     ----------
     pieces
-        Length, diameter and bore of each [m].
+        Length, diameter and bore of each piece [m].
     """
     compliance = sum(32.0 * length / (math.pi * (diameter**4 - bore**4)) for length, diameter, bore in pieces)
     return shear_modulus / compliance

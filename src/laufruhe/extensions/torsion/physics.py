@@ -4,8 +4,9 @@ Discs on shafts without mass turn about their even speed by small angles q:
 
     J q'' + C q' + K q = T,        order by order   (K + i H + i h w C - (h w)^2 J) q_h = T_h      (V5)
 
-with T the torque of gas, pistons and rods on each throw (T1), H what hysteresis adds to K. The textbook's
-chapter 2.9 is behind it: discs and shafts, half the reciprocating mass, critical speeds, main orders, stress.
+with the matrices of inertia J, damping C and stiffness K, the crank speed w, and the order h. T is the torque of gas,
+pistons and rods on each throw (T1), and H is what hysteresis adds to K. Chapter 2.9 of the textbook explains discs and
+shafts, half the reciprocating mass, critical speeds, main orders and stress.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ from laufruhe.physics.torque import cylinder_torque
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
 """Function of chain, orders and crank speed [rad/s]; returns load over twist, shape (orders, sections)."""
 
+# least torque over response times stiffness of a damped order; least swing of the front disc that gives a mode its
+# sign; relative eigenvalue that counts as zero
 _SINGULAR = 1e-13
 _FREE = 1e-9
 _NONE = 1e-13
@@ -50,13 +53,16 @@ class AtSpeed:
         return np.diag(inertias(chain))
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return the inertia of a ring at its disc over its own: 1; None for a pendulum, stiffer with more inertia."""
+        """Return the ratio of effective to own inertia: 1; None for a pendulum, whose stiffness grows with inertia."""
         return None if absorber.order else 1.0
 
 
 @dataclass(frozen=True)
 class InOrder:
-    """Crank speeds [rad/s] at which an order meets a mode; a pendulum is an inertia J / (1 - h^2/n^2) (V15)."""
+    """Crank speeds [rad/s] at which an order h meets a mode (V15).
+
+    A pendulum of inertia J that is tuned to order n acts as an inertia J / (1 - h^2/n^2).
+    """
 
     order: float
 
@@ -70,7 +76,10 @@ class InOrder:
         return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return 1 / (1 - h^2/n^2) for a pendulum; 0 if the order equals its tuning, at which the disc stands still."""
+        """Return the ratio of effective to own inertia: 1 / (1 - h^2/n^2) for a pendulum.
+
+        It is 0 if the order equals the tuning of the pendulum, so that the disc stands still.
+        """
         if not absorber.order:
             return 1.0
         if absorber.stiffness:
@@ -90,7 +99,7 @@ class TorsionalModes:
     Attributes
     ----------
     frequencies
-        [Hz], shape (modes,).
+        Natural frequencies [Hz], shape (modes,).
     shapes
         Angle of every disc, shape (discs, modes), the largest of each one.
     rings
@@ -113,13 +122,16 @@ def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
 
 
 def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
-    """Solve K q = (2 pi f)^2 J q in the twists of all links, some of which may have no stiffness (V4)."""
+    """Solve K q = (2 pi f)^2 J q in the twists of all links, some of which may have no stiffness (V4).
+
+    `fixed` are the stiffnesses of the absorbers that do not depend on their swing [N m/rad].
+    """
     ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
     stiff = np.array([*(section.stiffness for section in chain.sections), *fixed])
     twists = np.zeros((len(ends) + 1, len(inertia)))
     for row, (a, b) in zip(twists, ends, strict=False):
         row[a], row[b] = 1.0, -1.0
-    # nothing outside turns it: links pull nothing on the whole
+    # no torque from outside acts on the chain, so that its angular momentum is zero
     twists[-1] = inertia.sum(axis=0)
     angles = np.linalg.inv(twists)[:, :-1]
     mass, has_stiffness = angles.T @ inertia @ angles, stiff > 0.0
@@ -134,7 +146,7 @@ def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalM
     shapes = angles[:, has_stiffness] @ shapes - angles[:, ~has_stiffness] @ (loose @ shapes)
     count = len(chain.discs)
     shapes = shapes / shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
-    # upright at the front
+    # the front disc swings to the positive side
     shapes = shapes * np.where(shapes[0] < -_FREE, -1.0, 1.0)
     return TorsionalModes(1.0 / np.sqrt(inverse[real][::-1]) / math.tau, shapes[:count], shapes[count:])
 
@@ -158,7 +170,7 @@ def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) 
 
 
 def main_orders(engine: Engine, highest: float) -> tuple[float, ...]:
-    """Return the orders in which all cylinders act in phase: multiples of z/2 or z, for any firing order (V7)."""
+    """Return the orders in which all cylinders act in phase, multiples of cylinders over turns of a cycle (V7)."""
     first = len(engine.cylinders) / engine.cycle.turns
     return tuple(k * first for k in range(1, int(highest / first + 1e-9) + 1))
 
@@ -169,7 +181,7 @@ def critical_speed(frequency: float, order: float) -> float:
 
 
 def chain_of(engine: Engine) -> Torsion:
-    """Return the chain of an engine; raise `ModelError` if it has none."""
+    """Return the chain of discs and shafts of an engine; raise `ModelError` if it has none."""
     chain = engine.extra(Torsion)
     if chain is None:
         raise ModelError("twist of the crankshaft needs its discs and shafts; add [torsion]")
@@ -220,13 +232,13 @@ def _throw_torques(
 def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     """Return the twist of every section for one N m on every disc, shape (orders, sections, discs) [rad/(N m)] (V5).
 
-    Of order zero the load takes the torque at its disc, and the sections between them twist. An order on a natural
-    frequency without damping raises `ModelError`.
+    In order zero the load takes the torque at its own disc, and the sections from the driving disc to this one twist.
+    An order on a natural frequency without damping raises `ModelError`.
     """
     count, sections = len(chain.discs), np.arange(len(chain.sections))
     flexibility = np.zeros((len(orders), len(sections), count), dtype=complex)
     is_mean = orders == 0.0
-    # what drives in front of a section goes through it unless the load takes it there
+    # a section carries the torques in front of it, less that of the load if its disc is in front
     through = np.arange(count)[None, :] <= sections[:, None]
     leaves_shaft = (chain.driven <= sections)[:, None]
     stiff = np.array([section.stiffness for section in chain.sections])
@@ -324,7 +336,7 @@ def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -
         angles = np.linalg.solve(dynamic, drives)
     except np.linalg.LinAlgError:
         angles = np.full_like(drives, np.inf)
-    # what answers with that much more than its stiffness allows has nothing but rounding to damp it
+    # a response that is so much larger than stiffness allows is damped by rounding alone
     size = np.abs(angles).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
     undamped = np.flatnonzero(~(size * _SINGULAR <= np.abs(drives).max(axis=(1, 2))))
     if len(undamped):
