@@ -206,7 +206,7 @@ class DesignBoxes:
         return _BalancedLoop(loop, len(lower), *balanced(loop.gain))
 
     def loaded(self, loop: _BalancedLoop, centre: Array) -> _LoadedLoop:
-        """Return the loop under the loads at unbalances `centre` and under those of each column."""
+        """Return the loop under the loads at unbalances `centre`, and under the unit load of each column."""
         loads = self.loads.orders.loads
         fixed = loads[:, :1] + np.einsum("q,wqi->wi", centre, loads[:, 1:])[:, None]
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))

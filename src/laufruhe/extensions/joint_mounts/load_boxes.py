@@ -345,7 +345,7 @@ class _Boxes:
         return LinearResponse(value, slopes, fixed.remainder + rests.sum(axis=0), bends)
 
     def scores(self, bound: LinearBound) -> Array:
-        """Return branching scores, shape (boxes, open numbers)."""
+        """Return branching scores of the sides of each box, shape (boxes, open numbers)."""
         products = np.abs(bound.slopes[:, self._numbers + self.columns :]).reshape(
             len(self.lower), self.columns, self._numbers
         )

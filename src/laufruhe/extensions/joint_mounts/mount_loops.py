@@ -59,7 +59,7 @@ class Loop:
 
 
 class _Signals:
-    """Growing list of channels; a signal has coefficients of motion and feedback, shape (w, rows, 6 + channels)."""
+    """Growing list of feedback channels; a signal has coefficients of motion and channels, (w, rows, 6 + channels)."""
 
     def __init__(self, frequencies: int, maximum: int) -> None:
         self.size, self.owners = (frequencies, 6 + maximum), list[int]()

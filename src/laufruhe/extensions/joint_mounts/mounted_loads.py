@@ -45,7 +45,7 @@ class Pairing:
 
 
 class MountedLoads:
-    """Loads of a problem with open unbalances and open mounts; loads of open throws are separate from the fixed ones.
+    """Loads of a problem with open unbalances and open mounts; loads of open throws are separate from fixed loads.
 
     Attributes
     ----------

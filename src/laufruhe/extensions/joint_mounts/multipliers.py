@@ -47,7 +47,7 @@ def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
 
 
 def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
-    """Return optimal unbalances, or None if the limits contradict each other, and their bound."""
+    """Return optimal unbalances, or None if the limits contradict each other, and a bound with its multipliers."""
     zero = (tuple(np.zeros_like(norm.constant) for _, norm in parts) for parts in (problem.terms, problem.limits))
     x, best = None, lower_bound(problem, Multipliers(*zero))
     for factor in _times(problem):
@@ -90,7 +90,7 @@ def _times(problem: AffineProblem) -> list[int]:
 
 
 def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:
-    """Improve a coarse solution with all samples, from the rows near peaks alone (P10)."""
+    """Improve the unbalances and bound of a coarse program with all samples, by rows near peaks alone (P10)."""
     selected = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
     for _ in range(ROUNDS):
         selected = [

@@ -25,7 +25,7 @@ EARLY = 0.1
 
 
 def corner_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one bound by vertices; a better design at a vertex lowers the value of the question."""
+    """Yield one bound by vertices of boxes of mounts; a better design at a vertex lowers `question.value`."""
     problem = question.problem
     if question.in_batch or question.value == math.inf:
         return

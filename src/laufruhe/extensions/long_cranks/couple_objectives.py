@@ -45,7 +45,7 @@ class StarAmplitudes(AmplitudeObjective):
     """Sum of norms of forces and couples of single orders, with the window of better stars (S3)."""
 
     def upper_bound(self, space: StarSpace) -> float:
-        """Return an upper bound over all stars: all throws act on one side [SI]."""
+        """Return an upper bound over all crank stars, as if all throws acted on one side [SI]."""
         levers = float(np.abs(space.places).sum())
         return sum(
             term.weight * float(np.hypot(np.multiply(term.force, space.throws), np.multiply(term.couple, levers)).sum())
@@ -53,7 +53,7 @@ class StarAmplitudes(AmplitudeObjective):
         )
 
     def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound over all stars: the forces, which depend on the pattern only [SI]."""
+        """Return a lower bound over all crank stars: the forces, which depend on the pattern only [SI]."""
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
@@ -107,7 +107,7 @@ class CoupleTerm:
         return self.weight * values
 
     def plane(self, couples: Array) -> tuple[float, Array]:
-        """Return constant and slope of a linear lower bound that touches the term at these couples (P2)."""
+        """Return constant and slope of a linear lower bound that touches the term at `couples`, (2 orders,) (P2)."""
         rows = self.constant + np.tensordot(couples, self.couples, axes=1)
         z = self.norm.dual_feasible(self.grid, self.norm.subgradient(self.grid, rows))
         return self.weight * float(np.vdot(z, self.constant)), self.weight * np.tensordot(self.couples, z, axes=2)
@@ -154,12 +154,12 @@ class CoupleNorms:
         return constants, np.array([sum(slope for _, slope in parts) for parts in planes])
 
     def upper_bound(self, space: StarSpace) -> float:
-        """Return an upper bound of all stars [SI]."""
+        """Return an upper bound over all crank stars [SI]."""
         levers = float(np.abs(space.places).sum())
         return self.lower_bound(space) + levers * sum(term.weight * float(term.unit_norms.sum()) for term in self.terms)
 
     def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound of all stars: the value without couples (S40) [SI]."""
+        """Return a lower bound over all crank stars: the value without couples (S40) [SI]."""
         del space
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
@@ -248,7 +248,7 @@ class _Spread:
 
     @classmethod
     def from_stars(cls, problem: Problem, space: StarSpace, designs: Sequence[Evaluation]) -> _Spread | None:
-        """Separate the loads of three stars; None if they differ in more than couples."""
+        """Return the separated loads of three crank stars; None if the stars differ in more than couples."""
         base = designs[0].engine.cycle.base_order
         channels = {term.measure.load for term in problem.objective}
         signals = {

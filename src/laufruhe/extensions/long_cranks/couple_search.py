@@ -140,7 +140,7 @@ def _search_piece(
 
 
 def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:
-    """Return stars that no swap of two throws improves; the best one is also improved by rearrangement."""
+    """Return crank stars that no swap of two throws improves; rearrangement improves the best star further."""
     rng, candidates = np.random.default_rng(SEED), list[Stars]()
     for pattern in space.patterns:
         candidates += [*_mirror_stars(pattern, rng), *_block_stars(space, pattern, objective, rng)]
@@ -169,7 +169,7 @@ def _improve_by_swaps(space: StarSpace, objective: CoupleObjective, star: Stars)
 
 
 def swaps(star: Stars) -> Stars:
-    """Return all stars with two steps swapped, never that of the first throw, shape (n, throws)."""
+    """Return all stars with two steps swapped, shape (n, throws); the first throw keeps its step."""
     pairs = np.array(list(itertools.combinations(range(1, len(star)), 2)) or [(0, 0)])
     neighbours, rows = np.repeat(star[None], len(pairs), axis=0), np.arange(len(pairs))
     neighbours[rows, pairs[:, 0]], neighbours[rows, pairs[:, 1]] = star[pairs[:, 1]], star[pairs[:, 0]]

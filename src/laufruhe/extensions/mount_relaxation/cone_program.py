@@ -320,12 +320,12 @@ def _bound(step: _Step) -> tuple[float, Array]:
 
 
 def bounds_ahead() -> AbstractContextManager[Ahead]:
-    """Return the speculative executor for all boxes of one search."""
+    """Return the executor that computes likely bounds ahead, for all boxes of one search."""
     return speculation(_bound, START_SECONDS)
 
 
 class Objectives:
-    """Objectives of one program; each worker has a copy of it, so that all workers return the same bounds."""
+    """Objectives under the constraints of one program, which each worker process copies, so that all bounds agree."""
 
     def __init__(self, program: SdpProgram, ahead: Ahead | None) -> None:
         self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead

@@ -30,7 +30,7 @@ _ROUNDS, _MIN_SCALE, _MAX_SCALE = 10, 1e-4, 1e4
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Rows of one cone.
+    """Cone of consecutive rows of a program.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Cone:
 
 
 class ConeSolver:
-    """Solver of one program for any cost vector.
+    """Solver of one cone program for any cost vector.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class LinearUpperBound:
 
     @property
     def tighter(self) -> LinearUpperBound:
-        """The linear bound, or the constant one if it is smaller at the best design."""
+        """The linear bound, or the constant bound `upper` if that is smaller at the best design."""
         return self if self.at_reference < self.upper else constant_bound(self.upper, self.slopes)
 
     def times(self, factor: float) -> LinearUpperBound:

@@ -123,7 +123,7 @@ class PlaceTerm:
         return (3 if self.is_damped else 2) * len(self.turn_axes)
 
     def force_scaled(self, products: ComplexArray, omega: float) -> ComplexArray:
-        """Return the moments among products, those of dampers scaled to the size of their forces."""
+        """Return the rows of moments among products, with moments of dampers scaled to the size of their forces."""
         count = len(self.turn_axes)
         return np.concatenate([products[count : 2 * count], omega * products[2 * count :]])
 
@@ -287,7 +287,7 @@ class ParameterMaps:
         return np.asarray(axes[pair].T @ centre @ axes[pair]), [spring]
 
     def _plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Any, PlaneStiffness, float]:
-        """Return the key of a plane, its stiffness, and the sign of K12 in these axes."""
+        """Return the key of the plane in which spring `m` turns, its stiffness, and the sign of K12 in these axes."""
         number = kind.start + np.array(pair)
         turns = [(k, j, gain) for k in range(TURNED.start, TURNED.stop) for j, gain in self.drives[m].get(k, [])]
         axis, _, gain = turns[0]
@@ -406,7 +406,7 @@ class PlaneStiffness:
         return (float(along_range[0]), float(along_range[1])), (float(across_range[0]), float(across_range[1])), slope
 
     def contracted(self, box: Array) -> Array | None:
-        """Return the part of a box, shape (3, 2), that holds all possible matrices in it; None if none is possible."""
+        """Return the part of a box, shape (3, 2), that holds all possible matrices of the box; None without one."""
         part, rounding = box.copy(), ROUNDING * float(self.high.max())
         for _ in range(ROUNDS):
             along_range, across_range, slope = self._polar(part)

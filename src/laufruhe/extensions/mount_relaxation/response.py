@@ -96,7 +96,7 @@ class ResponseBound:
 def response_of(
     mounts: OpenMounts, loads: ComplexArray, omega: float, reference_motions: ComplexArray, bound: ResponseBound
 ) -> Response:
-    """Return the response to one order (E42, E52).
+    """Return the response to the load of one order over the box of `mounts` (E42, E52).
 
     Parameters
     ----------

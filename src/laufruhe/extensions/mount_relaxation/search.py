@@ -142,7 +142,7 @@ class SdpRelaxation:
         return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
 
     def contracted(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """Return the box contracted to the plane stiffnesses that are possible in it; None if none is."""
+        """Return the box contracted to the plane stiffnesses that are possible in it; None without possible ones."""
         lower, upper = lower.copy(), upper.copy()
         for key, sides in self._plane_sides():
             part = self._planes[key][1].contracted(np.column_stack([lower[sides], upper[sides]]))

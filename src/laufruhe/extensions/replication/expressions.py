@@ -89,7 +89,7 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
 
 
 def check_name(name: str, known: Collection[str], what: str) -> None:
-    """Raise `ExpressionError` with the nearest name unless a name exists."""
+    """Raise `ExpressionError` with the nearest known name if `name` is not known; `what` is its noun."""
     if name not in known:
         raise ExpressionError(f"'{name}' is no {what} here; {nearest(name, list(known))}")
 
@@ -219,7 +219,7 @@ def _parts(text: str) -> Iterator[tuple[str, str, str]]:
 
 
 def number_of(text: Any, names: Mapping[str, Any]) -> float:
-    """Evaluate an expression; `ExpressionError` also where it is anything but one number."""
+    """Return the number of an expression; raise `ExpressionError` also if the value is not a single number."""
     value = value_of(text, names)
     try:
         return float(value)

@@ -18,7 +18,10 @@ _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
 def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Return coordinates of a dataset along statements and readings (values of names): printed, ours, verdict, why."""
+    """Return coordinates of a dataset along statements and readings: printed, ours, verdict and why.
+
+    `readings` are the values of names in each reading (interpretation) of the source.
+    """
     if not statements:
         return {}
     verdicts = []
@@ -40,7 +43,7 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
-    """Judge a statement; `names` has our value as `value`."""
+    """Return the verdict on a statement; `names` are values by name, with the computed value as `value`."""
     if statement.printed is None:
         return BEYOND
     if statement.holds is not None:

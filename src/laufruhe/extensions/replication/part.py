@@ -131,7 +131,7 @@ class Replication(Part):
         return tables if like is None else joined(self._tables(like, scenes, name, *parents), tables)
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return every quantity of one scene, at its optimum if something is open."""
+        """Return every quantity of one point of the study, at its optimum if numbers are open."""
         problem, case = scenes.problem(point), _case(point)
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
@@ -159,7 +159,7 @@ class Replication(Part):
             return data.assign_coords(judge_statements(self.statements, self.names(data)))
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
-        """Return the names of expressions in each reading: numbers, quantities by case, definitions."""
+        """Return the values of names in each reading: numbers, quantities by case, and definitions."""
         names, known = [str(name) for name in data.data_vars if "point" in data[name].dims], {}
         for reading, numbers in self._all_readings().items():
             part = data.isel(point=np.flatnonzero(data["reading"] == reading))

@@ -54,14 +54,14 @@ class Labelled(NamedTuple):
 
 
 def check_quantity(what: str | QuantityQuery) -> None:
-    """Raise `ExpressionError` with the nearest name unless a quantity exists."""
+    """Raise `ExpressionError` with the nearest known name if a quantity does not exist."""
     name = what if isinstance(what, str) else what.quantity
     if not name.startswith(DECISION):
         check_name(name, [*RESULTS, *MEASURES], "quantity")
 
 
 def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
-    """Return a quantity of a case's design [SI]; `ModelError` if this engine has none of it."""
+    """Return a quantity of the final design of a case [SI]; raise `ModelError` if its engine lacks the quantity."""
     table = QuantityQuery(quantity=what) if isinstance(what, str) else what
     name = table.quantity
     if name in RESULTS:

@@ -19,7 +19,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the share of random assemblies below each objective, with lines at the best, the given and the mean one."""
+    """Draw the share of random assemblies below each objective; lines show the best, given and mean assembly."""
     details, objective = result.details, result.objective
     if not isinstance(details, AssemblyResult) or objective is None:
         raise ValueError("no parts were chosen")

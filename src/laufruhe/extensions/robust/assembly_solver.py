@@ -95,7 +95,7 @@ def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluat
 
 
 def _walk(problem: Problem, lots: Sequence[Lot], start: Chosen, bound: float, seconds: float) -> Chosen | None:
-    """Return an assembly below a bound that a walk by exact evaluations finds; None if it finds none."""
+    """Return an assembly below `bound` that a walk by exact evaluations finds in some seconds; None without one."""
     random, deadline = np.random.default_rng(walk.SEED), time.thread_time() + seconds
     best_known, best_evaluation, minimum, queue = start, _evaluated(problem, lots, start), math.inf, [start]
     for _ in range(walk.MAX_EVALUATIONS):

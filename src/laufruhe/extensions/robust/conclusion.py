@@ -233,7 +233,7 @@ def _priced_tolerances(
 def infeasible_robust_result(
     problem: Problem, initial_worst: WorstEngines, conflict: tuple[str, ...], timing: dict[str, float]
 ) -> Result:
-    """Return the result without a feasible design; limits have their values in the worst engines of the initial one."""
+    """Return the result without a feasible design; limits have their values in the worst initial engines."""
     result = infeasible_result(problem, evaluate(problem), conflict, timing)
     return replace(result, limits=_limits_in_the_worst_case(problem, result.limits, initial_worst, {}))
 

@@ -67,7 +67,7 @@ class StudyTolerancesTable(Table):
         return self
 
     def of(self, engine: Engine) -> Tolerances:
-        """Return the tolerances of an engine, one for each cause with a size above zero.
+        """Return the tolerances of an engine, one for each cause of error with a size above zero.
 
         Balancing planes stand from the first throw to the last. Aligned masses stand at the last throw, where power is
         taken off (C3).
@@ -220,7 +220,7 @@ class ToleranceStudy(Part):
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return the record of one engine, as `spread` does."""
+        """Return the record of the free forces of one engine, with the keys of `spread`."""
         return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:

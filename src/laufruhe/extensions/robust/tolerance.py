@@ -66,7 +66,7 @@ class AddedDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with one more rotor."""
+        """Return the drawing with a further rotor that has the error."""
         return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, self.rotor(error))))
 
     def rotor(self, error: complex) -> Rotor:
@@ -155,7 +155,7 @@ class Error:
 
     @property
     def is_affine(self) -> bool:
-        """True if all loads are affine in it."""
+        """True if all loads are affine in this error."""
         return all(drive.is_affine for drive in self.drives)
 
 
@@ -256,7 +256,7 @@ class Tolerances:
         return all(error.is_affine for error in self.errors)
 
     def scaled(self, name: str, factor: float) -> Tolerances:
-        """Return the tolerances with one of them times a factor."""
+        """Return the tolerances with the tolerance `name` times a factor."""
         return Tolerances(tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.tolerances))
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
@@ -293,7 +293,7 @@ class Robust(Extra):
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
-        """Return the name of the objective, with the engines that it covers."""
+        """Return the name of the objective, with the engines that the objective covers."""
         share, engines = self.population.share, self.population.engines
         if share is not None:
             return f"{name}, {100.0 * share:g} % of engines below"

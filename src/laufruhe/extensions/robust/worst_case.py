@@ -61,7 +61,7 @@ class WorstCase:
 
 
 def value_at(terms: Terms, errors: Array) -> float:
-    """Return the weighted sum of the norms at these errors."""
+    """Return the weighted sum of the norms at errors of shape (columns,)."""
     return sum(weight * norm.value(errors) for weight, norm in terms)
 
 
@@ -119,7 +119,7 @@ class _Node:
 
 
 class _ErrorSearch(BranchAndBound[_Node]):
-    """Branch and bound over errors; it minimises the negative sum."""
+    """Branch and bound over errors, which minimises the negative sum of norms."""
 
     what, reports_bounds = "boxes of errors", False
 
@@ -318,7 +318,7 @@ class _TermAbout:
         return min(bound, self.weight * kind.value(grid, longest[:, None]))
 
     def value(self, sizes: Array) -> float:
-        """Return the weighted norm of rows of these lengths, shape (k,); 0 if the norm needs more than lengths."""
+        """Return the weighted norm of rows of lengths `sizes`, shape (k,); 0 if the norm needs more than lengths."""
         kind = self.norm.norm
         return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.is_monotone_in_lengths else 0.0
 
@@ -326,7 +326,7 @@ class _TermAbout:
 def _over_majorants(
     parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[ErrorBlock]
 ) -> tuple[float, Array]:
-    """Return an upper bound of the quadratic majorants over all local numbers, and the point of it, shape (n,).
+    """Return an upper bound of the quadratic majorants over all local numbers, and its maximum point, shape (n,).
 
     The ends of up to MAX_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
     bounded one by one.
@@ -421,7 +421,7 @@ def _signs(count: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Reach:
-    """Change of the rows by a block, shape (k, d, w), its maximum for each row, shape (k,), and rise of the norm."""
+    """Change of rows by a block: `move`, (k, d, w), its maximum per row `rows`, (k,), and rise `size` of the norm."""
 
     move: Array
     rows: Array

@@ -40,7 +40,7 @@ class RunBoxes:
 
     @property
     def cost(self) -> int:
-        """Work of one box, as a count of numbers."""
+        """Work of one box, as a count of the numbers that its motion has."""
         sides, n = len(self._model.lower), 2 * self._matrices.base.size
         columns = 1 + sides + len(pairs_of(sides))
         return len(self._rows) * sum(run.sweep.count // run.times for run in self._runs) * columns * n

@@ -32,7 +32,7 @@ _AT_ONCE, BLOCK = 20_000, 64
 
 @dataclass(frozen=True)
 class Sweep:
-    """Steps of one run.
+    """Equal time steps of a run-up or shut-down at constant acceleration.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class RunResponse:
 
 
 class LinearRun:
-    """Steps of one run for a mounting, under any loads."""
+    """Motion of a block on its mounts over the time steps of one run, under any loads."""
 
     def __init__(self, model: TimeModel, sweep: Sweep) -> None:
         self.model, self.sweep = model, sweep

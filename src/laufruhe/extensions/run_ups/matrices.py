@@ -33,7 +33,7 @@ class RunMatrices:
 
     @cached_property
     def motion(self) -> LinearMaps:
-        """Stiffness, loss and damping of E25 and E26."""
+        """Matrices of stiffness, loss and damping in the equation of motion (E25, E26)."""
         drag = self.base.damping.copy()
         drag[:6, :6] = self._lowest("damping")
         position = Linear(self.base.stiffness, self._square("stiffness").slopes)
@@ -51,7 +51,7 @@ class RunMatrices:
 
     @cached_property
     def uneven_loss(self) -> LinearMaps:
-        """Loss less that of the common loss factor."""
+        """Loss matrix less the common loss factor times stiffness."""
         loss, stiffness = self.motion.lossy, self._square("stiffness")
         lowest = loss.lowest - self.loss_factor * stiffness.lowest
         slopes = loss.slopes - self.loss_factor * stiffness.slopes
@@ -59,7 +59,7 @@ class RunMatrices:
         return LinearMaps(zero, Linear(lowest, slopes), zero)
 
     def maps_of(self, measure: Measure) -> Rows:
-        """Return the maps of a measure, place by place, and the count of rows for each place."""
+        """Return the maps from motion to the signal of a measure, place by place, and the count of rows per place."""
         no_drag = np.zeros_like(self.base.drag)
 
         def at_rest(forces: Array) -> Array:

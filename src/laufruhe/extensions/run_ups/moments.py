@@ -21,7 +21,7 @@ MOMENTS = 14
 
 @dataclass(frozen=True, eq=False)
 class LongSteps:
-    """Long steps, each of several short ones.
+    """Loads of a run in long time steps, each of several short steps.
 
     Attributes
     ----------
@@ -37,7 +37,7 @@ class LongSteps:
 
 
 class RunMoments:
-    """Moments of one run in long steps, each of several short ones.
+    """Moments of the loads of one run in long time steps, each of several short steps.
 
     Parameters
     ----------

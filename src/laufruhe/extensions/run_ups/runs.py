@@ -105,7 +105,7 @@ def _cached_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run:
 
 
 def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Sweep | None:
-    """Return equal steps of a run, `coarser` times as long as for a final evaluation; None if they are too many."""
+    """Return equal time steps of a run, `coarser` times as long as in a final evaluation; None if too many."""
     fastest = max(first, last) * HIGHEST
     needed_steps = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
     if needed_steps > COARSEST * MAX_STEPS:

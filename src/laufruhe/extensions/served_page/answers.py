@@ -46,7 +46,7 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Source:
-    """The problem file as last read, and a hash of the content of the files that it names."""
+    """Tables of the problem file as last read, and a hash of the content of the files that it names."""
 
     tables: Mapping[str, Any]
     path: Path

@@ -21,7 +21,7 @@ EVERY = 0.4
 
 
 class FileWatcher:
-    """A problem file and every file that it names, polled while it is served; `InputError` if it is not valid."""
+    """Watcher that polls a problem file and all files that it names; `InputError` if the file is not valid at first."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

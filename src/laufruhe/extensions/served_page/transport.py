@@ -155,7 +155,7 @@ class HttpRequest(BaseHTTPRequestHandler):
             self._send(HTTPStatus.OK, self.server.files[path], f"{kind}; charset=utf-8")
 
     def do_POST(self) -> None:
-        """Compute for a client with the token; exchange a ticket for it."""
+        """Compute an answer for a client with the token, or exchange a ticket for the token."""
         guard = self.server.guard
         refusal = guard.refusal("POST", self._headers())
         if refusal:
@@ -176,7 +176,7 @@ class HttpRequest(BaseHTTPRequestHandler):
         return {name: values[0] if len(values) == 1 else "?" for name, values in headers.items() if values}
 
     def _body(self) -> Any:
-        """Return the request's JSON; None after refusing it."""
+        """Return the JSON of the request; None after a refusal."""
         length = self.headers.get("Content-Length", "")
         if self.headers.get("Transfer-Encoding") is not None or not length.isdecimal() or len(length) > 9:
             return self._refused(HTTPStatus.LENGTH_REQUIRED, "the length of the request is missing")

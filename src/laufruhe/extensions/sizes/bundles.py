@@ -109,7 +109,7 @@ class GroupedRows:
 
     @classmethod
     def from_rows(cls, lengths: RodSeries, z: Array) -> GroupedRows:
-        """Return the groups for multipliers of a piece, with the initial factors."""
+        """Return the groups for multipliers `z` of the rows of a piece, with the initial factors."""
         price = lengths.piece.affine.dual_norm(z)
         rows_of_columns = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
         products = z[:, :, None] * rows_of_columns

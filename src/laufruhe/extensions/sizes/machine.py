@@ -137,7 +137,7 @@ class RunningGear(Extra):
     throws: tuple[tuple[str, complex], ...] = ()
 
     def part(self, name: str) -> Webs | Shank | PistonPin | Bolts:
-        """Return one of its parts; raise ModelError if it is missing."""
+        """Return a part of the running gear by its name; raise ModelError if the part is missing."""
         part: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
         if part is None:
             raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")

@@ -70,7 +70,7 @@ class Piece:
         return replace(self.affine, constant=self.affine.constant * ratios, slope=self.affine.slope * ratios[..., None])
 
     def ratios(self, factors: Sequence[Array]) -> Array:
-        """Return the ratio of other factors to the initial ones for each row, shape (k, 1 or d)."""
+        """Return the ratio of factors at other sizes to the initial factors for each row, shape (k, 1 or d)."""
         parts = zip(factors, self.initial_factors, self.positions, strict=True)
         return np.concatenate([np.repeat(factor / initial, rows, axis=0) for factor, initial, (_, _, rows) in parts])
 
@@ -141,7 +141,7 @@ class SizeModel:
 
     @property
     def moves_rod(self) -> bool:
-        """True if the rod length is open; loads are not affine in it."""
+        """True if the rod length is open; loads are not affine in the rod length."""
         return ROD_LENGTH in self.names
 
     @property
@@ -192,7 +192,7 @@ class SizeModel:
     def factors(
         self, positions: Sequence[tuple[int, int | None, int]], measure: Measure, engine: Engine
     ) -> list[Array]:
-        """Return the factors at the positions of a piece, shape (places, 1 or d) each; [] without places."""
+        """Return the factors of sizes at the positions of a piece, shape (places, 1 or d) each; [] without places."""
         if not positions:
             return []
         chosen_places, rows = measure.places(measure.load.places(engine)), []
@@ -220,7 +220,7 @@ class SizeModel:
         return samples * (max(math.ceil(FINE / samples), 1) if self._averages(measure) else measure.norm.refinement)
 
     def pieces_over_length(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
-        """Return a function from a rod length to the pieces of a measure, with the same rows at each length."""
+        """Return a function from a rod length [m] to the pieces of a measure, with the same rows at each length."""
         length = self._sizes_given[ROD_LENGTH]
         if not measure.is_load:
             return lambda rod_length: self._new_pieces(measure, rod_length)
@@ -230,7 +230,7 @@ class SizeModel:
         return lambda rod_length: self._new_pieces(measure, rod_length, kinks)
 
     def fixed_rows(self, measure: Measure) -> list[Mask]:
-        """Return masks of the rows of each piece whose samples no kink passes as the rod length changes."""
+        """Return masks of the rows of each piece of a measure that no kink passes as the rod length changes."""
         pieces = self.pieces_over_length(measure)(self._sizes_given[ROD_LENGTH])
         if not measure.is_load:
             return [np.ones(len(piece.affine.constant), dtype=bool) for piece in pieces]
@@ -258,7 +258,7 @@ class SizeModel:
         ]
 
     def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
-        """Return the pieces of a measure at a rod length, by default the initial one; the largest is its value."""
+        """Return the pieces of a measure (rows with common factors) at a rod length; the largest is its value."""
         length = self.problem.engine.slider_cranks[0].rod_length if rod_length is None else rod_length
         cache, key = self._pieces.setdefault(length, {}), (measure, self._averages(measure))
         if key not in cache:
@@ -283,7 +283,7 @@ class SizeModel:
         return masses.min(axis=0), masses.max(axis=0)
 
     def _unit_evaluations(self, length: float) -> list[Evaluation]:
-        """Return evaluations without gear masses and unbalances, then with one unit of each column."""
+        """Return evaluations at a rod length [m]: without masses and unbalances, then with one unit of each column."""
         if length not in self._evaluations:
             problem, unbalances = self.problem, self.problem.unbalances
             engine = problem.design([0.0] * len(unbalances), unbalances)
@@ -303,7 +303,7 @@ class SizeModel:
     def _new_pieces(
         self, measure: Measure, length: float, kinks_at: Sequence[Array] | None = None
     ) -> tuple[Piece, ...]:
-        """Return the pieces at a rod length, with all rows if the angles of kinks are given."""
+        """Return the pieces of a measure at a rod length [m], with all rows if the angles of kinks are given."""
         evaluations, problem = self._unit_evaluations(length), self.problem
         if not measure.is_load:
             masses = [mass_rows(measure, unit.engine.rotors, unit.engine.slider_cranks) for unit in evaluations]

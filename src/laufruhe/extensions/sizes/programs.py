@@ -61,7 +61,7 @@ class SizePrograms:
     def multipliers_of(
         self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False
     ) -> CombinedMultipliers | None:
-        """Return multipliers from a box's program, or None if they bound nothing."""
+        """Return multipliers from the cone program of a box, or None if they bound nothing."""
         program = self.program(lower, upper, reach)
         x, multipliers = self._propose(program, exactly)
         if x is None and not exactly:
@@ -113,7 +113,7 @@ class SizePrograms:
         return CombinedMultipliers(tuple(parts), constant, size, not rows.terms)
 
     def minimum(self, multipliers: CombinedMultipliers, lower: Array, upper: Array, reach: SizeReach) -> float:
-        """Return the lower bound of a box from multipliers; infinite if they exclude it."""
+        """Return the lower bound of a box from multipliers; infinite if they prove the box infeasible."""
         if not multipliers.parts:
             return 0.0
         total, remainder, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))

@@ -63,7 +63,7 @@ class RodSeries:
         return replace(self.piece.affine, constant=constant, slope=np.tensordot(shares, self.slope, axes=1))
 
     def scaled(self, factors: Sequence[Array]) -> RodSeries:
-        """Return the series with other factors of its rows."""
+        """Return the series with the factors of other sizes."""
         ratios = self.piece.ratios(factors)
         remainder = self.remainder * float(np.abs(ratios).max(initial=0.0))
         return replace(self, constant=self.constant * ratios, slope=self.slope * ratios[..., None], remainder=remainder)

@@ -53,7 +53,7 @@ def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 
 def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the forces of bearings next to each throw [N], from its piece of shaft, shape (n, 2 cylinders, 3) (Z4)."""
+    """Return the forces of the bearings beside each throw by loads between them [N], (n, 2 cylinders, 3) (Z4)."""
     shares: list[Callable[[float], float]] = []
     for part in engine.slider_cranks:
         front, rear = _span(engine, part)
@@ -145,7 +145,7 @@ def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
 
 
 def gear_of(engine: Engine) -> RunningGear:
-    """Return the running gear of an engine; raise ModelError if it has none."""
+    """Return the running gear of an engine; raise ModelError if the engine has none."""
     gear = engine.extra(RunningGear)
     if gear is None:
         raise ModelError("a measure needs sizes of the running gear; add [running_gear]")

@@ -65,7 +65,7 @@ class TwistCoordinates:
         return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
 
     def ends(self, lower: Array, upper: Array, resonance: Resonance) -> tuple[Torsion, Torsion] | None:
-        """Return the chains with the lowest and the highest modes in a box; None if no corner has them (V15)."""
+        """Return the chains with the lowest and the highest modes in a box; None if they are not at corners (V15)."""
         absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
         falls = np.zeros(len(lower), dtype=bool)
         for k, keys in enumerate(self._keys):

@@ -102,7 +102,7 @@ def is_twisted(result: Result) -> bool:
 
 
 def speed_range(result: Result) -> tuple[float, float]:
-    """Return the shown speed range [rad/s]: that of the file, or one around the operating points."""
+    """Return the speed range of tables and pictures [rad/s]: of the file, or around the operating points."""
     limits = chain_of(result.final.engine).speeds
     speeds = [point.speed for point in result.problem.points]
     return limits or (_SLOWEST * min(speeds), _FASTEST * max(speeds))

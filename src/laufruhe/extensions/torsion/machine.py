@@ -87,7 +87,7 @@ class ShaftSection:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
 
     def moved(self, stiffness: float, diameter: float | None) -> ShaftSection:
-        """Return the section with another stiffness, or another diameter of its one piece and its stiffness."""
+        """Return the section with another stiffness, or with another diameter and the stiffness of this diameter."""
         if diameter is None or diameter == self.diameter or self.length is None:
             return replace(self, stiffness=stiffness)
         stiffness = stiffness_of([(self.length, diameter, self.bore)], self.shear_modulus)
@@ -200,7 +200,7 @@ class Torsion(Extra):
 
     @property
     def numbers(self) -> dict[tuple[str, str], Any]:
-        """Numbers that decisions may move, by the name of a disc, section or absorber and that of its attribute."""
+        """Numbers that decisions may change, by the names of a disc, section or absorber and of its attribute."""
         numbers: dict[tuple[str, str], Any] = {(disc.name, "inertia"): disc.inertia for disc in self.discs}
         for part in self.sections:
             numbers |= {(part.name, "stiffness"): part.stiffness, (part.name, "diameter"): part.diameter}
@@ -211,7 +211,7 @@ class Torsion(Extra):
     def moved(
         self, changes: Mapping[tuple[str, str], float], before: Sequence[SliderCrank], after: Sequence[SliderCrank]
     ) -> Self:
-        """Return the chain with changes of its numbers, and other pistons and rods in place of those of its discs."""
+        """Return the chain with changes of its numbers, and with the pistons and rods `after` in place of `before`."""
         chain = self
         if changes:
             numbers = {key: value + changes[key] if key in changes else value for key, value in self.numbers.items()}

@@ -287,7 +287,7 @@ def times(twisted: Spectrum, factors: Factors, chain: Torsion, speed: float) -> 
 
 
 def unit_factors(chain: Torsion, orders: Array, _: float) -> ComplexArray:
-    """Return one for every order and section: the factor of the twist itself."""
+    """Return the factor one for every order and section, so that the load is the twist itself."""
     return np.ones((len(orders), len(chain.sections)), dtype=complex)
 
 
