@@ -32,12 +32,15 @@ from laufruhe.problem.problem import Problem
 
 ONE_ORDER = 4.0 / math.pi
 """Largest ratio of the norm of one order of a signal to that of the signal."""
+# phases of a couple that are tried, and halvings of the bound of a couple
 PHASES, HALVINGS = 16, 24
 SMALL, SHORT = 0.01, 0.1
 """Share of the constant part, and lever [m], of the couples at which linear bounds touch the objective."""
 ALIASES = 1.1
-"""Safety factor of orders that shifts by firing intervals do not separate from the one of the window."""
+"""Safety factor of orders that shifts by firing intervals do not separate from the order of the window."""
+# relative differences of loads that count as none: between stars, and of the loads of one order
 _SAME, _NEGLIGIBLE = 1e-9, 1e-13
+# most numbers of rows that are computed at once
 _AT_ONCE = 1 << 22
 
 
@@ -263,7 +266,7 @@ class _Spread:
         rest: dict[LoadChannel, list[Spectrum]] = {}
         units: dict[LoadChannel, list[ComplexArray]] = {}
         used = np.zeros(len(orders), dtype=bool)
-        # what shifts by firing intervals change
+        # orders that shifts by firing intervals change
         fired = np.arange(count) % len(designs[0].engine.cylinders) > 0
         places = np.array(orders, dtype=np.intp) * per_turn
         for channel, by_design in signals.items():
@@ -276,7 +279,7 @@ class _Spread:
                 shared[places] -= unit * sums[0][:, None, None]
                 third, size = shared.copy(), float(np.abs(star_loads[0]).max(initial=0.0))
                 third[places] += unit * sums[2][:, None, None]
-                # nothing but couples has other orders than the firing's, and couples give the third star
+                # couples alone have other orders than firing, and give the loads of the third star
                 if (
                     np.abs(third - star_loads[2]).max() > _SAME * size
                     or np.abs(shared[fired]).max(initial=0.0) > _SAME * size

@@ -30,6 +30,7 @@ WORTH_SHARING = 20_000_000
 """Number of arrangements of halves from which workers share the search (fifteen throws, two seconds)."""
 LARGEST_WORK = 400_000_000
 """Largest number of arrangements of halves (sixteen throws, half a minute of one core)."""
+# pieces of the divisions of a pattern, and most pieces in a round
 PIECES, MAX_AT_ONCE = 64, 16
 STARTS, BLOCK_STARS = 12, 1500
 """Number of starting stars of each kind, and of stars in groups from which the best are selected."""

@@ -108,7 +108,7 @@ def _evaluate_stars(
         realised = phasing.realise(family.candidate(phasing, steps))
         design = evaluate(realised)
         value, fine = objective_value(realised, design), with_fine_sampling(design)
-        # a search at more angles closes what these leave open of a mean (P7)
+        # at more angles the bound of a mean is closer to the mean over the cycle (P7)
         shared = firing_bound(problem, fine)
         gap = gap_of(objective_value(problem, fine), max(bound, shared), numerical_zero(problem, design.engine))
         bound = max(bound, firing_bound(problem, design))

@@ -129,7 +129,7 @@ def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iter
 
 
 def _pairs(first: Indices, counts: Indices) -> Iterator[tuple[Indices, Indices]]:
-    # for every right number, `counts` left numbers from `first`, in blocks
+    # pairs of each right index with `counts` left indices from `first` on, in blocks
     ends, start = np.cumsum(counts), 0
     while start < len(counts):
         before = int(ends[start - 1]) if start else 0

@@ -55,6 +55,7 @@ _SETTINGS = {
 # seconds spent on relaxations after which worker processes start; shorter searches need none
 START_SECONDS = 0.25
 
+# kinds of cones
 ZERO, SIDES, LENGTH, MATRIX = "zero", "nonnegative", "second order", "semidefinite"
 _Step: TypeAlias = tuple[str, bytes, Array | int]
 Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]

@@ -24,7 +24,7 @@ from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
 from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.numerics.arrays import Array
 
-# diagonal shifts to try for convexity, over the largest eigenvalue
+# diagonal shifts that may make a matrix convex, and eigenvalue that counts as zero, over the largest eigenvalue
 _SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 1.1, 0.25)])
 _FLAT = 1e-13
 

@@ -40,7 +40,7 @@ LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 MAX_RELAXED, AHEAD = 100, 3
 # further first gaps, and most relaxations, where odd multiples loosen the bound of a mean: halving gains little
 FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 40
-# first relative gap of a design that is one of many, because bounds of the others limit the total bound
+# first relative gap of one design of many: bounds of the other designs limit the total bound
 IN_BATCH = 0.04
 # smallest score of a side to narrow, over the largest score; smallest gain of a round, over the missing bound
 MIN_SCORE, PROGRESS = 0.1, 0.1

@@ -209,7 +209,7 @@ def _lengths(rows: ComplexArray) -> Array:
 
 
 def _product_bounds(mounts: OpenMounts, motion: float, deflections: Array) -> Array:
-    # upper bounds of the products from those of motion and of deflections, shape (products,)
+    # upper bounds of the products from upper bounds of motion and of deflections, shape (products,)
     turn = motion * float(np.linalg.norm(mounts.turns, 2))
     kinds = _largest(mounts, "elastic"), _largest(mounts, "viscous")
     bounds = [np.full(spring.axes.shape[1], spring.largest * deflections[spring.mount]) for spring in mounts.springs]
@@ -268,7 +268,7 @@ def _motion_bound(mounts: OpenMounts, loads: ComplexArray, omega: float) -> floa
     loss = mounts.loss_at(omega)
     uniform_loss = float((mounts.losses + omega * mounts.lags).min()) * max(mounts.lowest, 0.0) * np.eye(mounts.size)
     if not mounts.dynamic:
-        # all of A has at least the smallest loss factor of its springs
+        # the whole stiffness has at least the smallest loss factor of its springs
         loss = max(loss, uniform_loss + omega * mounts.damping, key=lambda matrix: float(np.linalg.eigvalsh(matrix)[0]))
     dynamic_stiffness = mounts.dynamic.impedance(np.array([omega]), mounts.root.T)[0].real
     highest = mounts.highest + max(float(np.linalg.eigvalsh(dynamic_stiffness)[-1]), 0.0)

@@ -17,6 +17,8 @@ from laufruhe.present.pictures import rows_of
 if TYPE_CHECKING:
     import xarray as xr
 
+# width of a group of bars; over the largest bar: distance of a number from its bar, least bar with a number inside,
+# and least number that is not written as 0
 GROUP, ABOVE, MIN_INSIDE, MIN_SHOWN = 0.84, 0.012, 0.055, 1e-6
 DIGITS = 3
 BAR = 0.31

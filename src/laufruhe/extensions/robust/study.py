@@ -36,7 +36,9 @@ from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, statement_table
 
+# samples of a turn, and random engines that are computed at once
 ANGLES, PIECE = 360, 500
+# norm of free forces, and relative gap of their worst case
 MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
 CAUSES = ("reciprocating masses", "unbalance", "alignment")
 SHARES = np.arange(201) / 200.0

@@ -28,6 +28,7 @@ from laufruhe.prove.witness import THIN, Witness
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
 """Weights, and norms as functions of the errors."""
 
+# relative rise that counts as rounding, and most nodes of branch and bound
 ROUNDING = 1e-12
 MAX_NODES = 5000
 STARTS, CLIMBS = 12, 30

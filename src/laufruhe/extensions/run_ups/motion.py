@@ -30,7 +30,7 @@ from laufruhe.prove.mounts.box_response import BoxModel
 
 # phase of the fastest motion in a long step [rad]: target, and largest for which the moments suffice
 REACH, FARTHEST = 0.35, 1.0
-# smallest stiffness of a restrained motion, over that of the stiffest
+# smallest stiffness of a restrained motion, over the largest stiffness
 MIN_STIFFNESS = 1e3 * FREE_STIFFNESS
 # condition number of the modes above which the exact model takes no steps in modes
 MAX_CONDITION = 1e8
@@ -234,7 +234,7 @@ def _between(
     )
     sizes = [np.linalg.norm(matrix[..., :-1], axis=-2) for matrix in (middle, first, second)]
     grown = np.exp(matrix_norm * step)
-    # sizes within a step, then those of derivatives
+    # bounds of states within a step, then of their derivatives
     middle_size = grown * (sizes[0] + impulses)
     first_size = grown * (sizes[1].sum(axis=1) + step * first_norm * middle_size)
     second_size = grown * (sizes[2].sum(axis=1) + step * (first_norm * first_size + second_norm * middle_size))

@@ -28,6 +28,7 @@ from laufruhe.solvers.cones.unbalances import smallest_conflict
 FEW_ANGLES = 48
 """Number of samples over the period of the loads, if the problem uses more."""
 TIMES = 2
+"""Samples at which an optimum is evaluated, over samples of its program."""
 _FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 

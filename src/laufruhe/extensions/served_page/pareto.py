@@ -15,6 +15,7 @@ from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 
 POINTS = 25
+"""Points of a front."""
 _USUAL = ("maximum mount force", "mean mount force", "rms shaking force", "rms rocking couple", "counterweight mass",
           "balancer mass", "maximum main-bearing force")  # fmt: skip
 _NARROW = 1e-3

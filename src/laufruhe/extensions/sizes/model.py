@@ -31,6 +31,7 @@ from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_ro
 from laufruhe.problem.problem import Problem
 
 T = TypeVar("T")
+# masses that sizes add, and most entries of a cache
 MASSES, MAX_KEPT = 4, 4096
 FINE = 1440
 """Fewest samples at which the means of bounds are averaged."""

@@ -30,6 +30,7 @@ from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_opti
 
 STARTS, RANKED_STARTS = 2, 6
 """Local searches, and start designs that are ranked for them."""
+# relative tolerance of the start without mounts
 ROUGH_TOLERANCE = 1e-2
 MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
 

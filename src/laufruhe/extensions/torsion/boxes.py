@@ -258,7 +258,7 @@ class TwistBoxes:
         # each factor follows its own stiffness, convex or concave: `bend` bounds the error of the secant
         turn, bend = 0.5 * (high - low), np.abs(centre - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
-        # in coordinates of the discs, along the direction of its stiffness
+        # slopes in coordinates of the discs, along the stiffness of each section
         slopes = owners * turn[:, None] * twisted[chosen]
         answer = mapped(twist, (centre * scaled[chosen])[None], excitation.along.along(slopes)[None])
         if not bend.any():
@@ -306,7 +306,7 @@ class TwistBoxes:
         if ends is None:
             return False
         low, high = (resonance.numbers(chain) for chain in ends)
-        # counted from the highest; the low corner may have fewer
+        # modes count from the highest; the chain at the low corner may have fewer
         low, high = low[::-1], high[::-1][: len(low)]
         broken = (low > limit.maximum * (1.0 + SLACK)) | (high < limit.minimum * (1.0 - SLACK))
         if limit.outside is not None:

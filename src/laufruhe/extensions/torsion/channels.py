@@ -21,7 +21,7 @@ DIAMETERS = Need(
     "give one in [torsion]",
 )
 HIGHEST = 12.0
-"""Order up to which main orders count where none are named."""
+"""Highest main order that counts if a measure names no orders."""
 
 
 def _of_shafts(
@@ -83,4 +83,4 @@ FACTORS: Mapping[Channel, physics.Factors] = {
 }
 """Factors from the twist of a section to the load at each place."""
 RESONANCES: Mapping[Channel, Resonances] = {TORSIONAL_FREQUENCIES: _at_speeds, CRITICAL_SPEEDS: _in_orders}
-"""Speeds and orders that natural modes are counted at."""
+"""Functions that return the crank speeds or orders at which natural modes are computed, by channel."""

@@ -32,6 +32,7 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, load_rows
 from laufruhe.solvers.result import Result
 
+# speeds of a curve; ends of the speed range, over the slowest and the fastest operating point; steps of bisection
 SPEEDS = 120
 _SLOWEST, _FASTEST = 0.3, 1.25
 _HALVINGS = 10
@@ -175,7 +176,7 @@ def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: flo
 def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
     """Return a function that tests at a speed [rad/s] if the limit is broken, for the load of any of its points."""
     counted = [load for load in design.loads if limit.measure.includes_point(load.point)]
-    # points that differ in their speed alone are one
+    # operating points that differ in speed alone count as one
     loads = {load.point.gas: load for load in counted}.values()
 
     def at(speed: float) -> bool:

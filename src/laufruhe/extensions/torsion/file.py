@@ -24,9 +24,9 @@ from laufruhe.problem.problem import Problem
 
 T = TypeVar("T")
 
-# that a response over speed takes seconds for
+# most discs beside the throws: a response over speed then takes seconds
 MAX_DISCS = 60
-# share by which the inertia of discs may differ from what is given of all that turns: numbers are written rounded
+# relative difference of the inertia of discs from the given rotating inertia, because files have rounded numbers
 _ROUNDED = 0.01
 Inertias: TypeAlias = Annotated[list[float], ListOrSingle(Annotated[float, Number("kg m^2", minimum=0.0)])]
 TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", minimum=0.0)]

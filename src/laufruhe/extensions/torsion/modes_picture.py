@@ -82,7 +82,7 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
                 size = LARGEST * math.sqrt(weights / largest)
                 axes.plot(speed * RPM, frequency, "o", color=colour, markersize=size, zorder=5, alpha=0.85)
     axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
-    # over the names of orders
+    # above the names of orders
     mark_points(axes, result, lift=0.24)
 
 
