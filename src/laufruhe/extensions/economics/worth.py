@@ -1,7 +1,7 @@
 """Which shafts are worth building: fronts, the rules, argued once, and what a source says held against them.
 
-Every point of a front is a whole solve: a mass limit costs no more than an unlimited design, each comes
-with its own certificate on the exact model, and the price of the limit says what the next kilogram is worth.
+Every point of a front is a whole solve, which takes no longer with a mass limit than without. Each point has its own
+certificate on the exact model, and the price of the limit is the worth of the next kilogram.
 
 The economics are the study's own (Hasselgruber 1964, Massenausgleich): shafts are justified
 by comparison with the engine of one more cylinder, and by what they change at the mounts.
@@ -9,13 +9,13 @@ by comparison with the engine of one more cylinder, and by what they change at t
 W1  Indistinguishable forces. Two forces closer than `NEGLIGIBLE` look alike in the bars by
     which the study judges.
 W2  What is noticed. A fall of twice that, `NOTICEABLE`, stands out in the same bars.
-W3  A set of shafts is worth building if it takes off a noticeable share of the least force
-    that any smaller number of shafts leaves, and if the engine then runs smoother than the
-    plain engine with one more cylinder at equal power, by more than W1. Otherwise the
+W3  A set of shafts is worth building on two conditions. It takes off a noticeable share of the
+    least force with fewer shafts. And the engine then runs smoother, by more than W1, than the
+    plain engine with one more cylinder at equal power. Otherwise the
     smaller number of shafts, or the cylinder, is the better purchase.
 
-All forces are proven optima of sizes and angles, so no other sizes of the same shafts change a
-verdict, but where a share is closer to its threshold than the gap of the proof.
+All forces are proven optima of sizes and angles. So no other sizes of the same shafts change a verdict, unless a share
+is closer to its threshold than the gap of the proof.
 """
 
 from __future__ import annotations

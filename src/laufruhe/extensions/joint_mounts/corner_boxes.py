@@ -1,7 +1,7 @@
 """Lower bounds over boxes of mounts with any unbalances, by multipliers at the vertices of boxes (E69).
 
 Multipliers Z_k at the mounts of vertex k bound the objective for all unbalances, and on other mounts this bound is
-affine in the unbalances too (P4). Multilinear weights b_k(s) >= 0 with sum one mix the multipliers of all vertices, for
+affine in the unbalances too (P4). Multilinear weights b_k(s) >= 0 with sum one mix the multipliers of all vertices. For
 a norm N of the rows V at numbers s of the mounts and unbalances u:
 
     N(V(s, u)) >= sum_k b_k(s) <Z_k, V(s, u)> = a(s) + g(s) . u

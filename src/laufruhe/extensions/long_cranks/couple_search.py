@@ -219,8 +219,8 @@ def _block_stars(
 def _blocks(phases: int, rng: np.random.Generator) -> Indices:
     """Return the throw on each step for a star of even groups (S47).
 
-    Blocks of q neighbours stand evenly; which of them is on step p depends on p modulo P / q' alone, so that only
-    orders that q or q' divides have a couple, and those of q only as the star of the blocks has it.
+    Blocks of q neighbours stand evenly. The throw of a block on step p of P depends on p modulo P / q' alone. So only
+    orders that q or q' divides have a couple. Orders that q divides have it only if the star of the blocks has it.
     """
     primes = _primes(phases)
     if not primes:

@@ -1,6 +1,6 @@
 """Natural modes required by limits of decoupling (E56).
 
-A motion of the block has a natural mode of its own if an eigenvector v of the stiffness matrix A, A v = l v, has
+Let v be an eigenvector of the stiffness matrix A, A v = l v. A motion of the block has this natural mode of its own if
 a' v b' v >= s |v|^2. Here a and b are displacement and momentum of the motion (E7); s is its least share of kinetic
 energy. Scaled to b' v = 1, these v are a ball: v = V (1, w) with |w| <= 1. For a fixed v the designs with this mode are
 a convex set, because A(s) v = l v is linear in the shared numbers s_j and in l. So boxes are divided over w as well as

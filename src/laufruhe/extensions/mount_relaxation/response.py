@@ -4,8 +4,8 @@ An open stiffness adds the force t = kappa(s) u to that of the middle, where u i
 an open place s h sees s h (theta x e) more of the block's turn theta, and has the further moment s h e x f. An open
 damper adds i W t at angular frequency W, t = (C - C(c)) u; if it follows an open stiffness, it adds i W b t. The
 variables w are these products: t, s theta and s f, with f without loss and the forces of dampers over i W each by
-itself. With the dynamic stiffness D(c) at the middle c of the box, the load r0, and its change R u by unbalances u, the
-motion y of the block has
+itself. Let D(c) be the dynamic stiffness at the middle c of the box, and R u the change of the load r0 by unbalances u.
+The motion y of the block has
 
     D(c) y = r0 + R u - (terms linear in w)                                                 (E42)
 

@@ -1,8 +1,9 @@
 """Maps of a block on its mounts in time over boxes of stiffness, with the viscous damping of E26 (E65).
 
-A signal of the motion y is P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the
-stiffness A of the block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero to infinity. In the modes
-of the middle of a box, with E the difference of A from its value there and w the natural frequencies,
+A signal of the motion y is P y + (L S + D) y', with P, L and D linear in the stiffnesses. S = A^{-1/2} is the inverse
+square root of the stiffness A of the block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero to
+infinity. In the modes of the middle of a box, with E the difference of A from its value there and w the natural
+frequencies,
 
     S_ab = 1/w (a = b) + f[a,b] E_ab + sum_c f[a,c,b] E_ac E_cb - ...                              (E65)
 

@@ -1,7 +1,7 @@
 """Moments of the loads of a run over long steps, valid for any mounting (E65).
 
-Under z' = A z + B p(t), with the state z and the wrench p, a step of length H ends at e^{A H} z + sum_k A^k B m_k,
-where m_k is the integral of (H - s)^k / k! p(s) over the step. The wrench p is given by the polynomials of the exact
+Under z' = A z + B p(t), with the state z and the wrench p, a step of length H ends at e^{A H} z + sum_k A^k B m_k. The
+moment m_k is the integral of (H - s)^k / k! p(s) over the step. The wrench p is given by the polynomials of the exact
 model for its short steps (E28a). With enough moments, long steps end exactly where the short ones do.
 """
 

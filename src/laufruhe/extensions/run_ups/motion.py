@@ -1,7 +1,7 @@
 """Motion of run-up and shut-down over boxes of stiffness: two orders in their sides, and a remainder (E65).
 
-With d from -1 to 1 in each side of a box, the state z has z' = A z + B p(t) with A = A0 + sum d_j A_j + sum d_j d_k
-A_jk + rest, and p the loads of the exact model. Motion at the middle and its orders solve
+With d from -1 to 1 in each side of a box, the state z has z' = A z + B p(t). Here A is A0 + sum d_j A_j + sum d_j d_k
+A_jk + rest, and p are the loads of the exact model. The motion z0 at the middle and its orders solve
 
     z0' = A0 z0 + B p,   z_j' = A0 z_j + A_j z0,   z_jk' = A0 z_jk + A_j z_k + A_k z_j + A_jk z0     (j < k)
 
