@@ -76,9 +76,10 @@ class InOrder:
         return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
 
     def share(self, absorber: Absorber) -> float | None:
-        """Return the ratio of effective to own inertia: 1 / (1 - h^2/n^2) for a pendulum.
+        """Return the ratio of effective to own inertia: 1 for a ring, 1 / (1 - h^2/n^2) for a pendulum.
 
-        It is 0 if the order equals the tuning of the pendulum, so that the disc stands still.
+        It is 0 if the order equals the tuning of the pendulum, so that the disc stands still. A pendulum with a spring
+        has no such ratio, and None is returned.
         """
         if not absorber.order:
             return 1.0
@@ -124,7 +125,7 @@ def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
 def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
     """Solve K q = (2 pi f)^2 J q in the twists of all links, some of which may have no stiffness (V4).
 
-    `fixed` are the stiffnesses of the absorbers that do not depend on their swing [N m/rad].
+    `fixed` are the stiffnesses of the absorbers in these modes [N m/rad].
     """
     ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
     stiff = np.array([*(section.stiffness for section in chain.sections), *fixed])
