@@ -150,7 +150,7 @@ BAD = [
     bad("throws and order differ in number", "[1, 3, 4, 2]", "[1, 3, 2]",
         "engine.throws: gives 4 cylinders, but engine.firing_order gives 3; make"),
     bad("throws and cylinders differ in number", "[0, 180, 180, 0]", "[0, 180, 180, 0]\ncylinders = 5",
-        "engine.firing_order: gives 4 cylinders, but engine.cylinders gives 5; make them agree"),
+        "engine.firing_order: gives 4 cylinders, but engine.cylinders gives 5; make the two numbers agree"),
     bad("a throw too few", "[0, 180, 180, 0]", "[0, 180, 180]",
         "engine.throws: gives 3 cylinders, but engine.firing_order"),
     bad("bounds reversed", '["0 kg", "3 kg"]', '["3 kg", "0 kg"]',
@@ -172,7 +172,8 @@ BAD = [
     bad("names of some mounts", "[mounts]", "[mounts]\nnames = [\"a\"]",
         'mounts.names = ["a"]: names 1 of 4 mounts; name each once'),
     bad("mounts of no stiffness", "[mounts]", "[mounts]\nrelative_stiffness = [0, 0, 0]",
-        "mounts.relative_stiffness = [0.0, 0.0, 0.0]: carries nothing; give one a value"),
+        "mounts.relative_stiffness = [0.0, 0.0, 0.0]: is zero in every direction; "
+        "give one direction a value above zero"),
     bad("coupled to nobody", 'to = "left"', 'to = "lefty"',
         'balancer_shafts[2].unbalances[1].coupled.to = "lefty": is no unbalance defined before this '
         "one; did you mean 'left'?"),

@@ -151,7 +151,7 @@ def test_no_star_of_the_eighteen_has_less_couple() -> None:
         ("reversed_crank = 1", "reversed_crank = 4", "is no crank of a triangle; give 1, 2 or 3"),
         ("reversed_crank = 1", "crank_leads = [20]", "engine.crank_leads: has 1 angles"),
         ('crank_distance = "1.1 m"', "", "engine.crank_distance: is missing"),
-        ('"1.1 m"', '"0.8 m"', "no chamber: their pins meet"),
+        ('"1.1 m"', '"0.8 m"', "because their pins meet"),
         ("reversed_crank = 1", 'reversed_crank = 1\nthrows = [{ between = [0, 60] }]', "allows uneven firing"),
     ],
 )  # fmt: skip

@@ -233,7 +233,11 @@ class TestOpposedPistons:
                 "is beyond the ports, which are open for 110 deg",
             ),
             ("crank_lead = 12\nport_arc = 110", "crank_lead = 95", "dead centres 95 deg apart; bring them within 90"),
-            ('"640 mm"', '"480 mm"', "leaves cylinder 1 upper and cylinder 1 no chamber: their pins meet"),
+            (
+                '"640 mm"',
+                '"480 mm"',
+                "leaves no chamber between cylinder 1 upper and cylinder 1, because their pins meet",
+            ),
             ("rod_ratio = 0.25", "rod_ratio = 1.25", "blocks the crank"),
         ],
     )

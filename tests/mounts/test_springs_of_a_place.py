@@ -189,7 +189,7 @@ JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness =
     ("more", "told"),
     [
         (JOINED.replace('"front left"', '"pad"'), 'joined_to = "pad": is no mount defined before'),
-        (JOINED + 'position = ["0 mm", "0 mm", "0 mm"]', "is that of 'front left' already"),
+        (JOINED + 'position = ["0 mm", "0 mm", "0 mm"]', "is already given by mount 'front left'"),
         (JOINED + JOINED.replace('"pad"', '"shim"').replace('"front left"', '"pad"'), "joined to another mount itself"),
         (JOINED + 'damping_per_stiffness = "-1 ms"', "damping_per_stiffness"),
         (JOINED + "damping_per_stiffness = 0.001", "has no unit"),

@@ -121,7 +121,7 @@ def test_a_share_is_decided_with_unbalances_and_proven(twin: tuple[Problem, Resu
          "the sum 1.1"),
         ({"geared_inertias": [{"name": "a", "share": 1.2}]}, "must be at most 1"),
         ({"geared_inertias": [{"name": "a", "share": 0.5, "ratio": 0}]}, "almost a standing shaft"),
-        ({"engine": {**tables_of(PROBLEMS / "tractor-single.toml")["engine"], "throws": "open"}}, "need given throws"),
+        ({"engine": {**tables_of(PROBLEMS / "tractor-single.toml")["engine"], "throws": "open"}}, "need fixed throws"),
     ],
 )  # fmt: skip
 def test_bad_shares_are_one_line(more: Any, said: str) -> None:

@@ -105,7 +105,7 @@ def test_motoring_line() -> None:
     ("loads", "fuel", "rule"),
     [
         ([1.0, 2.0], [1.0, 2.0], "take 3 points"),
-        ([1.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.1, 3.0], "stands there twice"),
+        ([1.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.1, 3.0], "is given twice"),
         ([1.0, 2.0, 3.0], [3.0, 2.0, 1.0], "does not rise"),
         ([1.0, 2.0, 3.0], [0.5, 2.0, 3.5], "no friction"),
     ],
@@ -177,7 +177,7 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
     ("rows", "old", "new", "said"),
     [
         ("1750, 20, 2\n1750, 60, 3\n", "", "", "has 2 rows at 1750 rpm, the speed of pulling, and a fit needs 3"),
-        (ROWS.replace("1750, 60", "1750, 20"), "", "", "one load stands there twice"),
+        (ROWS.replace("1750, 60", "1750, 20"), "", "", "one load is given twice"),
         ("1750, 20, 9\n1750, 60, 6\n1750, 90, 5\n", "", "", "does not rise with the load"),
         ("1750, 20, 0.5\n1750, 60, 3.0\n1750, 90, 5.7\n", "", "", "no friction"),
         ("1750, 20, 2.2\n1750, 60, 3.0\n1750, 90, 6\n", "", "", "friction"),

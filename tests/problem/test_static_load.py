@@ -119,7 +119,7 @@ def test_the_key_of_a_file_narrows_a_measure(tmp_path) -> None:
     problem = load(path)
     assert problem.objective == with_loads(load(FOUR), alternating=True).objective
     path.write_text(text.replace("alternating = true", "alternating = true\norders = [0, 2]"))
-    with pytest.raises(InputError, match="contains 0, which alternating leaves out"):
+    with pytest.raises(InputError, match="contains order 0, which alternating leaves out"):
         load(path)
     path.write_text(text.replace("mean mount force", "added mass"))
     with pytest.raises(InputError, match="alternating"):

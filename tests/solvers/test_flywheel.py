@@ -306,7 +306,7 @@ def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
     text, _ = explained(path, 1e-3)
     assert "gas: without" in text
     assert "crank speed: without" in text
-    with pytest.raises(InputError, match="no cheap model is traded"):
+    with pytest.raises(InputError, match="cheap models are not compared"):
         traded([path], Path("nowhere"), lambda _: None)
 
 

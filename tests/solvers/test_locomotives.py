@@ -111,5 +111,5 @@ def test_turned_to_the_other_side_of_the_track() -> None:
 
 def test_axles_hang_over_at_both_ends_and_nothing_else_does() -> None:
     text = (PROBLEMS / "locomotive-two-cylinder.toml").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match="beside all bearings"):
+    with pytest.raises(InputError, match="on one side of all bearings"):
         laufruhe.load(text.replace('x = "0.75 m"', 'x = "-1.2 m"', 1))

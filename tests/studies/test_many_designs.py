@@ -178,7 +178,7 @@ def test_a_full_disk_is_one_line_and_the_study_goes_on(tmp_path: Path, monkeypat
 
     with monkeypatch.context() as patched:
         patched.setattr(Regions, "keep", full)
-        with pytest.raises(SolverError, match=r"No space left on device.*make room and the same command goes on"):
+        with pytest.raises(SolverError, match=r"No space left on device.*make room, and the same command goes on"):
             computed(tmp_path / "1", keys)
     store = xr.open_zarr(tmp_path / "1/out.zarr", group="p", consolidated=False, chunks=None)
     assert int(np.any(store["done"].values, axis=2).sum()) == 3

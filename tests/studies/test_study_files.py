@@ -102,7 +102,7 @@ BAD = [
      "study.common.nummbers"),
     (REPLICA.replace("{m} kg", "{m} mm"), "'mm' is not a unit of a mass"),
     (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
-    (REPLICA.replace('within = "5 %"', ""), "needs is and within together; give both"),
+    (REPLICA.replace('within = "5 %"', ""), "needs `is` and `within` together; give both"),
     (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by is and within, or by holds"),
     (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
     (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),

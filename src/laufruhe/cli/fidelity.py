@@ -71,8 +71,8 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in open_kinds(problem)]
     if len(of_wheels) == len(read):
-        rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
-        raise refused("flywheel", "", rule, "fix it", of_wheels[0][0])
+        rule = "is open, and cheap models are not compared for an open flywheel"
+        raise refused("flywheel", "", rule, "fix the flywheel", of_wheels[0][0])
     paths, problems = zip(
         *((path, problem) for path, problem in read if Kind.FLYWHEEL not in open_kinds(problem)), strict=True
     )

@@ -36,7 +36,7 @@ def needs(problem: Problem) -> Choice:
     parts = [*_loads(problem)] if _moved(initial, _values(replace(problem, points=()))) else []
     if not parts:
         part = "loads at every speed: gas, pistons, rods, rotors"
-        left.append(OmittedPart(part, "nothing that is asked depends on them"))
+        left.append(OmittedPart(part, "no objective or limit depends on them"))
     for name, changed in (*parts, *_of_the_block(problem)):
         change = _moved(initial, _values(changed))
         if change > SAME:
@@ -44,7 +44,7 @@ def needs(problem: Problem) -> Choice:
                 f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %"
             )
         else:
-            left.append(OmittedPart(name, "nothing that is asked depends on it"))
+            left.append(OmittedPart(name, "no objective or limit depends on it"))
     if {measure.channel for measure in problem.measures if measure.is_mounting} == {channels.SAG}:
         mounting = mounting_in(problem.engine)
         drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))

@@ -63,7 +63,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
         if table.shaft not in shafts:
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with cranks", nearest(table.shaft, list(shafts)))
         if table.friction is not None and table.diameter is None:
-            rule = "rubs on a journal whose diameter is missing"
+            rule = "needs the diameter of the journal, which is missing"
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
         name = table.name or str(k)
         size = [None if value is None else Open.from_value(value).start for value in (table.diameter, table.width)]
@@ -91,10 +91,12 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
     # throws must lie between bearings, except a single overhung throw and the two end cranks of an axle
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
-        raise Refused("main_bearings", None, rule, "give it two at least")
+        raise Refused("main_bearings", None, rule, "give the shaft two bearings at least")
     places, first, last = sorted({part.x for part in parts}), min(bearings), max(bearings)
     is_axle = len(bearings) == len(places) == 2 and places[0] < first and last < places[1]
     for part in parts if len(places) > 1 and not is_axle else ():
         if not first < part.x < last:
-            rule = f"leaves the throw of {part.name} at x = {units.quantity_text(part.x, 'm')} beside all bearings"
-            raise Refused("main_bearings", None, rule, "put one on its other side")
+            rule = (
+                f"leaves the throw of {part.name} at x = {units.quantity_text(part.x, 'm')} on one side of all bearings"
+            )
+            raise Refused("main_bearings", None, rule, "put a bearing on its other side")

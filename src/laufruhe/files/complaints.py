@@ -174,7 +174,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         return Complaint(where, value_text(value), "is not allowed", remedy)
     if kind in _COUNTED:
         sense, key, remedy = _COUNTED[kind]
-        rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} belong there"
+        rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} are allowed"
         return Complaint(where, value_text(detail["input"]), rule, remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None

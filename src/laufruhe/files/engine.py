@@ -210,7 +210,7 @@ def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: boo
     for k, part in enumerate(parts):
         for previous in parts[:k]:
             if part.faces(previous) and minimum_room(part, previous) <= 0.0:
-                rule = f"leaves {part.name} and {previous.name} no chamber: their pins meet"
+                rule = f"leaves no chamber between {part.name} and {previous.name}, because their pins meet"
                 raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
     with errors_at_key("engine"):
         return with_shared_chambers(parts, cycle_of(table).angle) if gas else tuple(parts)
@@ -249,7 +249,7 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
     for key, other_count in counts:
         if other_count != count:
             rule = f"gives {counted(other_count, 'cylinder')}, but engine.{first} gives {count}"
-            raise Refused(f"engine.{key}", None, rule, "make them agree")
+            raise Refused(f"engine.{key}", None, rule, "make the two numbers agree")
     check_order(table.listed_order, count)
     mechanism, rod = _mechanism(table, numbers)
     return LayoutInput(cycle_of(table), count, mechanism, numbers | rods, order, table.piston_mass, rod, gas)

@@ -62,7 +62,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
     require_one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
     if table.rim is None:
         if table.crankshaft_inertia is not None:
-            rule = "needs a rim; inertia is that of all that turns"
+            rule = "needs a rim, because without one the inertia includes all rotating parts"
             raise Refused("flywheel.crankshaft_inertia", None, rule, "leave it out")
         numbers = [("inertia", "kg m^2", Open.from_value(table.inertia))]
         wheel, first = Flywheel(numbers[0][2].start), 0

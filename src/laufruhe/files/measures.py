@@ -189,7 +189,7 @@ class MeasureContext:
                 rule = f"contains {order:.10g}, and orders of this cycle are multiples of {base}"
                 raise Refused(f"{where}.orders", table.orders, rule, f"did you mean {multiple:g}?")
         if table.alternating and 0.0 in (table.orders or ()):
-            rule = "contains 0, which alternating leaves out"
+            rule = "contains order 0, which alternating leaves out"
             raise Refused(f"{where}.orders", table.orders, rule, "remove 0, or alternating")
 
     def _check_masses(self, measure: Measure, of: list[str] | None, where: str) -> None:
@@ -209,7 +209,7 @@ class MeasureContext:
                 radius_of(rotor)
             except ModelError:
                 rule = f"counts the mass of '{rotor.name}', which has no radius"
-                raise Refused(where, measure.name, rule, "give it one") from None
+                raise Refused(where, measure.name, rule, "give it a radius") from None
 
 
 def _why_stray(key: str, channel: Channel) -> str:
@@ -325,7 +325,7 @@ def _limit(table: ConstraintTable, where: str, context: MeasureContext) -> Limit
     if table.outside is not None:
         first, last = (_bound(text, measure, f"{where}.outside") for text in table.outside)
         if not first < last:
-            raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
+            raise Refused(f"{where}.outside", table.outside, "has its ends reversed", "write the lower frequency first")
         band = first, last
     upper, lower = math.inf if high is None else high, -math.inf if low is None else low
     return Limit(table.name or measure.name, measure, upper, lower, band)

@@ -206,7 +206,12 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
             prefix = f"places[{k}]." if place.relative_stiffness else ""
-            raise Refused(f"mounts.{prefix}relative_stiffness", stiffness, "carries nothing", "give one a value")
+            raise Refused(
+                f"mounts.{prefix}relative_stiffness",
+                stiffness,
+                "is zero in every direction",
+                "give one direction a value above zero",
+            )
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
             values = _values(table, place, key, where, "add it, or mirror_of")
@@ -287,7 +292,7 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
     for k, (_, amount, second) in enumerate(rows, 1):
         if by_angle and not 0.0 <= second < 180.0:
             rule = f"has a loss angle of {second:g} deg in row {k}"
-            raise Refused(f"{where}.file", table.file, rule, "give it from 0 to 180, or set columns")
+            raise Refused(f"{where}.file", table.file, rule, "give loss angles from 0 to 180 deg, or set columns")
         value = amount * np.exp(1j * math.radians(second)) if by_angle else complex(amount, second)
         values.append(complex(unit * value))
     with errors_at_key(f"{where}.file", table.file):
@@ -303,7 +308,7 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
     if leader is None:
         return None
     number = _number_before(leader, names[:k], f"{where}.{'like' if place.like else 'mirror_of'}")
-    refuse_keys(place, _followed(place), where, f"follows '{leader}' already", "leave one out")
+    refuse_keys(place, _followed(place), where, f"is already taken from mount '{leader}'", "leave one out")
     return number
 
 
@@ -323,7 +328,7 @@ def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: st
     if names[first] != leader:
         remedy = f"name that one, '{names[first]}'"
         raise Refused(f"{where}.joined_to", leader, "is joined to another mount itself", remedy)
-    refuse_keys(place, (_AT,), where, f"is that of '{leader}' already", "leave one out")
+    refuse_keys(place, (_AT,), where, f"is already given by mount '{leader}'", "leave one out")
     return first
 
 

@@ -126,7 +126,7 @@ def display_path(path: Path) -> Path:
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
-        rule = "need given throws, and engine.throws is open"
+        rule = "need fixed throws, but engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or leave geared_inertias out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
@@ -299,7 +299,7 @@ def _check_decisions(problem: Problem) -> None:
     """Raise `Refused` for open numbers without effect or objective, too many, or that rename operating points."""
     decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
     if len(decisions) > MAX_OPEN:
-        remedy = "fix some, or couple some to others"
+        remedy = "fix some numbers, or couple some to others"
         raise Refused(decisions[MAX_OPEN].name, None, f"is open in addition to {MAX_OPEN} other numbers", remedy)
     for decision in decisions:
         if not decision.has_effect:

@@ -138,7 +138,9 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
     nonlinear = [d.name for d in problem.decisions if not d.is_affine]
     nonlinear += ["throws or firing order"] if problem.phasing is not None else []
     if nonlinear:
-        raise ModelError(f"many designs at once differ in unbalances alone; fix {', '.join(nonlinear)}")
+        raise ModelError(
+            f"designs that are evaluated together may differ in unbalances alone; fix {', '.join(nonlinear)}"
+        )
     model = AffineModel(problem, whole_cycle=not prune)
     affine = model.at(model.full_samples if prune else problem.fidelity.samples)
 

@@ -287,7 +287,9 @@ class ThrowWaves:
         )
         count = len(self.parts) * len(self.orders) * fixed.constant.size
         if count > MAX_NUMBERS:
-            raise ModelError(f"{2e-6 * count:.0f} million numbers at once")
+            raise ModelError(
+                f"the load waves of all throws take {2e-6 * count:.0f} million numbers, too many for memory"
+            )
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
         for coefficients, part in zip(waves, self.parts, strict=True):
             if measure.is_load or (measure.is_mass and part.cylinder is None):

@@ -96,7 +96,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
     if len(set(pins)) > 1:
-        raise NoEvenStarError("open throws need throws that are alike; use layout inline or vee")
+        raise NoEvenStarError("open throws need throws of one kind; use layout inline or vee")
     steps, maximum, pin = lattice.steps, lattice.slots.count(0), pins[0]
     # last place whose throws load each step; a step that is not full after it stays so
     last = {(step - p) % steps: p for p in range(steps) for step in pin}
@@ -118,8 +118,8 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     patterns = tuple(grow([], [0] * steps, len(layout.throw_positions)))
     if not patterns:
         raise NoEvenStarError(
-            f"no star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one throw "
-            f"{' and '.join(f'{360.0 * s / steps:g}' for s in pin)} deg apart"
+            f"no crank star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one "
+            f"throw {' and '.join(f'{360.0 * s / steps:g}' for s in pin)} deg apart"
         )
     return patterns
 

@@ -147,7 +147,8 @@ class PressureTrace:
         check_pressures(self, "crankcase_pressure")
         if len(self.angles) != len(self.pressures):
             raise ModelError(
-                f"the trace has {len(self.angles)} angles and {len(self.pressures)} pressures; give a pair a point"
+                f"the trace has {len(self.angles)} angles and {len(self.pressures)} pressures; "
+                "give one pressure for each angle"
             )
         if len(self.angles) < 4:
             raise ModelError(

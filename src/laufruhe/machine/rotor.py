@@ -151,7 +151,7 @@ class GearedInertia:
 
     def __post_init__(self) -> None:
         if self.ratio == 0.0:
-            raise ModelError(f"geared inertia '{self.name}' has ratio 0: what stands still takes no part")
+            raise ModelError(f"geared inertia '{self.name}' has ratio 0: it stands still, so it has no effect")
         if not 0.0 <= self.share <= 1.0:
             raise ModelError(f"geared inertia '{self.name}' has a share of {self.share:g}; it lies between 0 and 1")
 

@@ -86,7 +86,10 @@ def cluster(address: str) -> Iterator[Executor]:
     except (OSError, ValueError, TypeError) as error:
         reason = str(error).partition(":")[0] or type(error).__name__
         complaint = Complaint(
-            "--scheduler", address, f"does not answer ({reason})", "name a running one, as dask scheduler says it"
+            "--scheduler",
+            address,
+            f"does not answer ({reason})",
+            "name the address that a running dask scheduler prints",
         )
         raise InputError("laufruhe", (complaint,)) from None
     try:

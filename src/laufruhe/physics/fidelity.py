@@ -78,7 +78,7 @@ class Fidelity:
         if self.gas_orders is not None and not (self.gas and self.gas_orders >= 1):
             raise ChoiceError("gas_orders", self.gas_orders, "needs gas, and must be at least 1", "leave it out")
         if not self.crank_inertia > 0.0:
-            raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give kg m2")
+            raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give an inertia in kg m2")
         if self.is_uneven and self.kinematics != "exact":
             rule = "needs exact kinematics"
             raise ChoiceError("crank_inertia", self.crank_inertia, rule, "leave kinematics out")

@@ -100,7 +100,7 @@ def _line(x: Sequence[float], y: Sequence[float], what: str) -> tuple[float, flo
     places = sorted(x)
     size = max(abs(places[0]), abs(places[-1]))
     if any(b - a <= SAME * size for a, b in pairwise(places)):
-        raise ModelError(f"one {what} stands there twice; give the mean of what was measured at it")
+        raise ModelError(f"one {what} is given twice; give the mean of its measured values")
     # about the middle, where level and slope are independent of each other
     middle, readings = float(np.mean(x)), np.asarray(y, dtype=float)
     centred = np.asarray(x, dtype=float) - middle

@@ -77,7 +77,7 @@ def _attainable(limit: AttainableLimit, lead: str) -> str:
     if value == bound or limit.proof == Proof.GLOBAL:
         text = f"the {minimum} value of '{limit.name}' is {value}, which is proven"
     elif limit.proof == Proof.WITHIN_GAP:
-        text = f"{best}; none is {beyond} than {bound}"
+        text = f"{best}{none}"
     else:
         text = f"{best}, a local optimum{none if limit.bound > 0.0 else ' without a proof'}"
     ended = " Its search ended at the time limit; raise it." if limit.ended else ""
@@ -126,7 +126,7 @@ def why_star(result: Result) -> str:
     if not differences:
         return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < NO_CHANGE else ""
     if gain < NO_CHANGE:
-        return f"Star {k} is as good."
+        return f"Star {k} is as good as star 1."
     text = f"Star 1 beats star {k} by {share(gain, 3)}."
     text += f" Its throws leave a smaller {' and '.join(less)}." if less else ""
     lead = "It leaves" if less else "Its throws leave"

@@ -75,13 +75,13 @@ def run(
                 if answer.mark != mark:
                     where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
                     rule = f"'{todo[mark][1]}' had other files, another Laufruhe or other libraries {where}"
-                    remedy = "have the same everywhere, and the same command goes on"
+                    remedy = "install the same versions and files everywhere, and the same command goes on"
                     raise SolverError(f"{rule}, so its answer is not kept; {remedy}")
                 try:
                     store[mark].keep(mark, answer.seconds, answer.record)
                 except OSError as error:
                     why = f"a point cannot be kept ({error.strerror or error})"
-                    remedy = "finished points are, make room and the same command goes on"
+                    remedy = "finished points are kept; make room, and the same command goes on"
                     raise SolverError(f"{why}; {remedy}") from None
                 say(total - len(todo) + count, total)
         datasets, seconds = {}, {}

@@ -61,7 +61,7 @@ class Scenes:
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
             if name not in tables:
-                rule = "is left out by the study and is not there"
+                rule = "is left out by the study but does not exist"
                 raise self.refused(case, name, rule, nearest(name, list(tables)))
             del tables[name]
         with self.named(case):

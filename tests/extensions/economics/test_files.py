@@ -93,7 +93,7 @@ BAD_ECONOMICS = [
     ('says = "noticeable"', 'says = "noticable"', "did you mean 'noticeable'"),
     ('says = "noticeable"', 'says = "better", against = "second"', "compares 'first order' with 'second'"),
     ('name = "five cylinders"', 'name = "first order"', "two engines called 'first order'"),
-    ("inline-five.toml", "tractor-two.toml", "is there, and 'five cylinders' is compared without"),
+    ("inline-five.toml", "tractor-two.toml", "are present, but 'five cylinders' is compared without"),
     ("inline-five.toml", "tractor-single.toml", "no more cylinders"),
     ("inline-five.toml", "two-stroke-five.toml", "differ in cycle and gas, so"),
     ('inline-five.toml"', 'inline-five.toml"\nset = { "engine.stroke" = "110 mm" }', "differ in stroke"),

@@ -292,7 +292,7 @@ def test_what_cannot_be_drawn_is_told_in_a_line(panel: dict[str, Any], said: str
 @pytest.mark.parametrize("more", [{"value": "y['a']", "is": 1, "within": 0}, {"holds": "y['a'] > 1"},
                                   {"is": "y['a']", "within": 0}, {"holds": "x", "why": "{y:.1f}"}])  # fmt: skip
 def test_statements_are_judged_by_single_numbers(more: dict[str, Any]) -> None:
-    with pytest.raises(ExpressionError, match="is no single number; take one of them"):
+    with pytest.raises(ExpressionError, match="is no single number; take one of its numbers"):
         _judged(**more)
 
 
@@ -317,5 +317,5 @@ def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
 @pytest.mark.parametrize("like", ["a", "b", ["a"], 3])
 def test_a_problem_like_itself_is_refused_before_anything_is_computed(like: Any) -> None:
     part = _part(problems={"a": {"like": "b"}, "b": {"like": like}}, cases=[{"name": "c", "problem": "a"}])
-    with pytest.raises(ModelError, match="is like itself, or is no name; correct a like"):
+    with pytest.raises(ModelError, match="refers to itself by `like`, or `like` is no name; correct `like`"):
         part.points(Scenes(PROBLEMS))

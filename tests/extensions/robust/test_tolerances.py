@@ -157,8 +157,8 @@ def test_grades(tmp_path: Path) -> None:
         (" ± 1 %", '[robust]\nover = "40 %"\n', "neither the worst case nor a share"),
         (" ± 1 %", '[robust]\nover = "99.9 %"\nengines = 100\n', "leaves none"),
         ("", '[tolerances]\nresidual_unbalance = "G 6.3"\n', "is missing, and a grade needs the mass of the rotor"),
-        ("", '[tolerances]\nresidual_unbalance = "6.3"\n', "neither a grade nor an unbalance"),
-        ("", '[tolerances]\nrotor_mass = "60 kg"\n', "needs a grade"),
+        ("", '[tolerances]\nresidual_unbalance = "6.3"\n', "neither a balance grade nor an unbalance"),
+        ("", '[tolerances]\nrotor_mass = "60 kg"\n', "needs a balance grade"),
         ("", shaft("s", 2, "0 mm", 'unbalance = { between = ["0 kg m", "1 kg m"], tolerance = "1 g" }'), "percent"),
     ],
 )

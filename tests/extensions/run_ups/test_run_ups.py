@@ -63,7 +63,7 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     ("run", "rule"),
     [
         ("", "needs elastic mounts that an engine is run up on"),
-        (RUN.replace("up_to", 'operating_point = "sprint"\nup_to'), "is none here"),
+        (RUN.replace("up_to", 'operating_point = "sprint"\nup_to'), "is no operating point of this problem"),
         (RUN.replace('"0.5 s"', '"0 s"'), "must be more than"),
     ],
 )

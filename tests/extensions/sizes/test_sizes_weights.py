@@ -213,7 +213,11 @@ def test_the_best_star_is_the_best_of_all_stars_each_with_its_sizes() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "rule"),
     [
-        ('throws = "open"', "throws = [0, { between = [100, 200] }, { between = [100, 200] }, 0]", "open sizes need"),
+        (
+            'throws = "open"',
+            "throws = [0, { between = [100, 200] }, { between = [100, 200] }, 0]",
+            "open sizes of the running gear need",
+        ),
         ("cylinders = 4", "cylinders = 8", "more than 60 stars"),
     ],
 )

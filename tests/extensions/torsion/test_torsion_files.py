@@ -64,7 +64,7 @@ def test_one_number_for_each() -> None:
         ({"throw_inertia": ["1 kg m^2"] * 4}, "has 4 numbers for 5 throws"),
         ({"absorbers": [{"name": "d", "on": "pulley", "damping": "2 N m s/rad"}]}, "absorbers[1].inertia: is missing"),
         ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "0 kg m^2"}]}, "must be more than 0 kg m^2"),
-        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "leaves its ring to nothing"),
+        ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "then nothing holds the ring"),
         ({"absorbers": [{"name": "d", "on": "puley", "inertia": "1 kg m^2"}]}, "did you mean 'pulley'"),
         ({"output": "gearbox"}, "is no disc"),
         ({"throw_inertia": {"between": ["0.01 kg m^2", "0.001 kg m^2"]}}, "has its bounds reversed"),
@@ -125,7 +125,7 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
     for more, said in (
         (both, "differs from the 0.1831 kg m^2 that the discs of [torsion] have without pistons and rods"),
         ({"fidelity": {"crank_inertia": "1 kg m^2"}}, 'fidelity.crank_inertia = "1 kg m^2": differs from'),
-        (free, "flywheel.inertia: is open, and the discs of [torsion] tell the inertia of all that turns"),
+        (free, "flywheel.inertia: is open, but the discs of [torsion] give the inertia of all rotating parts"),
         ({**told, "torsion": {**tables["torsion"], "discs": opened}}, "follows from torsion.pulley.inertia"),
     ):
         with pytest.raises(InputError) as caught:

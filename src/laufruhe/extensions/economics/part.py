@@ -84,7 +84,9 @@ class BuildTable(Table):
     @model_validator(mode="after")
     def _is_not_plain(self) -> BuildTable:
         if not self.shafts and self.case is None:
-            raise f.refusal("has no shafts, so it is the plain engine, which is always there; name its shafts")
+            raise f.refusal(
+                "has no shafts, so it equals the plain engine, which the study always includes; name its shafts"
+            )
         if len(set(self.shafts)) < len(self.shafts):
             raise f.refusal("names a shaft twice; name each once")
         return self
@@ -245,7 +247,7 @@ def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
     problem = scenes.problem(Point(case))
     cylinders = len(reference.engine.slider_cranks)
     if shafts_of(problem):
-        rule = f"is there, and '{case.name}' is compared without"
+        rule = f"are present, but '{case.name}' is compared without balancer shafts"
         raise scenes.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
     if len(problem.engine.slider_cranks) <= cylinders:
         rule = f"has no more cylinders in '{case.name}' than the {cylinders} that it is compared with"

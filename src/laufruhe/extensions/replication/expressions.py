@@ -224,7 +224,9 @@ def number_of(text: Any, names: Mapping[str, Any]) -> float:
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise ExpressionError(f"'{text}' is no single number; take one of them, for example by at() or max()") from None
+        raise ExpressionError(
+            f"'{text}' is no single number; take one of its numbers, for example by at() or max()"
+        ) from None
 
 
 def numbers_of(entries: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:

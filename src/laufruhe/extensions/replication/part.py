@@ -123,7 +123,7 @@ class Replication(Part):
 
     def _tables(self, name: Any, scenes: Scenes, *parents: Any) -> dict[str, Any]:
         if name in parents or not isinstance(name, str):
-            raise ExpressionError(f"problem '{name}' is like itself, or is no name; correct a like")
+            raise ExpressionError(f"problem '{name}' refers to itself by `like`, or `like` is no name; correct `like`")
         if name not in self.problems:
             return scenes.file(name)
         tables = {key: value for key, value in self.problems[name].items() if key != "like"}

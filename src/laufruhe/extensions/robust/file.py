@@ -214,7 +214,7 @@ def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Populati
         rule = "is neither the worst case nor a share of engines between 50 and 100 %"
         raise Refused("robust.over", table.over, rule, 'write "worst case", or for example "95 %"')
     if table.engines * (1.0 - share) < 1.0:
-        rule = f"leaves none of {table.engines} engines above"
+        rule = f"is so high that none of {table.engines} engines lies above it"
         raise Refused("robust.over", table.over, rule, "raise engines, or lower the share")
     return Population(share, table.engines, table.seed)
 
@@ -303,24 +303,28 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
     """Return the tolerance of residual unbalance on planes from the first throw to the last."""
     if table is None or table.residual_unbalance is None:
         if table is not None and table.rotor_mass is not None:
-            raise Refused("tolerances.rotor_mass", None, "needs a grade", "add residual_unbalance, or leave it out")
+            raise Refused(
+                "tolerances.rotor_mass", None, "needs a balance grade", "add residual_unbalance, or leave it out"
+            )
         return []
     grade = grade_of(table.residual_unbalance)
     if grade is None:
         try:
             permitted = units.parse(table.residual_unbalance, "kg m")
         except units.UnitError:
-            rule, remedy = "is neither a grade nor an unbalance", 'write for example "G 6.3" or "50 g cm"'
+            rule, remedy = "is neither a balance grade nor an unbalance", 'write for example "G 6.3" or "50 g cm"'
             raise Refused(RESIDUAL, table.residual_unbalance, rule, remedy) from None
         if table.rotor_mass is not None:
-            raise Refused("tolerances.rotor_mass", None, "needs a grade, not an unbalance", "leave it out")
+            raise Refused(
+                "tolerances.rotor_mass", None, "is for a balance grade, but an unbalance is given", "leave it out"
+            )
     elif table.rotor_mass is None:
-        rule = "is missing, and a grade needs the mass of the rotor"
+        rule = "is missing, but a balance grade needs the mass of the rotor"
         raise Refused("tolerances.rotor_mass", None, rule, "add the mass of crankshaft, flywheel and clutch")
     else:
         permitted = permitted_unbalance(grade, table.rotor_mass, speed) / table.planes
     if permitted < 0.0:
-        raise Refused(RESIDUAL, table.residual_unbalance, "is negative", "give its size")
+        raise Refused(RESIDUAL, table.residual_unbalance, "is negative", "leave the sign out")
     front, rear = (pick(part.x for part in engine.slider_cranks) for pick in (max, min))
     places = [front + (rear - front) * k / max(table.planes - 1, 1) for k in range(table.planes)]
     errors = tuple(

@@ -34,11 +34,14 @@ def _read(table: RunUpTable, problem: Problem, __: ExtensionContext) -> Problem:
         )
     for _, spring in every_spring(engine.mounts):
         if any(not isinstance(law, FluidTrack) for law in spring.dynamic):
-            rule = f"has no law for mount '{spring.name}', whose stiffness was measured over frequency"
+            rule = f"has no equation in time for mount '{spring.name}', whose stiffness was measured over frequency"
             raise Refused("run_up", None, rule, "give it a fluid_track, or leave run_up out")
     if table.operating_point is not None and table.operating_point not in points:
         raise Refused(
-            "run_up.operating_point", table.operating_point, "is none here", nearest(table.operating_point, points)
+            "run_up.operating_point",
+            table.operating_point,
+            "is no operating point of this problem",
+            nearest(table.operating_point, points),
         )
     run = Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")
     return replace(problem, engine=engine.with_extra(run))

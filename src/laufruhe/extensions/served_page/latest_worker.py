@@ -52,7 +52,7 @@ class LatestWorker:
             return future.result(seconds)
         except TimeoutError:
             self._end(workers)
-            raise Late(f"it took longer than {seconds:.0f} s and was ended") from None
+            raise Late(f"the request took longer than {seconds:.0f} s and was ended") from None
         except (BrokenExecutor, CancelledError):
             if request_number != self._newest or self._closed:
                 raise Superseded from None

@@ -167,7 +167,7 @@ def check_acts(model: SizeModel) -> None:
         middle = 0.5 * (model.lower + model.upper)
         ends = [np.where(np.arange(len(middle)) == k, edge, middle) for edge in (model.lower, model.upper)]
         if all(model.value(measure, ends[0]) == model.value(measure, ends[1]) for measure in measures):
-            raise ModelError(f"{decision.name} is open, and nothing that is asked depends on it; fix it, or limit it")
+            raise ModelError(f"{decision.name} is open, but no objective or limit depends on it; fix it, or limit it")
 
 
 def solve_star_sizes(problem: Problem) -> Result:
@@ -177,10 +177,10 @@ def solve_star_sizes(problem: Problem) -> Result:
         raise ValueError("nothing of the phasing is open")
     started = time.perf_counter()
     if phasing.continuous or phasing.throw_bounds is not None:
-        rule = "open sizes need even firing or fixed throws"
+        rule = "open sizes of the running gear need even firing or fixed throws"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
     if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MAX_STARS:
-        many = f"more than {MAX_STARS} stars are open together with sizes"
+        many = f"more than {MAX_STARS} crank stars are open together with sizes of the running gear"
         raise ModelError(f"{many}; fix the firing order or the sizes")
     stars = even_stars(phasing)
     if not stars:

@@ -129,11 +129,11 @@ def _chain(
     """Return the chain from front to rear, and the decisions about its open numbers."""
     for part in parts:
         if part.shaft != CRANKSHAFT:
-            rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
+            rule = f"is modelled for one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
     if len(table.discs) > MAX_DISCS:
         rule = f"has {len(table.discs)} discs, and at most {MAX_DISCS} may be given beside the throws"
-        raise Refused("torsion.discs", None, rule, "join those that turn together")
+        raise Refused("torsion.discs", None, rule, "join discs that turn together")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
@@ -159,7 +159,7 @@ def _chain(
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
     if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
-        raise Refused("torsion.speeds", None, "is no range", "write the smaller one first")
+        raise Refused("torsion.speeds", None, "has its ends reversed", "write the lower speed first")
     absorbers = [
         _absorber(a, names, f"torsion.absorbers[{k + 1}]", open_numbers) for k, a in enumerate(table.absorbers)
     ]
@@ -189,10 +189,10 @@ def _crank_sections(table: TorsionTable, links: Sequence[str], open_numbers: _Op
     where, crank = "torsion.crank", table.crank
     if not links:
         if crank is not None:
-            raise Refused(where, None, "joins throws, and there is one", "leave it out")
+            raise Refused(where, None, "joins throws, but the crankshaft has only one throw", "leave it out")
         return []
     if crank is None:
-        raise Refused(where, None, "is missing", "say how stiff the crankshaft is from throw to throw")
+        raise Refused(where, None, "is missing", "give the stiffness of the crankshaft from throw to throw")
     if crank.stiffness is None or len(crank.stiffness) == 1:
         value = None if crank.stiffness is None else crank.stiffness[0]
         return _section(crank, table, where, value, "crank", links, open_numbers)
@@ -221,7 +221,7 @@ def _section(
         if length is not None:
             open_numbers.number(shaft.pieces[0].diameter, "diameter", "m", name, links)
         elif any(isinstance(piece.diameter, Open) for piece in shaft.pieces):
-            raise Refused(f"{where}.diameter", None, "is given beside one that is open", "leave it out")
+            raise Refused(f"{where}.diameter", None, "is given beside an open diameter in pieces", "leave it out")
     loss = table.loss_factor if shaft.loss_factor is None else shaft.loss_factor
     with errors_at_key(where):
         return [
@@ -233,11 +233,11 @@ def _section(
 def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
     diameter = Open.from_value(piece.diameter)
     if diameter.is_open and count > 1:
-        rule = "is open, and its shaft has other pieces"
+        rule = "is open, but its shaft has several pieces"
         raise Refused(f"{where}.diameter", None, rule, "fix the diameter, or give a single piece")
     if piece.bore >= diameter.lower:
         bore = units.quantity_text(piece.bore, "m")
-        raise Refused(f"{where}.bore", bore, "is as wide as its shaft", "give it a wall")
+        raise Refused(f"{where}.bore", bore, "is not smaller than the diameter of its shaft", "make it smaller")
     return piece.length, diameter.start, piece.bore
 
 
@@ -245,10 +245,15 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbe
     if table.on not in names:
         raise Refused(f"{where}.on", table.on, "is no disc", nearest(table.on, list(names)))
     if table.order is not None and table.stiffness is not None:
-        raise Refused(f"{where}.order", None, "is of a pendulum, and its stiffness is that of rubber", "keep one")
+        raise Refused(
+            f"{where}.order",
+            None,
+            "is for a pendulum, but stiffness is for a rubber absorber",
+            "keep one of the two keys",
+        )
     holds = Open.from_value(table.stiffness).lower or Open.from_value(table.damping).lower or table.order
     if not holds:
-        rule = "leaves its ring to nothing where it is zero"
+        rule = "may be zero, and then nothing holds the ring"
         raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")
     inertia, stiffness, damping = (
         open_numbers.number(value, key, unit, table.name, [table.name])
@@ -267,7 +272,7 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbe
 
 def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]:
     if len(values) not in (1, count):
-        raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one, or one for each")
+        raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one number, or one for each")
     return list(values) * count if len(values) == 1 else list(values)
 
 
@@ -282,7 +287,7 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
     discs = {(disc.name, "inertia") for disc in chain.discs}
     for decision in result.decisions:
         if decision.kind is Kind.FLYWHEEL:
-            rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
+            rule = "is open, but the discs of [torsion] give the inertia of all rotating parts"
             raise Refused(decision.name, None, rule, "leave [flywheel] out, and open a disc")
         if any(key in discs for key in decision.keys(TORSION)):
             rule = f"gives an inertia that follows from {decision.name}, which is open"
@@ -292,7 +297,11 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
     if not without_rings * (1.0 - _ROUNDED) <= inertia <= maximum * (1.0 + _ROUNDED):
         of_discs = units.quantity_text(without_rings, "kg m^2")
         rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
-        remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"
+        remedy = (
+            "leave [flywheel] out, and the inertia follows from the discs"
+            if where == "flywheel"
+            else "make the two inertias agree"
+        )
         raise Refused(where, units.quantity_text(inertia, "kg m^2"), rule, remedy)
     return result
 

@@ -103,7 +103,7 @@ class LayoutComparison(SweptPart):
         for case, size in zip(self.cases, sizes, strict=True):
             if len(size) > 1:
                 rule = "has cylinders of different bore or stroke"
-                raise scenes.refused(case, "engine", rule, "give all one size")
+                raise scenes.refused(case, "engine", rule, "give all cylinders one size")
         bore_1, radius_1 = next(iter(sizes[0]))
         for case, ((bore, radius),) in zip(self.cases, sizes, strict=True):
             if abs(radius - radius_1) > _SAME * radius_1 or abs(bore - bore_1) > _SAME:
