@@ -59,7 +59,7 @@ class _Commands(TyperGroup):
         return [*super().list_commands(ctx), *self._further]
 
     def get_command(self, ctx: Any, name: str) -> Any:
-        """Return the command of this name; those of extensions are imported for a name that the core has not."""
+        """Return the command of this name; commands of extensions are imported only for a name that the core lacks."""
         return super().get_command(ctx, name) or self._further.get(name)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 MAX_VIEWS = 3
 """Largest number of processes that draw the pictures of a result."""
 SELDOM = 200_000
-"""Number of new objects after which a process collects garbage: pictures have many, and little of it."""
+"""Number of new objects after which a process collects garbage; drawing makes many objects and little garbage."""
 
 
 @contextmanager
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
-    """Yield the function that requests pictures of these kinds: from another process, or this one if it is alone."""
+    """Yield the function that requests pictures of these kinds: from another process, or from this one on one core."""
     is_other = bool(kinds) and processors() > 1
     copies: tuple[ForkedWorker, ...] = ()
     if is_other and ForkedWorker.is_possible():

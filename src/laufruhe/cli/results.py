@@ -25,7 +25,7 @@ def write_results(
 ) -> None:  # fmt: skip
     """Write all files of a result into a folder, and a copy of its JSON.
 
-    The pictures for which a function waits are SVG by their names.
+    `wait_for_pictures` returns the pictures as SVG, by name.
     """
     if request.animated:
         from laufruhe.plots.motion import animate

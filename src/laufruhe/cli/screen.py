@@ -60,7 +60,7 @@ class Request:
 
 @contextmanager
 def timed(seconds: dict[str, float], what: str) -> Iterator[None]:
-    """Add the seconds of a part."""
+    """Add the seconds that the block takes to `seconds[what]`."""
     started = time.perf_counter()
     yield
     seconds[what] = seconds.get(what, 0.0) + time.perf_counter() - started
@@ -204,7 +204,7 @@ def speak(loud: int) -> None:
 def open_closed_streams() -> None:
     """Open standard streams that the caller closed, so that no file of results gets their numbers.
 
-    Input is empty and errors are lost; output refuses to be written, as a full device does.
+    Standard input is then empty, and standard error is lost. Writing to standard output fails, as on a full device.
     """
     for name, access in (("stdin", os.O_RDONLY), ("stdout", os.O_RDONLY), ("stderr", os.O_WRONLY)):
         if getattr(sys, name) is None:
@@ -242,7 +242,7 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 
 def pace() -> float:
-    """Return the seconds between two reports of a search: lines are less frequent."""
+    """Return the seconds between two reports of a search; reports in lines are less frequent than in place."""
     return 2.0 if _loudness.get() == VERBOSE else 0.1
 
 

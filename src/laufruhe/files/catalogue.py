@@ -45,7 +45,7 @@ def engines() -> Mapping[str, CatalogueEngine]:
 
 
 def engine_named(name: object, where: str) -> CatalogueEngine:
-    """Return an engine of the catalogue by name; `Refused` at the key `where` if there is none."""
+    """Return an engine of the catalogue by name; raise `Refused` at the key `where` if there is none."""
     engine = engines().get(name) if isinstance(name, str) else None
     if engine is None:
         remedy = nearest(str(name), list(engines()), "laufruhe engines lists them")

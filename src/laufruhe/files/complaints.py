@@ -47,7 +47,7 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """Return one complaint for each wrong key, at most `MAX_COMPLAINTS` and the number of further ones.
+    """Return one complaint for each wrong key, at most `MAX_COMPLAINTS`, and the number of further complaints.
 
     If keys belong to extensions that are not installed, only these are reported.
     """
@@ -247,7 +247,7 @@ def require_one_of(table: BaseModel, where: str, key: str, other: str, value: An
 
 
 def refuse_keys(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
-    """Raise `Refused` if one of these keys differs from its default."""
+    """Raise `Refused` if one of these keys of a table differs from its default."""
     for key in keys:
         if getattr(table, key) != type(table).model_fields[key].default:
             raise Refused(f"{where}.{key}", None, rule, remedy)

@@ -58,7 +58,7 @@ alternating = true              # without the steady reaction to the mean torque
 
 
 def draft_of_engine(name: str) -> str:
-    """Return the text of a draft problem file for a catalogue engine; `Refused` if no engine has this name."""
+    """Return the text of a draft problem file for a catalogue engine; raise `Refused` if no engine has this name."""
     entry = engine_named(name, "engine")
     lines = {key: f"# {key} = {toml_value(value)}" for key, value in entry.engine.items()}
     published = [line for key, line in lines.items() if key not in entry.assumed]
@@ -73,13 +73,13 @@ def draft_of_engine(name: str) -> str:
 
 
 def draft_of_table(title: str, engine: Mapping[str, Any], path: Path) -> str:
-    """Return the text of a draft for an [engine] table; `InputError` for the file if the engine cannot exist."""
+    """Return the text of a draft for an [engine] table; raise `InputError` for the file if the engine cannot exist."""
     lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
     return _draft(title, f"\n[engine]\n{lines}\n", engine_of_table(title, engine, path))
 
 
 def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
-    """Return the engine of an [engine] table; `InputError` for the file if the engine cannot exist."""
+    """Return the engine of an [engine] table; raise `InputError` for the file if the engine cannot exist."""
     tables = {"title": title, "engine": dict(engine), "operating_points": [{"speed": SPEED}]}
     return load_tables(tables, path).engine
 
@@ -97,7 +97,8 @@ def _draft(title: str, engine: str, built_engine: Engine) -> str:
 def _balance(engine: Engine) -> str:
     """Return the lines with counterweights and balancer shafts that may balance free forces and couples.
 
-    Free forces and couples are those of first and second order without the roll moment. Small ones get no weight.
+    Free forces and couples are those of first and second order without the roll moment. Small ones get no
+    counterweight or balancer shaft.
     """
     parts, speed = engine.slider_cranks, units.parse(SPEED, "rad/s")
     wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))

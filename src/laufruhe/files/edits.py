@@ -22,7 +22,7 @@ _THROW, _BUILT = re.compile(r"throw (\d{1,3})"), " built"
 
 
 def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return tables with other values of named numbers; open numbers start there and stay open.
+    """Return tables with other values of named numbers; an open number starts at its value and stays open.
 
     Open throws have no start, so values for all throws fix the crank of a result.
     """
@@ -41,7 +41,7 @@ def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
 
 
 def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
-    """Return tables with another value of one number; an open one starts there and stays open."""
+    """Return tables with another value of one number; an open number starts at the value and stays open."""
     keys = keys_by_name(tables, name)
     now = at(tables, keys)
     return with_value_at(tables, keys, {**now, "start": value} if _is_open(now) else value)

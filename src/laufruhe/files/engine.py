@@ -153,13 +153,13 @@ class EngineTable(Table):
 
     @property
     def listed_throws(self) -> list[float] | None:
-        """Angles of the throws [rad]; None unless all are numbers."""
+        """Angles of the throws [rad]; None if they are missing or one is open."""
         angles = [angle for angle in self.throws or () if isinstance(angle, float)]
         return angles if self.throws is not None and len(angles) == len(self.throws) else None
 
     @property
     def listed_order(self) -> list[int] | None:
-        """Firing order; None unless it is a list."""
+        """Firing order; None if it is missing or open."""
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
     def value_of(self, key: str) -> Any:
@@ -168,7 +168,7 @@ class EngineTable(Table):
 
     @property
     def kind(self) -> LayoutKind:
-        """Kind of its layout."""
+        """Kind of the engine's layout."""
         return LAYOUTS[self.layout]
 
 
@@ -288,7 +288,7 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
 
 
 def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
-    """Return masses and lengths of one cylinder, and its rod if it is a rigid body, else None."""
+    """Return masses and lengths of one cylinder, and its rod; None if the rod is not given as a rigid body."""
     big_end = None if table.big_end is None else table.big_end.size
     if not table.kind.has_pistons:
         return table.kind.mechanism(values or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
@@ -377,7 +377,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
 def piston_masses(
     table: EngineTable, parts: Sequence[SliderCrank], weights: Sequence[CounterweightTable]
 ) -> list[Decision]:
-    """Return decisions about open masses of slider-cranks: common ones of [engine], and those of single parts.
+    """Return decisions about open masses: common masses of [engine], and masses of single slider-cranks.
 
     Counterweights may not have balance factors if a mass is open.
     """

@@ -83,9 +83,9 @@ class Number:
     minimum, above, maximum, below
         Inclusive and exclusive lower bound, inclusive and exclusive upper bound [SI].
     plain
-        Factor that turns a bare number into SI, if one is allowed (degrees).
+        Factor that turns a bare number into SI, if bare numbers are allowed (degrees).
     closed
-        Reason why it may never be open, as the end of a sentence "it ..."; empty if it may.
+        Reason why the number may never be open, as the end of a sentence "it ..."; empty if it may be open.
     """
 
     unit: str

@@ -81,7 +81,7 @@ class QuantityTable(Table):
     )
 
     def measure(self, quantity: str) -> Measure:
-        """Return the measure of a quantity of `MEASURES` with these keys, which no engine has checked."""
+        """Return the measure of a quantity of `MEASURES` with these keys; no engine has checked it yet."""
         weights = self.direction_weights
         return Measure(
             *MEASURES[quantity], at=as_tuple(next((names for key in PLACES if (names := getattr(self, key))), None)),
@@ -289,7 +289,7 @@ def _minimised(name: str, table: QuantityTable, where: str, context: MeasureCont
 
 
 def limits_of(tables: Sequence[ConstraintTable], context: MeasureContext) -> tuple[Limit, ...]:
-    """Return the limits, those of loads and masses before those of numbers."""
+    """Return the limits of loads and masses, and after them those of single numbers such as sag."""
     limits = [_limit(table, f"constraints[{k}]", context) for k, table in enumerate(tables, 1)]
     _check_unique(limits)
     limits.sort(key=lambda limit: limit.measure.channel.is_number)

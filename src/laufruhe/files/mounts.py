@@ -156,7 +156,7 @@ class LoadCaseTable(Table):
 class MountsInput:
     """Mounts of a file with joined springs in one place, and the block that elastic ones carry.
 
-    The numbers are the fourteen of each elastic spring (E13); decisions are about them.
+    `numbers` has the fourteen numbers of each elastic spring (E13); `decisions` are about these numbers.
     """
 
     mounts: tuple[Mount, ...] = ()
@@ -168,7 +168,7 @@ class MountsInput:
 def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsInput:
     """Return the mounts of a file: rigid ones, or elastic ones with the block on them.
 
-    The folder is that of the problem file and of its CSV files.
+    `folder` contains the problem file and its CSV files.
     """
     if table is None or table.kind == "rigid":
         if block is not None:

@@ -140,7 +140,7 @@ def operating_points(
 ) -> tuple[OperatingPoint, ...]:  # fmt: skip
     """Return the operating points of a file; points that give no load have the gas of [gas].
 
-    The stroke turns a mean piston speed into a crank speed [m]; an engine without pistons has none.
+    The stroke [m] turns a mean piston speed into a crank speed; it is None for an engine without pistons.
     """
     points = []
     for k, table in enumerate(tables, 1):

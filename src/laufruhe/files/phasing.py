@@ -245,7 +245,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
 
 
 def _first(phasing: Phasing) -> Candidate:
-    """Return the candidate for the design as given."""
+    """Return the candidate crank of the initial design."""
     lowest = (phasing.bank and phasing.bank[0], phasing.split and phasing.split[0])
     for geometry in phasing.geometries or (lowest,):
         layout = phasing.layout(*geometry)

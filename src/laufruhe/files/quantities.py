@@ -74,7 +74,7 @@ QuantitiesTable = create_model(
 def with_followers(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the tables with the numbers that the quantities of [quantities] determine.
 
-    `Refused` if a quantity cannot be read.
+    Raise `Refused` if a quantity cannot be read.
     """
     quantities = tables.get("quantities")
     if not isinstance(quantities, Mapping):

@@ -144,7 +144,7 @@ def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
 def _rebuilt(
     tables: Mapping[str, Any], path: Path, candidate: Candidate | None, changes: Mapping[Place, str | float]
 ) -> Drawing:
-    """Return the drawing of a file with other numbers at some addresses; of one candidate if stars are open."""
+    """Return the drawing of a file with other numbers at some addresses; of one candidate if crank stars are open."""
     fidelity = tables.get("fidelity", {})
     if fidelity.get("kinematics") == "auto":
         options = {key: value for key, value in fidelity.items() if key not in ("kinematics", "tolerance")}
@@ -164,7 +164,7 @@ def _rebuilt(
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file with unchecked keys; `InputError` if it cannot be read.
+    """Return the tables of a TOML file with unchecked keys; raise `InputError` if it cannot be read.
 
     The path `-` is standard input. An engine of the catalogue is written out in the tables.
     """
@@ -296,7 +296,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
 
 
 def _check_decisions(problem: Problem) -> None:
-    """Raise `Refused` for open numbers without effect or objective, too many, or that rename operating points."""
+    """Raise `Refused` for open numbers without effect or objective, for too many, and for renamed operating points."""
     decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
     if len(decisions) > MAX_OPEN:
         remedy = "fix some numbers, or couple some to others"

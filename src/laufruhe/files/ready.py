@@ -56,7 +56,7 @@ def ready() -> dict[str, Ready]:
 
 
 def ready_named(name: str) -> Ready:
-    """Return a ready problem by name; `InputError` if there is none."""
+    """Return a ready problem by name; raise `InputError` if there is none."""
     entry = ready().get(name.removesuffix(".toml"))
     if entry is None:
         advice = nearest(name, list(ready()), "laufruhe examples lists them")

@@ -102,7 +102,7 @@ class RotorList:
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
         """Add a decision about the position of rotors along an axis (0 = x, 1 = y, 2 = z) if it is open.
 
-        Rotors without an unbalance do not follow.
+        Rotors without an unbalance do not move.
         """
         sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
         sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
@@ -110,7 +110,7 @@ class RotorList:
         self.decisions += Open.from_value(place).decisions(name, "m", *drives)
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
-        """Let the unbalance of a rotor follow that of another one, `source`, times gain, or mirrored."""
+        """Let the unbalance of a rotor follow that of the rotor `source`, times `gain` and possibly mirrored."""
         for k, decision in enumerate(self.decisions):
             for drive in decision.rotor_drives:
                 if drive.rotor == source:
@@ -227,7 +227,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
 
 
 def name_of_unbalance(shaft: str, names: Sequence[str | None], j: int) -> str:
-    """Return the name of the j-th unbalance of a shaft in results; a single unnamed one has the name of the shaft."""
+    """Return the name of the j-th unbalance of a shaft in results; a single unnamed one is named as the shaft."""
     return shaft if len(names) == 1 and names[0] is None else f"{shaft}.{names[j] or j + 1}"
 
 
@@ -268,7 +268,7 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
 
 
 def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
-    """Return the set of an unbalance with open size and angle; it must be convex."""
+    """Return the allowed values of an unbalance with open size and angle; raise `Refused` if they are not convex."""
     if not size.is_open:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)

@@ -76,23 +76,23 @@ class CaseTable(Table):
 
 
 def at(tables: dict[str, Any], where: str) -> Any:
-    """Return the value at a path such as counterweights.web.balance_factor; `Refused` if there is none."""
+    """Return the value at a path such as counterweights.web.balance_factor; raise `Refused` if there is none."""
     return nested.at(tables, keys_of(tables, where))
 
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
-    """Return a copy of tables with another value at a path; `Refused` if there is no such path."""
+    """Return a copy of tables with another value at a path; raise `Refused` if there is no such path."""
     return nested.with_value_at(tables, keys_of(tables, where), value)
 
 
 def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
-    """Return tables updated by others: nested tables are merged recursively, other values are replaced."""
+    """Return tables updated by `changes`: nested tables are merged recursively, other values are replaced."""
     merged = [key for key, change in changes.items() if isinstance(change, dict) and isinstance(tables.get(key), dict)]
     return {**tables, **changes, **{key: joined(tables[key], changes[key]) for key in merged}}
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """Return the keys and indices of a path; `Refused` if the problem has no such quantity."""
+    """Return the keys and indices of a path; raise `Refused` if the problem has no such quantity."""
     node: Any = tables
     keys = []
     parts = parts_of(where)
@@ -191,7 +191,7 @@ class SweepAxis:
 
 
 def axis_of(sweep: SweepTable) -> SweepAxis:
-    """Return the values of a sweep with their unit; `Refused` if there are fewer than two, or equal ones."""
+    """Return the values of a sweep with their unit; raise `Refused` if there are fewer than two, or equal ones."""
     spaced = (sweep.first, sweep.last, sweep.points)
     if sweep.values is None:
         values, key = _spaced(sweep), "points"
@@ -237,7 +237,7 @@ class Span:
 
 
 def span_of(drawn: DrawnTable) -> Span:
-    """Return the range from which a quantity is drawn; `Refused` if its ends do not fit."""
+    """Return the range from which a quantity is drawn; raise `Refused` if its ends do not fit."""
     return _span(drawn.quantity, drawn.first, drawn.last, drawn.spacing)
 
 

@@ -110,7 +110,7 @@ def _filled(
 
 
 class _Collected:
-    """Signals of a problem, each once, and the measures on them."""
+    """Signals of a problem, each stored once, and the measures that use them."""
 
     def __init__(self, model: AffineModel, kinds: set[Kind], result: Result, aside: str) -> None:
         self.model, self.kinds, self.aside = model, kinds, aside
@@ -164,7 +164,7 @@ class _Collected:
 
 
 def sides_of(limit: Limit) -> tuple[tuple[str, float], ...]:
-    """Return sense and edge of the finite sides of a limit [SI]."""
+    """Return sense and bound of each finite side of a limit [SI]."""
     sides = (("at least", limit.minimum), ("at most", limit.maximum))
     return tuple((sense, edge) for sense, edge in sides if math.isfinite(edge))
 

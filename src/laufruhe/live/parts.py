@@ -34,7 +34,7 @@ class Slider:
     angle
         Name of the angle in results.
     shown, factor
-        The unit of the file, and its factor on an SI value.
+        Unit of the file, and the factor from an SI value to this unit.
     """
 
     name: str
@@ -60,11 +60,11 @@ class DisplayedMeasure:
     refinement
         Factor on the number of steps at which the norm is taken.
     signal
-        Number of its signal; None for a constant.
+        Index of its signal; None for a constant.
     sides
-        Sense and edge of a limit, "at most" or "at least" [SI].
+        Sense of each side of a limit, "at most" or "at least", and its bound [SI].
     value
-        Value of a constant; of the decided design if no other is `followed`.
+        Value of a constant; value in the decided design if `followed` is False.
     """
 
     role: str
@@ -89,7 +89,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class LiveDesign:
-    """A decision vector with every measure by the exact model; None for constants."""
+    """A decision vector with the value of every measure by the exact model; None for measures that do not move."""
 
     name: str
     x: tuple[float, ...]
@@ -125,9 +125,9 @@ class LiveModel:
     reference
         Design for comparison; None if a server provides it.
     unmoved
-        Names that do not follow the sliders, with reasons.
+        Names of open numbers and measures that do not follow the sliders, with reasons.
     why_not
-        Why there are no sliders; empty where there are.
+        Reason why the page has no sliders; empty if it has sliders.
     """
 
     name: str

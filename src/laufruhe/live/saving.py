@@ -22,7 +22,7 @@ from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 SEARCHED = ("phasing", "robust", "search", "assembly")
-"""Tables that say how something open is decided."""
+"""Tables of a problem file that say how open numbers are decided."""
 SAME = 1e-9
 
 

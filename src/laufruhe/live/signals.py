@@ -19,9 +19,9 @@ from laufruhe.problem.measure import Measure, kinks_of, narrow_signal
 
 PEAK = NORMS["maximum"]
 NORMS_OF_PAGE = frozenset({"mean", "maximum", "rms", "peak to peak", "worst mean"})
-"""Norms that the page's scripts know; a measure of another one cannot be followed live."""
+"""Norms that the page's scripts know; a measure with another norm does not follow the sliders."""
 ZERO = 1e-13
-"""Share of the largest order that all orders left out come to at the most."""
+"""Largest sum of the omitted orders, relative to the largest order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +72,7 @@ class PointSignal:
     slope
         Change per unit of every column, shape (orders, places, d, columns).
     bent
-        Columns with kinks of their own, and these kinks.
+        Columns of the decision vector with kinks of their own, and these kinks.
     """
 
     share: float
@@ -93,7 +93,8 @@ class Signal:
     base
         Lowest order.
     samples
-        Steps over the period at which means are taken; a peak is sought among so many times as its norm refines.
+        Steps over the period at which means are taken; a peak is sought among
+        these steps times the refinement of its norm.
     adds
         True if the values are masses to add, not samples of a load.
     """

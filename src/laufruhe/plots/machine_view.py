@@ -97,7 +97,7 @@ def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) ->
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
 _OF_RODS = {"rod", "piston_pin", "bolts"}
 ROOM = 1.1
-"""Around what is seen, as a share of it."""
+"""Size of each view over the size of the drawn engine."""
 
 
 @dataclass(frozen=True)

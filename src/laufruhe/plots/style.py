@@ -1,8 +1,8 @@
 """Common parts of all pictures: page, colours, fonts, and the words around the data.
 
-A picture is made under `styled()`, begins with a `page` of panels and ends with `headed` (or `heading`), which gives
-the page the margins that all that was drawn needs: nothing can stand outside it. Figures are made without pyplot and
-laid out in inches: both cost a third of the time that a picture takes.
+A picture is made under `styled()`, begins with a `page` of panels and ends with `finish_page` (or `heading`), which
+adds margins so that everything drawn lies on the page. Figures are made without pyplot and laid out in inches, because
+pyplot and automatic layout cost a third of the time that a picture takes.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ GAP = 0.42
 NARROWEST, WIDEST = 6.4, 10.2
 """Width of a page [inch]; the widest keeps its size, and that of its letters, in a report."""
 EDGE = 0.3
-"""Around all that is on a page [inch]."""
+"""Margin around the content of a page [inch]."""
 _BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2
 _TITLE, _ENGINE = 13.0, 10.0
 _LINE = 1.35 / 72.0
@@ -157,7 +157,7 @@ def _resize(figure: Figure, size: tuple[float, float], offset: tuple[float, floa
 def finish_page(
     drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = ""
 ) -> Figure:
-    """Finish the page of a result; the note says what it leaves out."""
+    """Finish the page of a result; `note` says what the picture leaves out."""
     problem = result.problem
     described = f"Source: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."

@@ -86,7 +86,7 @@ def _drawn(trade: Trade) -> Figure:
 
 
 def _places(axes: Axes, errors: Array, times: Array) -> Array:
-    """Return the drawn errors; very small ones stand in a band under the axis."""
+    """Return the drawn errors; very small errors are drawn in a band below the axis."""
     small = errors < MIN_ERROR
     width, height = PANEL
     low, end = np.log10(axes.get_xlim())

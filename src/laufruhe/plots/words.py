@@ -153,7 +153,7 @@ def empty(axes: Axes, words: str) -> None:
 
 
 def omitted_words(largest: float, maximum: float, unit: str) -> str:
-    """Return what is said of a load too small to draw; empty if it is drawn."""
+    """Return in words the size of a load that is too small to draw; empty if the load is drawn."""
     if largest > UNSEEN * maximum:
         return ""
     return "zero" if largest <= ROUNDS_TO_ZERO * maximum else f"at most {number(largest, 2)} {unit}"

@@ -36,7 +36,7 @@ class Indicator:
     """Indicator diagram of one cylinder: absolute pressure [Pa] of its chambers by name over the travel.
 
     The travel is a part of the stroke from the head end. The chambers exert a force on the rod towards the crank [N];
-    another one is needed to accelerate the reciprocating mass.
+    another force is needed to accelerate the reciprocating mass.
     """
 
     travel: Array
@@ -78,7 +78,7 @@ def transmissibility_of(
 ) -> Iterator[tuple[int, Array]]:
     """Yield index and values of the transmissibility of every order that the loads have.
 
-    None of a design on a resonance that nothing damps.
+    Yield nothing for a design on an undamped resonance.
     """
     loads = split_loads(design.engine, point, design.fidelity)
     try:
@@ -112,7 +112,7 @@ def is_twin(result: Result) -> bool:
 
 
 def parts_of(result: Result, engine: Engine, k: int) -> Parts:
-    """Return forward and backward part of force and couple by order, at an operating point."""
+    """Return the parts of force and couple that turn forward and backward, by order, at an operating point."""
     wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
     return {
         (kind, order): turning_parts(*wrench.at(order)[list(columns)])

@@ -46,7 +46,10 @@ FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings",
 
 
 def places_of(result: Result) -> list[Places]:
-    """Return the quantities that a result shows by place; inside the crankcase requested ones, or all with bearings."""
+    """Return the quantities that a result shows by place.
+
+    Inside the crankcase these are the requested quantities, or all if the engine has bearings.
+    """
     engine, problem = result.problem.engine, result.problem
     requested, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
     places_list = [MOUNTS] if engine.mounts else []
@@ -61,7 +64,7 @@ def places_of(result: Result) -> list[Places]:
 
 
 def hardest_point(result: Result) -> int:
-    """Return the index of the operating point with the largest loads of the given design."""
+    """Return the index of the operating point with the largest loads of the initial design."""
     sizes = [float(np.abs(main_load(loads).coefficients).max(initial=0.0)) for loads in result.initial.loads]
     return int(np.argmax(sizes))
 
@@ -127,7 +130,7 @@ def firing_words(result: Result) -> tuple[str, str]:
 
 
 def has_loads(result: Result) -> bool:
-    """Return True if loads are finite: not on a resonance."""
+    """Return True if there are operating points and the final design has finite loads, not on a resonance."""
     return bool(result.problem.points) and not evaluations_with_loads(result)[-1].resonance
 
 
@@ -149,12 +152,12 @@ def ranking_of(result: Result) -> PhasingResult:
 
 
 def is_changed(result: Result) -> bool:
-    """Return True if the final design differs from the given one."""
+    """Return True if the final design differs from the initial design."""
     return result.final is not result.initial
 
 
 def designs_with_loads(result: Result) -> dict[str, Evaluation]:
-    """Return the designs with finite loads, by name; always the final one."""
+    """Return the designs with finite loads, by name; the final design is always among them."""
     return {name: design for name, design in result.designs.items() if design is result.final or not design.resonance}
 
 
@@ -169,7 +172,7 @@ def has_bearings(result: Result) -> bool:
 
 
 def bearing_paths(design: Evaluation, k: int) -> ComplexArray:
-    """Return main-bearing forces at an operating point as up + i left, shape (angles, bearings) [N]."""
+    """Return main-bearing forces at an operating point, upward + i leftward, shape (angles, bearings) [N]."""
     samples = channel_samples(design, k, BEARINGS.channel)
     return np.asarray(samples[..., 2] + 1j * samples[..., 1])
 

@@ -36,7 +36,8 @@ class MountingFacts:
     torque_travel
         Largest displacement of any mount under the mean torque.
     torque_roll_coupling, torque_roll_frequency
-        Zero if turning about the torque-roll axis is a mode (E8), and frequency of the mode that comes nearest (E46).
+        Coupling, zero if turning about the torque-roll axis is a mode (E8); frequency at which it is nearest to a mode
+        [Hz] (E46).
     with_fluid
         Undamped natural frequencies of the block and the fluid of its mounts together; none without fluid tracks (E50).
     depends_on_frequency

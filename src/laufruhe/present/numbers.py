@@ -17,7 +17,7 @@ ROUNDS_TO_ZERO = 1e-9
 
 
 def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
-    """Return a number with `digits` figures, without an exponent where possible; roundings of the scale become 0."""
+    """Return a number with `digits` figures, if possible without an exponent; rounding errors of `scale` become 0."""
     if not math.isfinite(value):
         return DASH
     if value == 0.0 or abs(value) <= ROUNDS_TO_ZERO * scale:
@@ -38,7 +38,7 @@ def aligned(value: float, largest: float, digits: int = 5) -> str:
 
 
 def fixed(value: float, decimals: int, sign: str = "") -> str:
-    """Return a number with fixed decimals; 0 where all its figures are zero. `sign` is "+" for a sign on all others."""
+    """Return a number with fixed decimals; 0 where all figures are zero. With `sign` "+", all others have a sign."""
     text = f"{value:{sign}.{decimals}f}"
     return text if float(text) else "0"
 

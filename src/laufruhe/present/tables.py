@@ -64,7 +64,7 @@ class Table:
         return replace(self, head=[strip_markdown(cell) for cell in self.head], rows=rows, marked=False)
 
     def as_markdown(self) -> str:
-        """Return title, table and note; names of the user mean nothing to Markdown."""
+        """Return title, table and note as Markdown; in a table without marks, special characters are escaped."""
         convert = str if self.marked else escape_markdown
         rows = [[convert(cell) for cell in row] for row in self.rows]
         parts = [f"## {escape_markdown(self.title)}"] if self.title else []

@@ -1,6 +1,6 @@
 """A report as data: headings, paragraphs, tables and pictures in the order in which they are read.
 
-It is assembled once. Every block knows how it is written in Markdown; `web_page` puts all of them on a page.
+A document is assembled once. Every block writes itself as Markdown; `web_page` puts all blocks on a page.
 """
 
 from __future__ import annotations

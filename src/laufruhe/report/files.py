@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, in folders that know what was made in them."""
+"""Write files whole or not at all, into folders that list the files made in them."""
 
 from __future__ import annotations
 
@@ -102,8 +102,8 @@ class FileSet:
 def staged(target: FileSet) -> Iterator[Path]:
     """Yield a hidden folder that replaces the target folder atomically when all files are made.
 
-    After an error, an interrupt or a kill at any moment the folder is as it was before, or all new; the next run
-    takes away what a killed one left behind. `InputError` on entry if the folder cannot be written, holds what
+    After an error, an interrupt or a kill at any moment the folder is unchanged or complete; the next run
+    removes what a killed run left behind. Raise `InputError` on entry if the folder cannot be written, holds what
     Laufruhe did not make and would overwrite, or holds the results of another command.
     """
     target = replace(target, folder=Path(os.path.realpath(target.folder)))
@@ -151,7 +151,7 @@ def _with_final_name(stage: Path, target: Path) -> Iterator[None]:
 def staged_file(path: Path, option: str) -> Iterator[Path]:
     """Yield a path to write data to; it replaces `path` when it is complete.
 
-    `InputError` if `path` cannot be written, or is a file that Laufruhe did not make.
+    Raise `InputError` if `path` cannot be written, or is a file that Laufruhe did not make.
     """
     path = path.resolve()
     place = FileSet(path, option, "", ())
@@ -175,7 +175,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
 
 
 def results_line(folder: Path, page: str) -> str:
-    """Return where the files are, and which to open first."""
+    """Return a line that names the folder of the files and the file to open first."""
     return f"Results: {printed(str(folder))} (begin with {printed(page)})"
 
 

@@ -103,7 +103,7 @@ def read_result(path: str | Path) -> SavedResult:
     Raises
     ------
     InputError
-        If there is none, or it is no such file.
+        If the file is missing, or is not such a result.
     """
     if not isinstance(path, str | Path):
         raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json")

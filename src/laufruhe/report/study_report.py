@@ -43,7 +43,7 @@ def write_study(
     seconds
         Seconds of each part.
     draw
-        Starts writing a picture at a path without ending; returns a function that waits for its SVG.
+        Function that starts writing a picture at a path without ending, and returns a function that waits for its SVG.
     ending
         Ending of the picture files of the Markdown page.
     """

@@ -17,7 +17,7 @@ import numpy as np
 from laufruhe.present.tables import Table
 
 _FORMULA = re.compile(r"(?!-?$|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?(?: ?%| [\w ./*^°²³]*)?$)[=+\-@\t＝＋－＠]")
-"""Begins what a spreadsheet may compute: a sign that no plain number with its unit follows."""
+"""Start of a text that a spreadsheet may compute: a sign that no plain number with its unit follows."""
 _OPTIONS = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
 _CREATED = datetime(2000, 1, 1, tzinfo=UTC)
 

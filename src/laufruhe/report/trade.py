@@ -108,7 +108,7 @@ def _beyond(trade: Trade) -> list[str]:
 
 
 def advice(trade: Trade) -> str:
-    """Return the choices in words."""
+    """Return the recommended fidelities in words."""
     evaluating, decided = choices(trade)
     text = f"`{evaluating.name}` for values within 0.1 % ({_time(evaluating.evaluation)} per design)"
     if decided is not None:
@@ -117,7 +117,7 @@ def advice(trade: Trade) -> str:
 
 
 def choices(trade: Trade) -> tuple[TradeRow, TradeRow | None]:
-    """Return the cheapest fidelity with a value, and with a decision, within a thousandth."""
+    """Return the cheapest fidelity whose value errs by 0.1 % at most, and the one whose regret is 0.1 % at most."""
     good = [row for row in trade.rows if row.error <= 1e-3]
     number = _fastest(good, lambda row: row.evaluation) if good else trade.rows[-1]
     deciding = [row for row in trade.rows if row.decides and row.regret <= 1e-3]
@@ -130,7 +130,7 @@ def _fastest(rows: Sequence[TradeRow], time: Callable[[TradeRow], float]) -> Tra
 
 
 def as_json(trade: Trade) -> str:
-    """Return the table as JSON."""
+    """Return the measurements as JSON."""
     return strict({
         "problem": trade.problem.name,
         "reference": {"objective": trade.value, "optimum": trade.optimum},

@@ -49,7 +49,7 @@ def headline(result: Result) -> str:
 
 
 def details(result: Result) -> list[str]:
-    """Return the sentences below the headline: attainable limits, firing order, comparison of stars."""
+    """Return the sentences below the headline: attainable limits, firing order, comparison of crank stars."""
     static = "" if result.objective is None else static_sentence(result.problem, result.final)
     return [sentence for sentence in (*attainable(result), static, fired(result), why_star(result)) if sentence]
 
@@ -115,7 +115,7 @@ def fired(result: Result) -> str:
 
 
 def why_star(result: Result) -> str:
-    """Return a sentence that compares the best star with the next; empty for a single star."""
+    """Return a sentence that compares the best crank star with the next; empty for a single star."""
     stars = result.phasing.ranking if result.phasing is not None else ()
     k, rival = next(((k, star) for k, star in enumerate(stars, 1) if star.throws != stars[0].throws), (0, None))
     if rival is None or not rival.value:
@@ -134,7 +134,7 @@ def why_star(result: Result) -> str:
 
 
 def _differences(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
-    """Return the free loads in which two stars differ, of both stars and in words."""
+    """Return the free loads in which two crank stars differ: the load of each star, and a text."""
     requested = {order for measure in result.problem.measures for order in measure.orders or best.orders}
     driven = {drive.rotor for decision in result.problem.unbalances for drive in decision.rotor_drives}
     acting = {abs(rotor.shaft.ratio) for rotor in result.final.engine.rotors if rotor.name in driven}

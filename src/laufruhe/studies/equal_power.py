@@ -38,8 +38,8 @@ def equal_power_scale(cylinders: int, reference_cylinders: int) -> EqualPowerSca
 def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     """Return the problem with every cylinder resized so that the engine has the reference's power.
 
-    Brake mean pressure and mean piston speed stay, so the gas model is untouched. `ModelError` where cylinders differ
-    in bore or stroke, or stand on elastic mounts: the rules have none for a block and its springs.
+    Brake mean pressure and mean piston speed stay, so the gas model is untouched. Raise `ModelError` if cylinders
+    differ in bore or stroke, or the engine stands on elastic mounts: no rule scales a block and its springs.
     """
     cylinders = problem.engine.slider_cranks
     if problem.engine.block is not None:

@@ -39,7 +39,7 @@ class Template:
 
 
 class Part(Table):
-    """Dataset of a study, its cases, and words about it.
+    """Part of a study: its cases, and how they become points, records, a dataset, a table and a picture.
 
     A kind is a subclass in a module of `laufruhe.studies.kinds` with its name as `kind: Literal[...]`;
     it is found there. Its fields are its keys in the study file.
@@ -75,11 +75,11 @@ class Part(Table):
         return self.model_dump(exclude={"name", "title", "source", "cases", "readings", "sweep"})
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
-        """Return the tables that name quantities, by key, and functions that read them (`Refused` for a misfit)."""
+        """Return the tables that name quantities, by key, and functions that read them; these may raise `Refused`."""
         return []
 
     def size(self) -> int:
-        """Return a lower bound of the number of points, without making any."""
+        """Return a lower bound of the number of points, without making the points."""
         return len(self.cases)
 
     def points(self, scenes: Scenes) -> list[Point]:
@@ -87,7 +87,7 @@ class Part(Table):
         raise NotImplementedError
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return one piece of work as JSON values; it depends on the settings and the point only.
+        """Return the record of one piece of work as JSON values; it depends on the settings and the point only.
 
         A `ModelError` is the fault of the point, and is recorded as such.
         """

@@ -66,9 +66,9 @@ def _merged(complaints: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple
 
 
 def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
-    """Read and check a study, a file, its text or its tables; a part with several readings becomes one part for each.
+    """Read and check a study from a file, its text or its tables; each reading of a part becomes a part of its own.
 
-    `InputError` with one line for everything wrong: file, key, value, rule, remedy.
+    Raise `InputError` with one line for each fault: file, key, value, rule, remedy.
     """
     tables, path = tables_and_path(source)
     if "study" not in tables:

@@ -42,7 +42,7 @@ class Regions:
     """Numbers of one part: `values` along case, draw and quantity, and `done` along case and piece.
 
     The folder `root` is the store of a whole study; this part is a group in it. `regions` has the region of every
-    piece by fingerprint. `InputError` if something else stands there.
+    piece by fingerprint. Raise `InputError` if the folder holds anything else.
     """
 
     def __init__(self, root: Path, name: str, template: Template, regions: Mapping[str, Region]) -> None:
@@ -55,7 +55,7 @@ class Regions:
                 self.seconds[mark] = seconds
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write the values of a piece, then mark it as done."""
+        """Write the values of the piece of work with the fingerprint `mark`, then mark it as done."""
         region, values = self._wanted[mark], np.ascontiguousarray(record[VALUES], dtype="<f8")
         packed = _SECONDS.pack(seconds)
         self._values[region.case, region.first : region.last] = values
@@ -64,7 +64,7 @@ class Regions:
         self.seconds[mark] = seconds
 
     def read(self, mark: str) -> Record:
-        """Return the record of a piece."""
+        """Return the record of the piece of work with the fingerprint `mark`."""
         region = self._wanted[mark]
         values = np.asarray(self._values[region.case, region.first : region.last])
         return {VALUES: values, COLUMNS: self._columns}
@@ -130,7 +130,7 @@ def _standing(store: Any, name: str, about: Mapping[str, Any], forms: Mapping[st
 
 
 def _store_at(root: Path) -> Any:
-    """Return the group of a store, new in an empty folder; `InputError` if the folder holds anything else."""
+    """Return the group of a store, new in an empty folder; raise `InputError` if the folder holds anything else."""
     import zarr
 
     if not any(root.iterdir()):
@@ -151,7 +151,7 @@ def _store_at(root: Path) -> Any:
 
 @contextmanager
 def locked_store(root: Path) -> Iterator[None]:
-    """Lock a store; `InputError` if another run does, Zarr is not installed, or the folder cannot be made."""
+    """Lock a store; raise `InputError` if another run has locked it, Zarr is missing, or the folder cannot be made."""
     try:
         import zarr  # noqa: F401
     except ImportError:

@@ -29,8 +29,9 @@ from laufruhe.studies.stores import Records, Task, stores_of
 # a worker imports everything anew, which takes two seconds
 POOL_PAYS = 4.0
 NEAR, FAR = 0.5, 30.0
-"""Seconds of points that one piece of work takes, on this machine and elsewhere: what is lost with a worker, and far
-more than handing it out takes."""
+"""Seconds that one piece of work takes, on this machine and on others.
+
+A worker that dies loses one piece, and handing out a piece takes far less time."""
 SHARES = 4
 """Pieces that each worker gets at least, so that all end together."""
 
@@ -44,7 +45,7 @@ def run(
 ) -> tuple[dict[str, xr.Dataset], dict[str, float]]:
     """Return all parts of a study as datasets, and the seconds that their points took on one core.
 
-    `InputError` where a scene is bad. The results do not depend on the number of processes `jobs`.
+    Raise `InputError` for a faulty scene. The results do not depend on the number of processes `jobs`.
 
     Parameters
     ----------
@@ -106,7 +107,7 @@ class PointResult:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Several tasks for one worker, with the scenes and the folder that scenes are named from."""
+    """Several tasks for one worker, with the scenes and the folder to which their paths are relative."""
 
     numbers: Sequence[int]
     tasks: Sequence[Task]

@@ -19,7 +19,7 @@ from laufruhe.units import readable
 
 MAX_DRAWS = 1_000_000_000
 MAX_TABLED = 100_000
-"""Draws that are written as CSV too: more are no table any more."""
+"""Largest number of draws that are also written as CSV."""
 LISTED = (5.0, 50.0, 95.0)
 CURVE = np.arange(1, 400) / 4.0
 _WORDS = 4
@@ -35,7 +35,7 @@ class Sampled(Part):
     own_chunk: ClassVar[int] = 1000
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings of a piece; a larger number of draws keeps existing ones."""
+        """Return the settings of a piece; a larger number of draws keeps existing pieces."""
         return {**super().settings(), "name": self.name, "draws": None, "chunk": self.piece}
 
     @property
@@ -83,7 +83,7 @@ class Sampled(Part):
         return xr.Dataset(variables, {"case": cases}, self.about(seed=self.seed))
 
     def columns(self, scenes: Scenes) -> dict[str, Column]:
-        """Return the numbers of a draw, by name."""
+        """Return the columns of numbers that each draw has, by name."""
         raise NotImplementedError
 
     def template(self, scenes: Scenes) -> Template | None:
@@ -111,6 +111,6 @@ def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[floa
 
 
 def percentiles_of(values: Array) -> list[float]:
-    """Return the values that 5, 50 and 95 % stay below; NaN without values."""
+    """Return the values below which 5, 50 and 95 % of all values lie; NaN without values."""
     finite = values[np.isfinite(values)]
     return [float(value) for value in np.percentile(finite, LISTED)] if len(finite) else [float("nan")] * len(LISTED)

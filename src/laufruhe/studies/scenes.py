@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 DISPLAY = {"report", "plots", "live", "cli"}
-"""Rooms that only show answers."""
+"""Folders of the package that only show answers, so that their code does not enter the fingerprint."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class Scenes:
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Return the tables of a point's problem, not to be modified; `InputError` for a missing table or quantity."""
+        """Return the tables of a point's problem, not to be modified; `InputError` reports a missing table or quantity."""
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
@@ -99,7 +99,7 @@ class Scenes:
             return at_equal_power(problem, reference)
 
     def refuse_open_phasing(self, problem: Problem, case: CaseTable) -> None:
-        """Raise `InputError` for an open star, which selects shafts by itself."""
+        """Raise `InputError` for an open crank star, whose search selects shafts by itself."""
         if problem.phasing is not None:
             rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
             raise self.refused(case, "phasing", rule, remedy)

@@ -1,8 +1,8 @@
 """Stores of finished points of a study, by fingerprint.
 
-There are two stores, for two shapes of records. Points of most kinds are as different as their engines, each costs
-milliseconds to minutes, and a study that is changed keeps those that are not: a line for each, added to a file, needs
-nothing but the package. Draws are millions of rows of the same numbers: regions of one array.
+There are two stores, for two shapes of records. A point of most kinds takes milliseconds to minutes, and the shape of
+its record depends on its engine. Such a record is one line of a file. A changed study keeps the lines of unchanged
+points. Random draws are millions of rows with equal columns; they are regions of one array.
 """
 
 from __future__ import annotations
@@ -32,21 +32,21 @@ class Store(Protocol):
 
     @property
     def seconds(self) -> Mapping[str, float]:
-        """Seconds of every point."""
+        """Computing time of every point [s], by fingerprint."""
 
     def read(self, mark: str) -> Record:
-        """Return one record; all of them may exceed memory."""
+        """Return the record of the point with the fingerprint `mark`; all records may exceed memory."""
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write a record; it has left the process when this returns."""
+        """Write the record of the point with the fingerprint `mark`; the system has it when this returns."""
 
 
 class FinishedPoints(AbstractContextManager["FinishedPoints"]):
     """Finished points of a file by fingerprint; each is on disk as soon as it is known.
 
-    Every line begins with a checksum of the rest of it. What is cut, changed or no point at all does not fit its
-    checksum, counts as not there, and is left alone: its point is solved again. Lines are added whole, between two ends
-    of line, so that neither a cut line nor another study in the same folder spoils them.
+    Every line begins with a checksum of the rest of the line. A line that is cut, changed or foreign does not match
+    its checksum; it stays in the file, and its point is solved again. Each line is added whole between two line feeds,
+    so that neither a cut line nor another study in the same folder spoils it.
     """
 
     def __init__(self, path: Path, marks: Collection[str]) -> None:
@@ -66,7 +66,7 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         return dict(self._records[mark])
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write a record and its seconds; it has left the process when this returns."""
+        """Write a record and its seconds; the system has both when this returns."""
         if self._stream is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = FileIO(self.path, "a")

@@ -52,16 +52,16 @@ def decide_scene(problem: Problem) -> tuple[Result, str, str]:
 
 
 Further: TypeAlias = Callable[[Evaluation], float]
-"""Further quantity of a design; `ModelError` states why it has none."""
+"""Function that returns a further quantity of a design; its `ModelError` states why the design has no value."""
 
 
 def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
     """Return the record of a scene [SI], NaN for missing values.
 
-    Its metric and the unit of that, status and proof ("nothing open" without decisions), initial and
-    final objective, and lower bound; mean and maximum force by mount [N], means over the operating
-    points by their weights; values of the decisions, and forces by order; values of the limits and
-    their shadow prices, by name; and further quantities, or the reason why one has no value.
+    The record has the metric with its unit, status and proof ("nothing open" without decisions), the initial and
+    final objective, and the lower bound. It has mean and maximum force by mount [N]; the mean is weighted over
+    operating points. It has the decisions, forces by order, and values and shadow prices of the limits, by name.
+    It ends with the further quantities, or the reason why a quantity has no value.
     """
     result, status, proof = decide_scene(problem)
     objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
@@ -133,7 +133,7 @@ def dataset(
 ) -> xr.Dataset:
     """Return solved scenes as one labelled dataset, with `extra` coordinates along the points.
 
-    Engines of one part may have different mounts, decisions and limits; those that one lacks are NaN.
+    Engines of one part may have different mounts, decisions and limits; values that an engine lacks are NaN.
     """
     mounts = list(dict.fromkeys(name for record in records for name in record["mean"]))
     units, limit_units = (
@@ -227,8 +227,8 @@ class SweptPart(Part):
     def checked(self, scenes: Scenes) -> list[Problem]:
         """Return the problem of every case at the first values of all sweeps.
 
-        The last value of every sweep is built too, so that errors are found before the run. `InputError` if a problem
-        cannot be built, a number is swept and set or swept twice, or the metrics differ in unit.
+        The last value of every sweep is built too, so that errors are found before the run. Raise `InputError` if a
+        problem cannot be built, a number is swept and set or swept twice, or the metrics differ in unit.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}

@@ -35,7 +35,7 @@ REFERENCE_STEPS = 1440
 """Steps over the period for the optimum from which a regret is measured."""
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
 KEEPS = 1e-3
-"""Share by which a design may be beyond a limit at the reference and count as a decision."""
+"""Largest relative violation of a limit, at the reference, with which a design counts as a decision."""
 _MIN_TIME, _LONG, _MAX_REPEATS = 0.02, 0.1, 50
 
 
@@ -46,18 +46,18 @@ class TradeRow:
     Attributes
     ----------
     error, estimate
-        Error of the objective of the given design relative to the reference, and its bound.
+        Error of the objective of the initial design relative to the reference, and its bound.
     evaluation, gradient, solve, fresh
-        Seconds; another design with the scene prepared (from nothing where that cannot
-        be prepared), its gradient with it, an optimum (of a processor), and an evaluation from nothing. NaN
-        where nothing is open, or this fidelity cannot decide it.
+        Times [s]: the objective of another design with the problem prepared (with all preparation if that is not
+        possible), the same with its gradient, an optimum (processor time), and the objective with all preparation.
+        NaN where nothing is open, or this fidelity cannot decide the problem.
     memory
-        Largest of an evaluation from nothing [byte].
+        Largest memory of an evaluation with all preparation [byte].
     optimum, violation
-        Reference objective of the design that this fidelity decides, and the largest share by which that is beyond a
-        limit at the reference; NaN as above.
+        Reference objective of the design that this fidelity decides, and the largest relative violation of a limit by
+        this design at the reference; NaN as above.
     regret
-        Relative excess of that objective over the best known design; NaN as above, and for an objective of zero.
+        Relative excess of `optimum` over the best known objective; NaN as above, and for an objective of zero.
     """
 
     name: str
@@ -97,12 +97,12 @@ class Trade:
     Attributes
     ----------
     value, optimum
-        Reference objective of the design as given, and of the best design known [SI]; NaN where nothing is open.
+        Reference objective of the initial design, and of the best design known [SI]; NaN where nothing is open.
     flywheel
-        Crank inertia at which the constant speed was priced [kg m2], and the relative
+        Crank inertia with which uneven speed was computed [kg m2], and the relative
         change of the objective that the uneven speed makes; None if no measure is of a load.
     time_domain
-        None for rigid mounts.
+        Difference of mount forces between time and frequency domain; None for rigid mounts.
     left_out
         Sentences about parts of the problem that a trade does not include.
     """
@@ -118,7 +118,7 @@ class Trade:
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
-    """Measure every fidelity, by the first of several objectives; `ModelError` where the problem has none."""
+    """Measure every fidelity, by the first of several objectives; raise `ModelError` if the problem has none."""
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
     left_out = [f"The trade takes the drawing, without {extra.words}." for extra in problem.extras]
@@ -153,7 +153,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
 
 
 def traded_part(problem: Problem) -> Problem:
-    """Return the problem that a trade measures: the drawing with the first objective only."""
+    """Return the problem that a trade measures: one with the first objective only."""
     return problem.changed(ranks=(), extras=())
 
 
@@ -175,8 +175,8 @@ def effort(problem: Problem) -> tuple[bool, int]:
 class _Decided:
     """Designs of the reference and of each fidelity, which start from it (F14).
 
-    The initial value is the reference objective of the design as given. The minimum is that of the best design known
-    that keeps the limits; zero of what cancels, NaN where none is.
+    `initial_value` is the reference objective of the initial design. `minimum` is the reference objective of the best
+    known design that keeps the limits. It is zero for an objective that cancels, and NaN if no design is known.
     """
 
     def __init__(self, scale: ErrorReference) -> None:

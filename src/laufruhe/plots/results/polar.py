@@ -30,7 +30,7 @@ PANEL, GAP, LEAD = 2.0, 0.42, 0.42
 # magnifications of the smaller direction
 ENLARGED = (20, 10, 5, 2, 1)
 STEADY = 0.25
-"""Share of the largest force: what moves less about a steady part is shown without it."""
+"""Share of the largest force; forces that vary less than this are drawn without their steady part."""
 NEEDLE = 1.0 / 24.0
 """Ratio of the smaller to the larger force below which the path is drawn over the crank angle."""
 LATERAL, VERTICAL = 1, 2

@@ -21,7 +21,7 @@ from laufruhe.solvers.result import Result
 
 applies = is_elastic
 SMALLEST = 1e-4
-"""Smaller ones are not shown."""
+"""Smallest transmissibility that is shown."""
 
 
 @styled()

@@ -1,8 +1,8 @@
 """Study kind `free forces`: free forces and couples of the first two orders by layout, compared with the literature.
 
-Handbooks tabulate them for the choice of a crankshaft: forces over F_h of one cylinder, couples
-about the middle over F_h a. An order that turns with the crank is taken by crank weights; what
-turns against it needs a shaft (Hasselgruber 1964, eq. 33, Fig. 29).
+Handbooks tabulate them for the choice of a crankshaft: forces over the force F_h of one cylinder, couples about the
+middle over F_h times the spacing a. Crank weights balance the part of an order that turns with the crank; the part that
+turns against it needs a balancer shaft (Hasselgruber 1964, eq. 33, Fig. 29).
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ _WORDS = {
 class FreeLoad:
     """Free load of one order that the pistons leave, its largest value over a turn relative to one cylinder's [1].
 
-    Couples over force times the spacing; against is what turns against the crank, which no crank weight takes.
+    Couples are relative to force times spacing. `against` is the part that turns against the crank; no crank
+    weight balances it.
     """
 
     force: float
@@ -58,8 +59,8 @@ class FreeLoad:
 def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     """Return free force and couple of the reciprocating masses in one order, about the middle of the engine.
 
-    Order of crank speed; the spacing is the unit of length of the couples [m]. `ModelError` where cylinders differ in
-    mechanism: there is no one cylinder to compare with.
+    `order` is a multiple of crank speed; `spacing` is the unit of length of the couples [m]. Raise `ModelError` if
+    cylinders differ in mechanism, because then no single cylinder gives the unit of force.
     """
     shapes = {(p.crank_radius, p.rod_length, p.offset, p.reciprocating_mass) for p in engine.slider_cranks}
     if len(shapes) > 1:
