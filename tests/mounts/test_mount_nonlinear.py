@@ -306,7 +306,7 @@ def test_limits_out_of_reach_are_not_met_and_said_so(tmp_path):
     found = solve_mounts(moved)
     # not stiffness alone: nothing is proven, and nothing proven is claimed
     assert found.status is Status.FAILED
-    assert "no design found" in found.message
+    assert "no design was found" in found.message
 
 
 @pytest.mark.slow

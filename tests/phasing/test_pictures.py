@@ -59,4 +59,4 @@ def test_command_fails_on_what_cannot_be(tmp_path):
     path.write_text(text.replace("best = 8", 'best = 8\nintervals = { max = "100 deg" }'), encoding="utf-8")
     answer = CliRunner().invoke(app, ["solve", str(path), "--out", str(tmp_path / "out"), "--no-plots"])
     assert answer.exit_code == 1
-    assert "no star can keep the intervals" in answer.output
+    assert "no crank star can keep the firing intervals" in answer.output

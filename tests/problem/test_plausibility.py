@@ -79,7 +79,9 @@ def test_throws_without_a_firing_order_are_asked_about(told: str) -> None:
     )
     found = [str(doubt) for doubt in load(engine).plausibility_warnings]
     assert found == ([] if told else [found[0]])
-    assert told or found[0].startswith("firing: is of all 10 cylinders within one turn of two; give a firing order")
+    assert told or found[0].startswith(
+        "firing: takes place in all 10 cylinders within one of the two turns of the cycle; give a firing order"
+    )
 
 
 def test_twins_that_fire_within_one_turn_are_usual() -> None:

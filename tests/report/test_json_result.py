@@ -193,7 +193,7 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     assert words in text.getvalue()
     page = result_document(result, (), "laufruhe evaluate twin.toml").as_markdown("")
     assert words in page
-    assert "firing: is at once in cylinder 1 and cylinder 2; give a firing order" in page
+    assert "firing: occurs at once in cylinder 1 and cylinder 2; give a firing order" in page
     assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.plausibility_warnings]
     assert fired(scenes.stated(scenes.GIVEN)) == "Firing order 1-3-4-2, every 180 deg."
 

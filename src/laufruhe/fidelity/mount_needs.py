@@ -41,7 +41,7 @@ def needs(problem: Problem) -> Choice:
         change = _moved(initial, _values(changed))
         if change > SAME:
             dependences.append(
-                f"{name}: without, or changed by a tenth, what is asked moves by up to {100.0 * change:.3g} %"
+                f"{name}: without it, or with it changed by a tenth, a measure changes by up to {100.0 * change:.3g} %"
             )
         else:
             left.append(OmittedPart(name, "no objective or limit depends on it"))

@@ -62,7 +62,7 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
         bore, stroke = part.bore or 2.0 * part.crank_radius, 2.0 * part.crank_radius
         usual = math.pi / 4.0 * bore**2 * stroke
         if not part.reciprocating_mass and part.has_rod:
-            rule = "makes no inertia force, so nothing of the pistons shakes the block"
+            rule = "makes no inertia force, so the pistons do not shake the block"
             yield Complaint("reciprocating mass", quantity_text(0.0, "kg"), rule, "check it")
         elif (
             usual > 0.0 and part.reciprocating_mass and not MIN_DENSITY < part.reciprocating_mass / usual < MAX_DENSITY
@@ -91,7 +91,7 @@ def _of_rotors(engine: Engine) -> Iterator[Complaint]:
 def _of_mounts(engine: Engine) -> Iterator[Complaint]:
     moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
     if engine.block is not None and engine.block.mass <= moving:
-        rule = f"is not more than the {quantity_text(moving, 'kg')} of its pistons and cranks, which it counts in"
+        rule = f"is not more than the {quantity_text(moving, 'kg')} of its pistons and cranks, which it includes"
         yield Complaint("mass of the block", quantity_text(engine.block.mass, "kg"), rule, "check its unit")
     stiffness = sum(max(spring.at_rest) for _, spring in every_spring(engine.mounts))
     if engine.block is None or not stiffness:
@@ -106,8 +106,8 @@ def _of_firing(engine: Engine) -> Iterator[Complaint]:
     groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in simultaneous_firings(engine)]
     remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
     if groups:
-        yield Complaint("firing", "", f"is at once in {'; in '.join(groups)}", remedy)
+        yield Complaint("firing", "", f"occurs at once in {'; in '.join(groups)}", remedy)
     fires = sorted(part.firing_angle for part in engine.cylinders)
     if len(fires) > _PAIR and fires[-1] - fires[0] < math.tau <= engine.cycle.angle - math.tau:
-        rule = f"is of all {len(fires)} cylinders within one turn of two"
+        rule = f"takes place in all {len(fires)} cylinders within one of the two turns of the cycle"
         yield Complaint("firing", "", rule, remedy)

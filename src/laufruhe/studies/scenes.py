@@ -56,7 +56,7 @@ class Scenes:
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Return the tables of a point's problem, not to be modified; `InputError` reports a missing table or quantity."""
+        """Return the tables of a point's problem, not to be modified; `InputError` names missing tables or keys."""
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:

@@ -32,7 +32,7 @@ STATED_ERROR = 1e-5
 """Relative error of a value from which the note states it."""
 PRICES = "Shadow price: decrease of the objective per unit by which the limit is relaxed."
 BOTH = "Second price: increase of the objective per unit by which the limit is tightened."
-ATTAINABLE = "Each column breaks the limit in its heading; none is an answer."
+ATTAINABLE = "Each column is a design that breaks the limit in its heading, so no column is a solution."
 ORDER = (
     "Each objective is minimised over the designs that the objectives above it leave optimal, within their tolerance. "
     "Price: decrease of the last objective per unit by which this one may be exceeded."
@@ -49,8 +49,8 @@ def decisions(result: Result) -> list[Table]:
     head, note = ("decision", "initial", "final", "bounds", "at bound", "shadow price"), ""
     if result.free:
         ends = (f"{d.name} from {with_unit(d.low, d.unit)} to {with_unit(d.high, d.unit)}" for d in result.free)
-        note = f"The optimum is not unique. Equally good within {share(result.problem.tolerance, 1)}, other decisions "
-        note += f"adapted: {', '.join(ends)}."
+        note = "The optimum is not unique. With the other decisions adapted, designs whose objective is equal within "
+        note += f"{share(result.problem.tolerance, 1)} have {', '.join(ends)}."
     return [Table(head, rows, title="Decisions", note=note)]
 
 

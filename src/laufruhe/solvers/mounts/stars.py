@@ -101,7 +101,9 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     by_firing = problem.depends_on_firing_order and not phasing.shares_throws
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MAX_LISTED:
-        raise ModelError(f"more than {MAX_LISTED} stars cannot be open together with mounts; fix the firing order")
+        raise ModelError(
+            f"more than {MAX_LISTED} crank stars cannot be open together with mounts; fix the firing order"
+        )
     on_initial = replace(phasing, realise=lambda candidate: _on_initial_mounts(phasing.realise(candidate)))
     lists_all = phasing.method is Method.ENUMERATION
     scored: list[tuple[float, Star]] = []

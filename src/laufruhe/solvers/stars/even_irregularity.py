@@ -38,7 +38,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     violated = violated_limits(wheel, initial)
     if violated:
         reason = (
-            f"no star keeps {quote_names(violated)}: the degree of irregularity is equal for all even stars; "
+            f"no crank star keeps {quote_names(violated)}: the degree of irregularity is equal for all even stars; "
             "increase the flywheel's inertia"
         )
         return no_star(problem, reason, conflict=violated)
@@ -90,7 +90,7 @@ def _any_star(problem: Problem, phasing: Phasing) -> Result:
     """Return the result of the first crank star; all crank stars have the same objective."""
     families, reason = families_of(phasing)
     if not families:
-        return no_star(problem, f"no star exists: {reason}")
+        return no_star(problem, f"no crank star exists: {reason}")
     family = families[0]
     candidate = family.candidate(phasing, family.first)
     result = solve_fixed(replace(phasing.realise(candidate), phasing=None))

@@ -92,7 +92,7 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
             # each star may violate other limits
             limits = (quote_names(names) or "the bounds") + " together" * (len(names) > 1)
             tried = counted(search_result.infeasible, "design")
-            reason = f"no star keeps {limits}, whatever else is decided ({tried} tried)"
+            reason = f"no crank star keeps {limits}, whatever else is decided ({tried} tried)"
             return no_star(problem, reason, conflict=names)
         cause = "the time limit" if is_time_over() else f"phasing.time_limit = {phasing.time_limit:g} s"
         reason = f"no feasible design was found in {cause}; raise it"
@@ -132,7 +132,7 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
     """Solve the problem of the best even crank star, and certify it with the bound of all designs (S17)."""
     designs = [(design, entry) for design in search_result.designs if (entry := design.ranking_entry).firing_orders]
     if not designs:
-        return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
+        return no_star(problem, "no crank star has a firing order that keeps the firing intervals allowed")
     remaining = iter(designs)
     for best, first in remaining:
         left_out = phasing.without(_needed_shafts(problem, phasing, best))
@@ -142,7 +142,9 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
         if StarDesign(candidate, result).is_feasible:
             break
     else:
-        reason = f"each of the best {counted(len(designs), 'star')} violates a limit between the samples of the search"
+        reason = (
+            f"each of the best {counted(len(designs), 'crank star')} violates a limit between the samples of the search"
+        )
         return no_star(problem, f"{reason}; raise phasing.best or fidelity.samples", Status.FAILED)
     bound, zero_level = search_result.bound, numerical_zero(problem)
     if result.objective and not any(phasing.is_geometry_open):

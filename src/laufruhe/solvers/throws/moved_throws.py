@@ -89,7 +89,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
             designs.append((result.objective.value, crank.at(changes), result, result.certificate))
     if not designs:
         limits = quote_names(limit.name for limit in problem.limits) or "the firing intervals"
-        return no_star(problem, f"no crank was found that keeps {limits}, but none is excluded", Status.FAILED)
+        return no_star(problem, f"no crank was found that keeps {limits}, but one may exist", Status.FAILED)
     value, candidate, best, proof = min(designs, key=lambda design: design[0])
     method = f"{proof.method}; throws moved from {counted(count, 'crank')}"
     phasing_of_order = replace(phasing, firing_order=candidate.firing_order)

@@ -80,13 +80,13 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
     if not phasing.intervals.holds([phasing.even_interval]):
         interval = f"{math.degrees(phasing.even_interval):g}"
         return (
-            f"no star can keep the intervals: {phasing.cylinders} cylinders fire {interval} deg apart on average, "
-            f"phasing.intervals allows {allowed_text}"
+            f"no crank star can keep the firing intervals: {phasing.cylinders} cylinders fire {interval} deg apart "
+            f"on average, phasing.intervals allows {allowed_text}"
         ), True
     if phasing.throws is not None:
         return why_no_order(phasing, phasing.throws), True
     if not phasing.continuous:
-        return f"no star exists: {families_of(phasing)[1]}", True
+        return f"no crank star exists: {families_of(phasing)[1]}", True
     text = f"no crank and firing order keeps the firing intervals allowed, {allowed_text}"
     patterns, complete = _firing_patterns(phasing)
     if not patterns or patterns[0].broken <= _ROUNDING:
