@@ -1,6 +1,6 @@
 """Live model of a problem: loads that are affine in the open numbers (P1).
 
-The numbers are those of `AffineModel`, the norms are named, and the page takes them as results do. Measures that
+The numbers come from `AffineModel`. Norms are given by name, and the page computes them as results do. Measures that
 the model cannot compute are listed with a reason.
 """
 

@@ -39,7 +39,7 @@ BEFORE, AFTER = GREY, BLUE
 DPI = 150
 GAP = 0.42
 NARROWEST, WIDEST = 6.4, 10.2
-"""Width of a page [inch]; the widest keeps its size, and that of its letters, in a report."""
+"""Width of a page [inch]; the widest page keeps its size in a report."""
 EDGE = 0.3
 """Margin around the content of a page [inch]."""
 _BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2

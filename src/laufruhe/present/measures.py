@@ -97,7 +97,7 @@ def pad_orders(values: Array, length: int) -> Array:
 
 
 def limits_of(result: Result) -> tuple[LimitValue, ...]:
-    """Return limits as solved, or those of an evaluated design."""
+    """Return the limits of a solved result, or the limits of an evaluated design."""
     return result.limits or limit_values(result.problem, result.final)
 
 

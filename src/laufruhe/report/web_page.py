@@ -46,7 +46,7 @@ def template() -> Template:
 
 
 def data_address(svg: str) -> str:
-    """Return a picture as a data address; names within it cannot clash with those of another."""
+    """Return a picture as a data address; names within it cannot clash with names of another picture."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
 
 

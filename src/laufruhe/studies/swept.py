@@ -39,7 +39,7 @@ _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
 def decide_scene(problem: Problem) -> tuple[Result, str, str]:
-    """Return the result of a scene, its status and its proof; evaluate the given design if there is no solution."""
+    """Return the result of a scene, its status and its proof; evaluate the initial design if there is no solution."""
     try:
         result = solve(problem)
     except SolverError:
@@ -212,7 +212,7 @@ class SweptPart(Part):
         return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return the record of one scene: its proven optimum, or the given design if nothing is open."""
+        """Return the record of one scene: its proven optimum, or the initial design if nothing is open."""
         return solve_scene(scenes.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
