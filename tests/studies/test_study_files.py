@@ -103,7 +103,7 @@ BAD = [
     (REPLICA.replace("{m} kg", "{m} mm"), "'mm' is not a unit of a mass"),
     (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
     (REPLICA.replace('within = "5 %"', ""), "needs `is` and `within` together; give both"),
-    (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by is and within, or by holds"),
+    (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by `is` and `within`, or by `holds`"),
     (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
     (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),

@@ -19,7 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.solvers.result import Result, Status
 
-# endings of their folders
+# endings of the results folders, by command
 _SUFFIX = {"solve": "", "evaluate": "-initial"}
 
 Answer = Callable[[Problem, Listener], Result]

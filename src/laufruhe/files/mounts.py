@@ -362,7 +362,7 @@ class _Numbers:
             self.decisions[d] = replace(decision, drives=tuple(drives))
 
     def follow(self, leader: int, keys: Sequence[str], mirrored: bool) -> None:
-        """Let the numbers of some keys of the last spring follow those of the spring `leader`, perhaps mirrored in y = 0."""
+        """Let some keys of the last spring follow those of the spring `leader`, perhaps mirrored in y = 0."""
         last = len(self.rows) - 1
         for number in (number for key in keys for number in _FIELDS[key][1]):
             gain = _MIRRORED[number] if mirrored else 1.0

@@ -256,8 +256,8 @@ def failed_search(search: MountSearch, result: Result) -> Result:
         violated = [program.constraint_names[k] for k in np.flatnonzero(excess > 1e-6)]
         names = " and ".join(f"'{name}'" for name in dict.fromkeys(violated) if name != "modes")
     message = (
-        f"no design was found that keeps {names or 'the limits'}, from {sum(o.starts for o in search.optima)} starts (the "
-        f"nearest design violates a limit by {nearest.violation:.3g} of that limit); relax it, or open more numbers"
+        f"no design was found that keeps {names or 'the limits'}, from {sum(o.starts for o in search.optima)} starts "
+        f"(the nearest design violates a limit by {nearest.violation:.3g} of it); relax it, or open more numbers"
     )
     design = search.best.design if search.best else None
     nearest_design = nearest_record(search.problem, design.evaluation, priced_decisions(design)) if design else None
