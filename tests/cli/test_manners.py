@@ -187,7 +187,7 @@ def test_other_options_before_the_command_are_told_where_they_stand(here: Path) 
     assert (found.exit_code, list(here.iterdir())) == (2, [])
     assert (
         found.output
-        == "laufruhe: --json: stands behind the command; write it there, as in: laufruhe check ... --json\n"
+        == "laufruhe: --json: belongs after the command; write it there, as in: laufruhe check ... --json\n"
     )
     assert "No such option" in run.invoke(app, ["--nothing", "check", str(SINGLE)]).output
 

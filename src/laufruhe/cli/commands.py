@@ -43,7 +43,7 @@ from laufruhe.numerics.cores import ONE_THREAD
 
 
 class _Commands(TyperGroup):
-    """Commands of the core and of extensions; an option of a command stands behind it."""
+    """Commands of the core and of extensions; an option of a command is written after the command."""
 
     @cached_property
     def _further(self) -> dict[str, Any]:
@@ -69,7 +69,7 @@ class _Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Parse as typer, but explain an option that belongs behind the command."""
+        """Parse as typer, but explain an option that belongs after the command."""
         before = [arg.partition("=")[0] for arg in takewhile(lambda arg: arg.startswith("-"), args)]
         common = {option for param in self.get_params(ctx) for option in param.opts}
         for option in (option for option in before if option not in common):
@@ -81,7 +81,7 @@ class _Commands(TyperGroup):
                 command = next((word for word in args if word in takers), takers[0])
                 remedy = f"write it there, as in: laufruhe {command} ... {option}"
                 with exit_statuses(Path("laufruhe")):
-                    raise refused(option, "", "stands behind the command", remedy)
+                    raise refused(option, "", "belongs after the command", remedy)
         return super().parse_args(ctx, args)
 
     def make_context(self, *args: Any, **kwargs: Any) -> Any:

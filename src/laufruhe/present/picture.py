@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Bars:
-    """Bars along the first axis, or lying if `upright` is false, with their numbers on top."""
+    """Bars along the first axis, or horizontal ones if `upright` is False, with `numbers` at their ends."""
 
     places: Any = ()
     values: Any = ()
@@ -87,8 +87,8 @@ Mark: TypeAlias = Line | Bars | Area | Words
 class Axis:
     """Axis of numbers, or of texts at their places (`ticks`).
 
-    The end may be the smaller value; without ends the marks decide. A logarithmic axis takes the first figures
-    of its ticks.
+    `ends` may descend; without ends, the marks determine the range. `log` has the first figures of the ticks of a
+    logarithmic axis.
     """
 
     label: str = ""

@@ -12,8 +12,8 @@ from laufruhe.extension import extended
 class ResultPicture:
     """Name and caption of a result's picture.
 
-    The functions `applies` and `figure` of its home module take a result; by default it is the module of that name in
-    `plots.results`.
+    The functions `applies` and `figure` of the module `home` take a result. By default `home` is the module of
+    `plots.results` with the name of the picture.
     """
 
     name: str

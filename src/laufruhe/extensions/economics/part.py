@@ -250,7 +250,7 @@ def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
         rule = f"are present, but '{case.name}' is compared without balancer shafts"
         raise scenes.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
     if len(problem.engine.slider_cranks) <= cylinders:
-        rule = f"has no more cylinders in '{case.name}' than the {cylinders} that it is compared with"
+        rule = f"has no more cylinders in '{case.name}' than the {cylinders} of the engine compared"
         raise scenes.refused(case, "engine", rule, "name an engine with more")
     with scenes.blamed(Point(case), "more_cylinders"):
         check_comparable(problem, reference)

@@ -62,7 +62,7 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
         raise ModelError(f"{name} is minimised over unbalances and mounts, not over {other_kinds}; fix it, or limit it")
     names = quote_names(violated_limits(limits, relaxed.final))
     message = (
-        f"the best design found breaks {names}: beside {other_kinds} a run-up is checked, not designed for; "
+        f"the best design found breaks {names}: with {other_kinds} open, a run-up is only checked, not optimised; "
         f"relax it, fix {other_kinds}, or limit travel"
     )
     return replace(

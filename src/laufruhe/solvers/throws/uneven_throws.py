@@ -176,7 +176,9 @@ def _without_design(problem: Problem, phasing: Phasing, box_bound: ThrowBound | 
     remedy = (
         "" if box_bound is None else f", and {box_bound.boxes} boxes of throws do not exclude one; raise search.boxes"
     )
-    return no_star(problem, f"no crank was found that keeps {names}{remedy}; relax them, or open more", Status.FAILED)
+    return no_star(
+        problem, f"no crank was found that keeps {names}{remedy}; relax them, or open more numbers", Status.FAILED
+    )
 
 
 def local_optimum(
