@@ -116,7 +116,7 @@ def _evaluate_stars(
         complete = complete or is_proven
         designs.append(EvenDesign(phasing, family, steps, (), value, bound, is_proven))
     designs.sort(key=lambda design: design.value)
-    method = "star without couples; its objective is common to all even stars"
+    method = "crank star without couples; its objective is common to all even stars"
     return EvenStarResult(tuple(designs), bound, complete, len(designs), method)
 
 

@@ -67,7 +67,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
         return no_star(problem, why_none_fires(phasing)[0])
     designs: list[tuple[float, Candidate, Result, Certificate]] = []
     count = 0
-    for start in until_time_limit(with_progress("cranks that throws leave", starts)):
+    for start in until_time_limit(with_progress("start cranks", starts)):
         crank, realised = _MovedCrank(phasing, start), phasing.realise(start)
         angles = tuple(_angle_decisions(phasing, start))
         options = replace(realised.search, starts=min(realised.search.starts, MAX_SEARCHES))
