@@ -100,7 +100,7 @@ class RotorList:
         self.rotors.append(rotor)
 
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
-        """Add a decision about the position of rotors along an axis (0 = x, 1 = y, 2 = z) if it is open.
+        """Add the decision `name` about the position of rotors along an axis (0 = x, 1 = y, 2 = z) if it is open.
 
         Rotors without an unbalance do not move.
         """

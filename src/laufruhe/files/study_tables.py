@@ -50,7 +50,7 @@ class SweepTable(Table):
 
     @property
     def count(self) -> int:
-        """Number of its values."""
+        """Number of swept values."""
         return (self.points or 0) if self.values is None else len(self.values)
 
 

@@ -30,7 +30,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Template:
-    """Layout of the numbers of many draws: the number of draws of each case and of one piece of work, and columns."""
+    """Layout of the numbers of many draws: cases, draws of each case, draws of a piece of work (`chunk`), and columns."""
 
     cases: tuple[str, ...]
     draws: int

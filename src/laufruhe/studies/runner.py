@@ -96,7 +96,7 @@ def run(
 
 @dataclass(frozen=True)
 class PointResult:
-    """Answer of a task, with the task's fingerprint as the machine `host` found it."""
+    """Record of the task with the index `task`; `mark` is its fingerprint as computed on the machine `host`."""
 
     task: int
     mark: str
