@@ -30,7 +30,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Template:
-    """Layout of the numbers of many draws: cases, draws of each case, draws of a piece of work (`chunk`), and columns."""
+    """Layout of the numbers of many draws: cases, draws of each case, draws of one piece (`chunk`), and columns."""
 
     cases: tuple[str, ...]
     draws: int

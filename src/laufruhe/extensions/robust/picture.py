@@ -26,7 +26,7 @@ def figure(result: Result) -> Figure:
     """Draw the share of engines below each objective for both designs, above bars of the cost of tolerances."""
     details, unit = result.details, objective_unit(result)
     if not isinstance(details, RobustResult):
-        raise ValueError("the result is not of built engines")
+        raise ValueError("the result has no built engines")
     layout = page(2, 1, (WIDE, 2.5), gap=0.7)
     first, second = layout.panels
     for design, colour in ((details.nominal, BEFORE), (details.robust, AFTER)):

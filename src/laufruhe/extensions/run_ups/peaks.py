@@ -170,7 +170,7 @@ class RunPeaks:
         """Steps of run-up and shut-down; () if they are too many."""
         run = self._problem.engine.extra(Run)
         if run is None:
-            raise TypeError("there is no run-up")
+            raise TypeError("the problem has no run-up")
         arguments = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
         sweeps = [sweep_of(*sweep, self._coarser) for sweep in arguments]
         return tuple(sweep for sweep in sweeps if sweep is not None) if None not in sweeps else ()
@@ -210,7 +210,7 @@ def signal_of(measure: Measure, response: RunResponse) -> Array:
     """Return the signal whose largest length is the measure, shape (times, places, d)."""
     channel = measure.channel
     if not isinstance(channel, RunChannel):
-        raise TypeError(f"{measure.name} is not of a run-up")
+        raise TypeError(f"{measure.name} is no measure of a run-up")
     signal: Array = getattr(response, channel.part)
     return signal
 

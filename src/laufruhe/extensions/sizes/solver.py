@@ -174,7 +174,7 @@ def solve_star_sizes(problem: Problem) -> Result:
     """Return the best star with its optimal sizes and unbalances; the best value so far bounds the next search."""
     phasing = problem.phasing
     if phasing is None:
-        raise ValueError("nothing of the phasing is open")
+        raise ValueError("the problem has no open phasing")
     started = time.perf_counter()
     if phasing.continuous or phasing.throw_bounds is not None:
         rule = "open sizes of the running gear need even firing or fixed throws"
