@@ -43,7 +43,7 @@ def at(place: complex) -> tuple[float, float]:
 
 
 def bar(axes: Axes, start: tuple[complex, float], end: tuple[complex, float], order: float, **look: Any) -> None:
-    """Draw a rod or a web as two circles and the area between them."""
+    """Draw a rod or a web: two circles, each a centre [m] and a radius [m], and the area between them."""
     (first, start_radius), (second, end_radius) = start, end
     along = cmath.phase(second - first)
     turns = np.linspace(0.5 * math.pi, 1.5 * math.pi, 13)
@@ -142,7 +142,7 @@ class Scene:
 
     @property
     def is_flat(self) -> bool:
-        """True if the cylinders lie: the second view is from above."""
+        """True if all cylinders lie, so that the second view is from above."""
         leaning = [abs(math.cos(part.bank)) for part in self.engine.slider_cranks]
         return max(leaning) < 0.5
 

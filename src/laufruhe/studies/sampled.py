@@ -19,7 +19,7 @@ from laufruhe.units import readable
 
 MAX_DRAWS = 1_000_000_000
 MAX_TABLED = 100_000
-"""Largest number of draws that are also written as CSV."""
+"""Largest number of draws, over all cases, that are also written as CSV."""
 LISTED = (5.0, 50.0, 95.0)
 CURVE = np.arange(1, 400) / 4.0
 _WORDS = 4

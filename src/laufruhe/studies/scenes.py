@@ -1,4 +1,4 @@
-"""Scenes of a study: read once, changed point by point, and identified by a fingerprint of all their inputs."""
+"""Scenes (problems) of a study: read once, changed for each point, and identified by a fingerprint of all inputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DISPLAY = {"report", "plots", "live", "cli"}
 
 @dataclass(frozen=True)
 class Point:
-    """Piece of work: a scene, changed values by their paths, a metric in place of its objective.
+    """Piece of work: a scene (problem), changed values by their paths, a metric in place of its objective.
 
     `shafts` names the balancer shafts that remain, all if None. `base` replaces the tables of the
     case's problem file. `span` is the range of draws, first number and end.

@@ -39,7 +39,7 @@ _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
 def decide_scene(problem: Problem) -> tuple[Result, str, str]:
-    """Return the result of a scene, its status and its proof; evaluate the initial design if there is no solution."""
+    """Return result, status and proof of a problem of a study; evaluate the initial design if there is no solution."""
     try:
         result = solve(problem)
     except SolverError:
@@ -56,7 +56,7 @@ Further: TypeAlias = Callable[[Evaluation], float]
 
 
 def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
-    """Return the record of a scene [SI], NaN for missing values.
+    """Return the record of a problem of a study [SI], NaN for missing values.
 
     The record has the metric with its unit, status and proof ("nothing open" without decisions), the initial and
     final objective, and the lower bound. It has mean and maximum force by mount [N]; the mean is weighted over

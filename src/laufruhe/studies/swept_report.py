@@ -37,7 +37,7 @@ def with_unit(values: xr.DataArray) -> str:
 
 
 def without_rounding(value: float, scale: float) -> float:
-    """Return the value, or zero if it is a rounding relative to the scale."""
+    """Return the value, or zero if it is a rounding error relative to the scale."""
     return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
 
 
@@ -53,7 +53,7 @@ def readable_metric(data: xr.Dataset) -> xr.Dataset:
 
 
 def claim_of(data: xr.Dataset) -> str:
-    """Return the strongest claim that holds for all final designs."""
+    """Return "proven optimum" if all decided designs are proven, else "best found"."""
     decided = (data["proof"].values != NOTHING_OPEN) & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
 
@@ -109,7 +109,7 @@ def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
 
 
 def spread(data: xr.Dataset, name: str) -> Any:
-    """Return numbers along an axis; labels become 0, 1, 2 ..."""
+    """Return the values of a coordinate as numbers along an axis; labels become 0, 1, 2 ..."""
     values = data[name].values
     labels = list(dict.fromkeys(values.tolist()))
     return values if values.dtype.kind in "fi" else np.array([labels.index(value) for value in values.tolist()])
@@ -138,7 +138,7 @@ def metric_axis(data: xr.Dataset, *names: str) -> p.Axis:
 
 
 def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Colour]]:
-    """Return label, points and colour of every line."""
+    """Return label, mask of its points and colour of every line."""
     keyed_by = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
     columns = [data[name].values.tolist() for name in keyed_by]
     keys = list(zip(*columns, strict=True)) if keyed_by else [()] * data.sizes["point"]
