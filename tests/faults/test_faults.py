@@ -94,7 +94,7 @@ def test_deep_nesting(deep: int, open_close: str, tmp_path: Path) -> None:
 def test_deep_texts_are_not_parsed(text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A parser takes memory with the square of a key's parts: 40 kB took 1.6 GB."""
     monkeypatch.setattr(tomllib, "loads", None)
-    refused(written(tmp_path, text), f"line {1 + text.count(chr(10))}", "nested more than 16 deep")
+    refused(written(tmp_path, text), f"line {1 + text.count(chr(10))}", "nested more than 16 levels deep")
 
 
 @pytest.mark.parametrize(

@@ -144,7 +144,7 @@ def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
 def _rebuilt(
     tables: Mapping[str, Any], path: Path, candidate: Candidate | None, changes: Mapping[Place, str | float]
 ) -> Drawing:
-    """Return the drawing of a file with other numbers at some addresses; of one candidate if crank stars are open."""
+    """Return the engine of a file with other numbers at some addresses; for one candidate if crank stars are open."""
     fidelity = tables.get("fidelity", {})
     if fidelity.get("kinematics") == "auto":
         options = {key: value for key, value in fidelity.items() if key not in ("kinematics", "tolerance")}
@@ -159,7 +159,7 @@ def _rebuilt(
         values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
         faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
         why = " and ".join(map(str, faults))
-        raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
+        raise ModelError(f"this engine cannot be built with {values}: {why}; narrow its bounds or tolerances") from None
     return Drawing(rebuilt.engine, rebuilt.points, rebuilt.decisions, rebuilt.mount_numbers)
 
 
@@ -190,7 +190,7 @@ def _merged(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     for place, node in walk(tables):
         where = key_path(place)
         if len(place) > DEEPEST:
-            raise refused(where, "", f"is nested more than {DEEPEST} deep", "flatten it", path)
+            raise refused(where, "", f"is nested more than {DEEPEST} levels deep", "flatten it", path)
         strange = _UNSEEN.search("".join(text for text in (*place[-1:], node) if isinstance(text, str)))
         if strange is not None:
             rule = f"contains U+{ord(strange.group()):04X}, which is not a printable character"
@@ -217,7 +217,7 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
         raise refused("file", "", f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8", path) from None
     deep = line_deeper_than(DEEPEST, text)
     if deep is not None:
-        raise refused(f"line {deep}", "", f"is nested more than {DEEPEST} deep", "flatten it", path)
+        raise refused(f"line {deep}", "", f"is nested more than {DEEPEST} levels deep", "flatten it", path)
     try:
         return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -296,7 +296,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
 
 
 def _check_decisions(problem: Problem) -> None:
-    """Raise `Refused` for open numbers without effect or objective, for too many, and for renamed operating points."""
+    """Raise `Refused` for too many open numbers, and for ones without effect or objective or that rename points."""
     decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
     if len(decisions) > MAX_OPEN:
         remedy = "fix some numbers, or couple some to others"
