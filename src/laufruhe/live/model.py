@@ -39,7 +39,7 @@ from laufruhe.solvers.result import Result
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW, SERVED = "use laufruhe page {file}", "the server optimises it, or use its own control"
 OBJECTIVE = "objective"
-NO_SLIDERS = "Nothing that is open here can be moved live."
+NO_SLIDERS = "None of the open numbers can be moved by a slider."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:

@@ -81,7 +81,7 @@ class FileSet:
         if not above.is_dir():
             raise self.refused(f"cannot be written ('{above}' is not a folder)")
         if folder in (working_folder := Path.cwd(), *working_folder.parents) or os.path.ismount(folder):
-            raise self.refused("cannot be replaced while it is worked in or mounted")
+            raise self.refused("cannot be replaced, because it contains the working folder or is a mount point")
         if not folder.exists():
             return frozenset()
         verb, made = _made(folder)
