@@ -1,7 +1,8 @@
 """Branch and bound: divide the set of designs into parts, lowest bound first, until no part can hold a better design.
 
-All proofs by division share this loop (T9, Z12, P8, P13, S29, S30, V13, E38, R4 to R7). The loop sets the order of the
-parts, the limits of time and number, the progress reports and the end. A subclass states the parts and their bounds.
+A part is a set of designs. All proofs by division share this loop (T9, Z12, P8, P13, S29, S30, V13, E38, R4 to R7). The
+loop sets the order of the parts, the limits of time and of the number of parts, the progress reports and the end. A
+subclass states the parts and their bounds.
 """
 
 from __future__ import annotations
@@ -53,7 +54,7 @@ INFEASIBLE_PART = FathomedPart(math.inf)
 """Part without any feasible design."""
 
 BoundedParts: TypeAlias = Iterable[tuple[float, P] | FathomedPart]
-"""Pairs of lower bound and part, or fathomed parts."""
+"""Result of a division: a pair (lower bound [SI], part) for each part to divide further, or a fathomed part."""
 
 
 class BranchAndBound(Generic[P]):
@@ -72,7 +73,7 @@ class BranchAndBound(Generic[P]):
     reports_bounds
         Whether bounds are bounds of the objective, and appear in progress reports.
     node_count, open_nodes
-        Number of parts bounded so far, the root included, and parts that remain, as a heap.
+        Number of parts bounded so far, the root included; heap of the parts that remain.
     complete
         Whether the search ended by its own criterion, and not by a limit of time or number.
     """
@@ -89,12 +90,12 @@ class BranchAndBound(Generic[P]):
 
     @property
     def cutoff(self) -> float:
-        """Bound from which a part is not divided [SI]."""
+        """Level [SI]: a part is not divided if its lower bound is at least this level."""
         return self.value
 
     @property
     def level(self) -> float:
-        """Lower bound of the objective of designs cut off from their parts [SI]; infinite if none are."""
+        """Lower bound of the objective of all designs that were cut off from parts [SI]; infinite if none were."""
         return math.inf
 
     def contains_witness(self, _: P) -> bool:
@@ -102,7 +103,7 @@ class BranchAndBound(Generic[P]):
         return False
 
     def propose(self, part: P) -> None:
-        """Search for a better incumbent in the part with the lowest bound, before it is divided."""
+        """Search for a better incumbent in the part with the lowest bound, or do nothing, as by default."""
 
     def is_fathomed(self, node: OpenNode[P]) -> bool:
         """Return True if neither this part nor any part with a higher bound need be divided."""
@@ -122,14 +123,14 @@ class BranchAndBound(Generic[P]):
         Parameters
         ----------
         root
-            Lower bound of the set of all designs, and that set; or that the whole set is fathomed.
+            Lower bound [SI] and set of all designs as a pair, or a `FathomedPart` if that set needs no division.
         max_nodes
             Largest number of parts, the root included.
 
         Returns
         -------
         float
-            The lowest bound of all parts that remain or were fathomed [SI]. Nothing lowers it to that of the incumbent.
+            The lowest bound of all parts that remain or were fathomed [SI], even if it is above the incumbent.
         """
         self.open_nodes, self.node_count, self._minimum = [], 1, math.inf
         if isinstance(root, FathomedPart):
@@ -179,7 +180,7 @@ class Box(NamedTuple):
     Attributes
     ----------
     narrows
-        Whether the halves are worth narrowing before they are bounded.
+        Whether narrowing the sides of each half, before it is divided in turn, is expected to pay.
     """
 
     lower: Array
@@ -200,7 +201,7 @@ def halves(box: Box, cut: float | None = None) -> tuple[tuple[Array, Array], tup
 
 
 def widest(lower: Array, upper: Array, root_width: Array) -> int:
-    """Return the index of the side that is longest relative to the root box, all of shape (n,)."""
+    """Return the index of the longest side of a box, relative to the root box; all arguments have the shape (n,)."""
     return int(np.argmax((upper - lower) / np.maximum(root_width, 1e-300)))
 
 
@@ -231,7 +232,7 @@ class BoxBisection(BranchAndBound[Box]):
 
     @property
     def cutoff(self) -> float:
-        """Bound from which no design of a box is better by the gap tolerance [SI]."""
+        """Lower bound of a box from which none of its designs is better by the gap tolerance [SI]."""
         return self.value - GAP_SAFETY * self.gap_tolerance if self.value < math.inf else math.inf
 
     def contains_witness(self, box: Box) -> bool:
@@ -253,7 +254,7 @@ class BoxBisection(BranchAndBound[Box]):
             yield half if isinstance(half, FathomedPart) else (max(nodes[k // 2].bound, half[0]), half[1])
 
     def run(self, root: tuple[float, Box] | FathomedPart | None, max_boxes: int) -> BoxResult:
-        """Divide the root box, or without one the remaining boxes, into at most `max_boxes` boxes in total."""
+        """Divide the root box, or the remaining boxes if `root` is None, into at most `max_boxes` boxes in total."""
         bound = self.resume(max_boxes) if root is None else self.divide(root, max_boxes)
         lowest = [node.part for node in self.next_nodes(MAX_PLACES) if node.bound < self.cutoff]
         return BoxResult(bound, self.node_count, tuple(0.5 * (box.lower + box.upper) for box in lowest))
@@ -288,7 +289,7 @@ class BatchBisection(BoxBisection):
         return [*self.bound_boxes([half for box in boxes for half in halves(box)])]
 
     def bound_boxes(self, boxes: Sequence[tuple[Array, Array]]) -> list[tuple[float, Box]]:
-        """Return pairs of lower bound and box for boxes (lower, upper); each box has its side to halve."""
+        """Return pairs (lower bound [SI], box) for boxes (lower, upper); each returned box has its side to halve."""
         lower, upper = (np.array([box[k] for box in boxes]) for k in (0, 1))
         results = zip(boxes, *self._bounder.bounds(lower, upper), strict=True)
         return [(float(bound), Box(*box, int(side))) for box, bound, side in results]
@@ -307,7 +308,7 @@ def bisect_box(
     Parameters
     ----------
     bounder
-        Lower bounds of the objective on boxes.
+        Method that returns lower bounds of the objective on boxes.
     lower, upper
         Bounds of the open numbers, shape (n,).
     value
@@ -326,7 +327,10 @@ def bisect_in_stages(
     bounder: BoxBounds, lower: Array, upper: Array, value: float, gap_tolerance: float, max_boxes: int,
     shares: Sequence[float], witness: Witness | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield the result of `bisect_box` after each of these increasing shares of its boxes; nothing if it has none."""
+    """Yield the result of `bisect_box` after each share of `max_boxes` boxes; yield nothing if `max_boxes` is zero.
+
+    The shares rise and are at most one. The other parameters are those of `bisect_box`.
+    """
     bisection = BatchBisection(bounder, value, gap_tolerance, witness)
     for k, share in enumerate(shares if max_boxes else ()):
         root = None if k else bisection.bound_boxes([(lower, upper)])[0]

@@ -1,8 +1,8 @@
 """Lower bound, gap and certificate of a design, computed from the exact model (P4-P6).
 
-A norm of rows V is at least <Z, V> for every Z in the unit ball of its dual norm. With multipliers mu >= 0 on the
-limits, the sum of these inequalities is an affine lower bound of the objective. Its minimum over the sets of the
-decisions has a closed form. Any Z and mu give a valid bound, so a solver only has to propose good ones.
+The rows V of a load have a norm of at least <Z, V> for every Z in the unit ball of the dual norm. With multipliers
+mu >= 0 on the limits, the sum of these inequalities is an affine lower bound of the objective. Its minimum over the
+sets of the decisions has a closed form. Any Z and mu give a valid bound, so a solver only has to propose good ones.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ class Certificate:
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Dual rows of an affine problem: Z of terms, and mu Z of limits with multipliers mu, shape (k, d) each."""
+    """Dual rows of an affine problem, shape (k, d) each: Z of a term, and mu Z of a limit with its multiplier mu."""
 
     terms: tuple[Array, ...]
     limits: tuple[Array, ...]
@@ -167,7 +167,7 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class Minorant:
-    """Affine function constant + gradient . x that no feasible design's objective is below, and its dual rows."""
+    """Affine lower bound constant + gradient . x of the objective at a feasible decision vector x, and its dual rows."""
 
     constant: float
     gradient: Array
@@ -206,8 +206,8 @@ def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
 
 
 def is_moved(norm: AffineNorm) -> bool:
-    """Return True if any decision changes the rows of a norm."""
-    # the first row mostly decides, and saves a look at all
+    """Return True if any decision changes the rows of a load in a norm."""
+    # the slope of the first row mostly decides, and saves a look at all rows
     return bool(norm.slope[:1].any() or norm.slope.any())
 
 
@@ -220,7 +220,7 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
-    """Return True if these dual rows of the limits, shape (k, d) each, prove the limits infeasible (P4)."""
+    """Return True if the dual rows `limits` of the limits, shape (k, d) each, prove that no design keeps them (P4)."""
     proof = lower_bound(replace(problem, terms=()), Multipliers((), limits))
     sizes = [maximum + norm.value(np.zeros(problem.size)) for maximum, norm in problem.limits]
     scale = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
@@ -240,7 +240,7 @@ def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound
     x
         Decision vector of the solution, shape (n,).
     solution
-        Its dual rows, on its own grid.
+        Dual rows of the solution, on the grid of the solution.
     """
     interpolated = interpolate_duals(problem, solution)
     pairs = zip(problem.terms, interpolated.terms, strict=True)
@@ -283,7 +283,7 @@ def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound:
 
 
 def _size(norm: AffineNorm, x: Array) -> float:
-    # norm of the rows if none of their parts cancelled
+    # norm of the rows with the absolute value of every summand, which scales their rounding errors
     return norm.norm.value(norm.grid, np.abs(norm.constant) + np.abs(norm.slope) @ np.abs(x))
 
 
@@ -307,7 +307,7 @@ def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipli
     Parameters
     ----------
     problem, bound
-        Norms on the grid of the dual rows; dual rows to correct, and their gradient.
+        Norms on the grid of the dual rows; lower bound with the dual rows to correct, and with its gradient.
     x
         Decision vector, shape (n,).
     """
@@ -332,7 +332,7 @@ def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipli
 
 
 def _interpolate(fine: AffineNorm, z: Array) -> Array:
-    """Interpolate dual rows of a coarser grid, shape (k, d), to the grid of a norm; rows of masses stay."""
+    """Interpolate dual rows of a coarser grid, shape (k, d), to the grid of a norm; dual rows of masses stay."""
     signals, kinks = len(fine.grid.weights) // fine.grid.steps, fine.grid.kinks
     factor, remainder = divmod(len(fine.grid.weights) - signals * kinks, max(len(z) - signals * kinks, 1))
     if remainder:

@@ -1,7 +1,8 @@
 """Check bounds against a known design: no lower bound of a set of designs exceeds the objective of a design in it.
 
-Every method states a thin part around a known design and bounds it without any correction. The bound is compared with
-the objective of that design. Parts of a search that contain the design are compared too, and so is every certificate.
+Every method bounds a thin set of designs around a known design, without any correction. The bound is compared with the
+objective of that design. The bounds of all sets in a search that contain the design are compared too, and so is every
+certificate.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import check_bound, is_over
 
 THIN = 1e-6
-"""Distance from a design to either end of a thin part, as a share of each side."""
+"""Distance from a design to either end of a thin box around it, as a share of each side of the root box."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +27,7 @@ class Witness:
     Attributes
     ----------
     place
-        Open numbers in the coordinates of the bounds, shape (n,).
+        Open numbers of the design, in the coordinates of the boxes that are bounded, shape (n,).
     value
         Objective at the samples of the problem [SI].
     evaluate_upper
@@ -48,11 +49,11 @@ class Witness:
             check_bound(what, bound, self.upper_value)
 
     def check_near(self, what: str, bound: float) -> None:
-        """Report a bound [SI] of a thin part around the design that exceeds its objective; `what` names the parts."""
+        """Report a bound [SI] of a thin box around the design that exceeds its objective; `what` names the boxes."""
         self.check(f"{what}, around the known design", bound)
 
 
 def thin_box(place: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return the bounds of a thin box around a place, cut to the box between `lower` and `upper`, all of shape (n,)."""
+    """Return the ends of a thin box around open numbers `place`, inside the box from `lower` to `upper`, shape (n,)."""
     margin = THIN * (upper - lower)
     return np.clip(place - margin, lower, upper), np.clip(place + margin, lower, upper)

@@ -1,8 +1,8 @@
 """Lower bounds of travel and force under static load cases over boxes of stiffness, with bump stops (E37, E55, E60).
 
-With the stops in contact at the centre of a box as springs, motion is linear in the load, and E37 is its series. Other
-motions differ by the force of stops that open or close in the box, each at most in proportion to its overshoot. Bounds
-of travel hold if they contain the bounds that they imply.
+The stops that touch at the centre of a box count as springs. Motion is then linear in the load, and E37 is its series.
+In the rest of the box the motion differs by the force of stops that open or close. The force of such a stop is at most
+its stiffness times its overshoot. Assumed bounds of all travels hold if the travels that follow from them lie within.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 STEPS, HALVINGS = 30, 12
 # iterations of bounds of travel, factor beyond the implied bound, and growth of a step
 ROUNDS, WIDER, FASTER = 16, 1.0 + 1e-6, 1.4
-# accuracy of an equilibrium as a share of a gap, and spans of travel within which a stop may close
+# accuracy of an equilibrium as a share of a stop's gap, and number of spans of travel within which a stop may close
 EXACT, NEXT = 1e-9, 2.0
 AT_REST = LoadedOrders(
     *(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128), 0
@@ -67,7 +67,18 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
 def _with_stops(
     model: BoxModel, measure: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
 ) -> tuple[LinearBound, Array]:
-    """Return the bound with stops of nonzero sign as springs, and the span of travels without other stops."""
+    """Return the bound with some stops as springs, and the span of stop travels without the others, (boxes, stops).
+
+    Parameters
+    ----------
+    load
+        Wrench of a load case in coordinates with unit mass, shape (6,).
+    boxes
+        Centres, half widths, stiffness matrices at the centres and at the softest corners, and stop travels at the
+        centres.
+    signs
+        +1 or -1 for a stop that counts as a spring in that direction, 0 for an open stop, shape (boxes, stops).
+    """
     centres, halves, matrices, soft, travel = boxes
     on = signs != 0.0
     pushed = load + np.einsum("bk,ki->bi", signs * stops.stiffness * stops.gaps, stops.rows)
@@ -104,7 +115,7 @@ def _with_stops(
 
 
 def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
-    """Return approximate static motions, shape (boxes, 6); bounds hold for any accuracy."""
+    """Return approximate static motions under a load, shape (boxes, 6); bounds hold for any accuracy of them."""
 
     def energy(y: Array) -> Array:
         elastic = 0.5 * np.einsum("bi,bij,bj->b", y, matrices, y) - y @ load
@@ -128,14 +139,23 @@ def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
 def _stop_errors(
     stops: Stops, expansion: Expansion, corner: Array, signs: Array, equilibrium: Array
 ) -> tuple[Array, Array]:
-    """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60).
+    """Return errors of stop forces [N], infinite if unknown, and the span of stop travels, (boxes, stops) each (E60).
 
-    `signs` is +1 or -1 for a stop that acts in that direction, 0 for an open stop.
+    Parameters
+    ----------
+    expansion
+        Series of the motion with some stops as springs.
+    corner
+        Cholesky factor L of the stiffness matrix at the softest corner of each box, shape (boxes, 6, 6).
+    signs
+        +1 or -1 for a stop that counts as a spring in that direction, 0 for an open stop, shape (boxes, stops).
+    equilibrium
+        Stop travels of the approximate static motion, shape (boxes, stops).
     """
     response = mapped(expansion, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
     travel = np.asarray(response.value[:, 0].real)
     span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.remainder[:, 0, None]
-    # distance of springs beyond their gaps, and of open stops within
+    # overshoot of stops that count as springs, and clearance of open stops
     distance = np.where(signs != 0.0, signs * travel - stops.gaps, stops.gaps - np.abs(travel))
     along = _along(corner, stops.rows)
     wide = np.maximum(span, np.abs(equilibrium - travel) + EXACT * stops.gaps)
@@ -151,6 +171,6 @@ def _stop_errors(
 
 
 def _along(root: Array, vectors: Array) -> Array:
-    # lengths of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)
+    # lengths of L^-1 v for Cholesky factors L and vectors v, shape (k, 6) or (boxes, k, 6), to (boxes, k)
     by_box = np.broadcast_to(vectors, (len(root), *vectors.shape[-2:]))
     return np.asarray(np.linalg.norm(np.linalg.solve(root, by_box.swapaxes(1, 2)), axis=1))

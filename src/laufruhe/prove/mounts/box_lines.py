@@ -16,16 +16,18 @@ ROUNDS = 2
 
 @dataclass(eq=False)
 class LinearRelaxation:
-    """Linear functions of s nowhere above objective and limits, s from -1 to 1 in each number of a box.
+    """Linear lower bounds of objective and limits on boxes, as functions of the position s in a box.
+
+    s_j runs from -1 to 1 as open number j runs from its lower to its upper bound in the box.
 
     Attributes
     ----------
     value, slopes
         Lower bound of the objective: value + slopes . s, shapes (boxes,) and (boxes, open numbers).
     limits
-        Lower bounds of relative violations of limits, pairs in the same shapes.
+        Lower bounds of relative violations of limits: pairs (value, slopes) in the same shapes.
     pulls
-        Branching scores of each limit, shape (boxes, open numbers).
+        Branching scores from each limit, shape (boxes, open numbers): the side with the largest score is halved.
     """
 
     value: Array
@@ -35,7 +37,7 @@ class LinearRelaxation:
 
     @classmethod
     def zero(cls, lower: Array) -> LinearRelaxation:
-        """Return zero objective without limits, for boxes of this shape."""
+        """Return the relaxation with a zero objective and no limits; `lower` has the shape (boxes, open numbers)."""
         return cls(np.zeros(len(lower)), np.zeros_like(lower))
 
     def subset(self, indices: NDArray[np.intp]) -> LinearRelaxation:
@@ -45,7 +47,7 @@ class LinearRelaxation:
         return LinearRelaxation(self.value[indices], self.slopes[indices], limits, pulls)
 
     def add(self, weight: float, minimum: LinearBound, left_out: float = 0.0) -> None:
-        """Add a weighted term to the objective, or zero on boxes where its bound is not positive.
+        """Add the bound of a weighted term to the objective, or zero on boxes where the bound is not positive.
 
         The largest effect of omitted orders on the term is `left_out` [SI].
         """
@@ -55,7 +57,7 @@ class LinearRelaxation:
         self.slopes = self.slopes + weight * np.where(is_positive[:, None], minimum.slopes, 0.0)
 
     def add_limit(self, minimum: LinearBound, left_out: float, maximum: float) -> None:
-        """Add the limit of a measure to at most `maximum` [SI].
+        """Add a limit by the linear bound of its measure and the largest allowed value `maximum` [SI].
 
         The largest effect of omitted orders on the measure is `left_out` [SI].
         """
@@ -71,8 +73,8 @@ class LinearRelaxation:
         """Lower bound of the largest relative violation of limits in each box, shape (boxes,); -1 without limits.
 
         Every weighted mean of the limits is a lower bound (P4). The method starts with the most violated limit and
-        mixes in the others one by one. The minimum of the mean over the box is concave in the share of a limit, with
-        kinks where a slope changes its sign: the best kink is taken.
+        mixes in the others one by one. The minimum of the mean over the box is concave in the weight of a limit, with
+        kinks where a slope changes its sign. The kink with the largest bound is taken.
         """
         none = (np.full(len(self.value), -1.0), np.zeros_like(self.slopes))
         values, gradients = (np.array(parts) for parts in zip(*(self.limits or [none]), strict=True))
@@ -97,7 +99,7 @@ class LinearRelaxation:
 
     @property
     def pull(self) -> Array:
-        """Branching scores of the limits, shape (boxes, open numbers)."""
+        """Largest branching score of each open number from any limit, shape (boxes, open numbers)."""
         return np.asarray(np.max([np.zeros_like(self.slopes), *self.pulls], axis=0))
 
     @property
@@ -105,7 +107,7 @@ class LinearRelaxation:
         """Lower bound of the feasible objective in each box, shape (boxes,); infinite where limits are violated.
 
         Multipliers of the limits (P4) are set one by one. The bound is piecewise linear in a multiplier, with kinks
-        where a slope changes its sign: the best kink is taken.
+        where a slope changes its sign. The kink with the largest bound is taken.
         """
         value, slopes = self.value, self.slopes
         bound, broken = value - np.abs(slopes).sum(axis=1), self.violation > 0.0

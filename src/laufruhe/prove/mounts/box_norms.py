@@ -20,22 +20,25 @@ from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse
 
 PARTS = ("value", "slopes", "remainder", "scores")
-# halvings of the interval of a ratio
+# halvings of the interval that contains the bound of a transmissibility
 HALVINGS = 45
 
 
 @dataclass(frozen=True, eq=False)
 class LinearBound:
-    """Lower bound value + slopes . s - rest of a measure over boxes, s from -1 to 1 in each number (E38).
+    """Lower bound value + slopes . s - remainder of a measure on boxes (E38).
+
+    s_j runs from -1 to 1 as open number j runs from its lower to its upper bound in a box.
 
     Attributes
     ----------
     value, remainder
-        Shape (boxes,).
+        Value at the centre, and largest fall of the measure below value + slopes . s, shape (boxes,).
     slopes
         Shape (boxes, n).
     scores
-        Share of each side in the remainder, for branching, shape (boxes, n).
+        Branching scores of the open numbers, mostly their parts of the remainder, shape (boxes, n). The side with the
+        largest score is halved.
     """
 
     value: Array
@@ -49,7 +52,7 @@ class LinearBound:
         return np.asarray(self.value - self.remainder - np.abs(self.slopes).sum(axis=-1))
 
     def where(self, mask: Mask) -> LinearBound:
-        """Return the bound on boxes of a mask, and zero on the others."""
+        """Return the bound on the boxes of a mask, shape (boxes,), and zero on the others."""
         masks = (mask, mask[:, None], mask, mask[:, None])
         parts = (np.where(keep, getattr(self, part), 0.0) for part, keep in zip(PARTS, masks, strict=True))
         return LinearBound(*parts)
@@ -60,25 +63,28 @@ class LinearBound:
 
 
 def choose(bounds: Sequence[LinearBound], numbers: Indices) -> LinearBound:
-    """Return for every box the bound with a number, shape (boxes,)."""
+    """Return for every box one of the bounds; `numbers` has its index for each box, shape (boxes,)."""
     parts = (np.array([getattr(bound, part) for bound in bounds]) for part in PARTS)
     return LinearBound(*(part[numbers, np.arange(len(numbers))] for part in parts))
 
 
 def zero_bound(lower: Array) -> LinearBound:
-    """Return the bound zero of a length, for boxes of this shape."""
+    """Return zero as the lower bound of a norm on every box; `lower` has the shape (boxes, n)."""
     return LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
 def lower_bound_of_norm(model: BoxModel, measure: Measure, lines: LoadedOrders, expansion: Expansion) -> LinearBound:
-    """Return a linear lower bound of a norm of forces or travel on every box (E38)."""
+    """Return a linear lower bound of a norm of mount forces or travel on every box, from the series of motion (E38)."""
     rows, factors = counted_rows(model.problem, measure)
     answer = model.answer(lines, expansion, measure.channel, rows, factors)
     return norm_under(model.problem, measure, answer, lines)
 
 
 def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
-    """Return a linear lower bound of a norm of responses at the mounts that count, r = 3 mounts, on every box (E38)."""
+    """Return a linear lower bound of a norm of forces or travel on every box (E38).
+
+    `answer` has the forces or travel of the counted mounts, r = 3 mounts components, for the loaded orders `lines`.
+    """
     share, weights = measure.shares(problem.points), line_weights(problem, measure, lines)
     if measure.norm.is_euclidean:
         return root_under(answer, weights)
@@ -101,21 +107,21 @@ def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines
 
 
 def counted_rows(problem: Problem, measure: Measure) -> tuple[Indices, Array]:
-    """Return the rows of the mounts that a measure counts, and the factors on them."""
+    """Return the indices of the mount components that a measure counts, and its weights on them, shape (r,) each."""
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
     return rows, np.tile(np.array(measure.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
 
 
 def line_weights(problem: Problem, measure: Measure, lines: LoadedOrders) -> Array:
-    """Return the weights of squares of orders in the mean over cycle, mounts and operating points, shape (lines,)."""
+    """Return the weight of each squared order in the mean over cycle, mounts and operating points, shape (lines,)."""
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     share = measure.shares(problem.points)
     return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
 def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: int) -> LinearBound:
-    """Bound a mean, maximum or peak to peak over the samples of one operating point."""
+    """Return a linear lower bound of a mean, maximum or peak to peak over the samples of operating point p."""
     indices = np.flatnonzero(lines.points == p)
     value, slopes = answer.value[:, indices], answer.slopes[:, indices]
     remainder, scores = answer.remainder[:, indices], answer.scores[:, indices]
@@ -166,7 +172,10 @@ def _lengths(rows: Array) -> Array:
 
 
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
-    """Return a linear lower bound of a weighted root sum of squares; orders whose series may diverge count as zero."""
+    """Return a linear lower bound of the root of a weighted sum of squares over orders, with weights of shape (lines,).
+
+    Orders whose series may diverge count as zero in value and slopes.
+    """
     is_finite = np.isfinite(answer.remainder)
     value = np.where(is_finite[..., None], answer.value, 0.0)
     slopes = np.where(is_finite[..., None, None], answer.slopes, 0.0)
@@ -179,7 +188,7 @@ def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
 
 
 def root_of(weights: Array, parts: Array) -> Array:
-    """Return the root of a weighted sum of squares over orders, (boxes, lines, ...) to (boxes, ...)."""
+    """Return the root of a weighted sum of squared `parts` over orders, shape (boxes, lines, ...) to (boxes, ...)."""
     return np.asarray(np.sqrt(np.tensordot(parts**2, weights, axes=(1, 0))))
 
 
@@ -192,7 +201,7 @@ def ratio_under(
     elastic: LinearResponse, rigid: LinearResponse, measure: Measure, points: Sequence[OperatingPoint],
     lines: LoadedOrders,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Return lower bounds of the largest ratio, shape (boxes,), and branching scores, shape (boxes, n) (E40).
+    """Return lower bounds of a transmissibility, shape (boxes,), and branching scores, shape (boxes, n) (E40).
 
     Parameters
     ----------
@@ -215,7 +224,7 @@ def ratio_under(
         is_bounded = np.all(np.isfinite(rigid.remainder[:, group]), axis=1) & (bottom.value > 0.0)
         curvature = square / (2.0 * np.where(is_bounded, bottom.value, 1.0))
         over = bottom.value + (bottom.remainder + curvature)
-        # largest t with top - t bottom >= 0 all over the box
+        # largest ratio t with top - t bottom >= 0 all over the box
         minimum, high = np.zeros(len(best)), top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
         for _ in range(HALVINGS):
             t = 0.5 * (minimum + high)

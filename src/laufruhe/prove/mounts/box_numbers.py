@@ -1,13 +1,14 @@
 """Bounds of sag, natural frequencies, energy shares and other mount numbers over boxes of stiffness (E39, E64).
 
-For energy shares of motions in modes, let E be the change of the stiffness in the modes u of the middle of a box. A
-mode v of a design in the box satisfies
+For energy shares of motions in modes, u_j are the modes at the middle of a box, and s_j the squares of their angular
+frequencies. E is the change of the stiffness matrix from the middle, in coordinates of these modes. A mode v of a
+design in the box, with components v_j, satisfies
 
     (l - s_j - E_jj) v_j = sum of E_jk v_k over the others
 
-with l the square of its frequency, which is monotone in stiffness. This bounds the parts |v_j|, and these bound the
-difference of v and u_i + sum E_ij / (s_i - s_j) u_j. A share is the product of two linear functions of v, so linear in
-stiffness up to the square of the size of the box.
+with l the square of its angular frequency, which is monotone in stiffness. This bounds the sizes |v_j|, and these bound
+the difference of v and u_i + sum E_ij / (s_i - s_j) u_j. An energy share is the product of two linear functions of v.
+It is therefore linear in stiffness up to the square of the size of the box.
 """
 
 from __future__ import annotations
@@ -30,9 +31,9 @@ from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.ranges import SLACK
 
-# parts of other modes that count by their joint length
+# size |v_j| above which components count by their joint length
 NEAR = 0.25
-# iterations of the bounds of parts
+# iterations of the bounds of |v_j|
 ROUNDS = 4
 # rounding of stiffness and squares, relative to the largest square
 ROUNDING = 1e-12
@@ -49,7 +50,7 @@ def sag(model: BoxModel, x: Array) -> Array:
 
 
 def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> LinearBound:
-    """Return the tangent of the convex sag at the middle, for boxes whose softest corner has no free mode (E9)."""
+    """Return the tangent of the convex sag at the middle of boxes; zero if a mode is free at the softest corner (E9)."""
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
     stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
@@ -59,7 +60,7 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
 
 
 def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
-    """Bound the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
+    """Return lower bounds of the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
     assert measure.channel.axis_residual is not None
     axis = measure.channel.axis_residual(model.mounting(model.lower).block, measure.frequency)
     bounds = np.zeros(len(lower))
@@ -73,7 +74,7 @@ def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array)
 
 
 def stiffness_in_all(model: BoxModel, x: Array) -> Array:
-    """Return the total stiffness of many designs [N/m], shape (boxes,)."""
+    """Return the sum of all mount stiffnesses of many designs [N/m], from shape (boxes, n) to (boxes,)."""
     decisions = model.problem.mount_decisions
     gains = np.array([sum(drive.gain for drive in decision.mount_drives) for decision in decisions])
     lowest = model.problem.design([float(v) for v in model.lower], decisions)
@@ -87,20 +88,20 @@ def _frequencies(model: BoxModel, x: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class BoxModes:
-    """Modes of designs in boxes, in coordinates of the modes of the middles.
+    """Modes v of designs in boxes, in coordinates of the modes u of the middles; symbols are those of the module.
 
     Attributes
     ----------
     modes
-        Modes of the middles as columns, shape (boxes, 6, 6).
+        Modes u of the middles as columns, shape (boxes, 6, 6).
     parts
-        Upper bounds of parts |v_j| of mode i, shape (boxes, i, j).
+        Upper bounds of the components |v_j| of mode i, shape (boxes, i, j).
     deficits
         Upper bounds of 1 - |v_i|, shape (boxes, i).
     first
-        Slopes of E_ij / (s_i - s_j) over half a box, shape (boxes, n, i, j).
+        Changes of E_ij / (s_i - s_j) by half the width of each open number, shape (boxes, n, i, j).
     rests
-        Upper bounds of the difference of v_j and its first order, shape (boxes, i, j).
+        Upper bounds of the difference of v_j and its linear approximation, shape (boxes, i, j).
     """
 
     modes: Array
@@ -111,7 +112,7 @@ class BoxModes:
 
 
 def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
-    """Return the modes of boxes of stiffness [N/m], shape (boxes, n)."""
+    """Return bounds of the modes of all designs in boxes of stiffness [N/m], shape (boxes, n)."""
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
     slopes = np.einsum("bji,njk,bkl->bnil", modes, model.slopes["stiffness"], modes, optimize=True)
     slopes = slopes * (0.5 * (upper - lower))[:, :, None, None]
@@ -143,7 +144,7 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
 
 
 def maximum_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
-    """Return upper bounds of the largest share of each motion in a mode, shape (motions, boxes) (E7, E39)."""
+    """Return upper bounds of the largest energy share of each motion in any mode, (motions, boxes) (E7, E39)."""
     box = box_modes(model, lower, upper)
     return np.array([_shares(model, box, motion)[2].max(axis=1) for motion in motion_indices(measure)])
 
@@ -170,9 +171,9 @@ def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> 
 
 
 def _shares(model: BoxModel, box: BoxModes, motion: int) -> tuple[Array, Array, Array]:
-    """Return upper bounds of the share of a motion in every mode: value + slopes . s, and constants.
+    """Return upper bounds of the energy share of a motion in every mode: value + slopes . s, and a constant.
 
-    Their shapes are (boxes, modes), (boxes, modes, n) and (boxes, modes).
+    The shapes of value, slopes and constant are (boxes, modes), (boxes, modes, n) and (boxes, modes).
     """
     shape, momentum = model.root[:, motion], np.linalg.inv(model.root)[motion]
     a, b = shape @ box.modes, momentum @ box.modes
@@ -186,14 +187,14 @@ def _shares(model: BoxModel, box: BoxModes, motion: int) -> tuple[Array, Array, 
     rest = rest + np.maximum(-2.0 * a * b, 0.0) * box.deficits + far[0] * far[1]
     value = a * b + rest
     reach = np.abs(slopes).sum(axis=2)
-    # use constants where the linear function is no better
+    # use constants where the linear function is not lower
     poor = ~(value + reach < near)
     value, slopes = np.where(poor, near, value), np.where(poor[:, :, None], 0.0, slopes)
     return value, slopes, np.minimum(near, value + np.abs(slopes).sum(axis=2))
 
 
 def _projection_bounds(components: Array, parts: Array) -> Array:
-    # upper bounds of |vector' v| by the parts of the vector in middle modes, shape (boxes, modes)
+    # upper bounds of |vector' v| for every mode v, by the vector's components in the modes u, shape (boxes, modes)
     sizes = np.abs(components)[:, None]
     near = parts > NEAR
     total = np.sqrt(np.sum(np.where(near, sizes, 0.0) ** 2, axis=2))
@@ -226,9 +227,9 @@ LINEAR_BOUNDS: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], Line
     channels.STATIC_TRAVEL: static_loads,
     channels.STATIC_FORCE: static_loads,
 }
-"""Linear lower bounds of mount numbers, which give limits a multiplier on a box (E38)."""
+"""Linear lower bounds of mount numbers, so that limits on these numbers have a multiplier on a box (E38)."""
 BOUNDED_LINEARLY = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
-"""Channels whose range is no better than the linear bound."""
+"""Channels whose bounds in `RANGES` are no better than their linear bounds."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:

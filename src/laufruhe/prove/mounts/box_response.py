@@ -1,7 +1,8 @@
 """Response of a block on mounts over boxes of stiffness (E37, E38, E41).
 
-In coordinates with unit mass the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x, and so are the forces
-that motion causes in the mounts. Over a box they are a series (`laufruhe.prove.mounts.box_series`).
+In coordinates with unit mass the impedance is D(x) = A + i B - W^2, with the stiffness matrix A, the matrix B of loss
+and damping, and the angular frequency W. D is linear in the stiffnesses x, and so are the maps from motion to mount
+forces. Over a box, motion and forces are a series (`laufruhe.prove.mounts.box_series`).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ NEGLIGIBLE = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class LoadedOrders:
-    """Loaded orders of all operating points.
+    """Loaded orders of all operating points; a line is one order at one operating point.
 
     Attributes
     ----------
@@ -77,9 +78,9 @@ class LoadedOrders:
 
 
 SQUARE = ("stiffness", "loss", "damping")
-"""Matrices A, and the parts of B without and with frequency as a factor, in coordinates with unit mass, (6, 6)."""
+"""Names of the matrix A, and of the parts of B without and with frequency as a factor, shape (6, 6) each."""
 MAPS = ("springs", "losses", "dampers")
-"""Maps from motion to the forces of the mounts, shape (3 mounts, 6)."""
+"""Names of the maps from motion to the mount forces of stiffness, loss and damping, shape (3 mounts, 6) each."""
 
 
 def is_travel(channel: Channel) -> bool:
@@ -88,7 +89,9 @@ def is_travel(channel: Channel) -> bool:
 
 
 class BoxModel:
-    """Matrices of a problem on elastic mounts whose only open numbers are stiffnesses; all designs have its wrenches.
+    """Matrices of a problem on elastic mounts whose only open numbers are stiffnesses.
+
+    All designs have the same wrenches on the block.
 
     Attributes
     ----------
@@ -129,7 +132,7 @@ class BoxModel:
         return dict(zip((*SQUARE, *MAPS), (*totals, *maps), strict=True))
 
     def lines(self, measure: Measure) -> LoadedOrders:
-        """Return the loaded orders that a measure counts."""
+        """Return the loaded orders that a measure counts, with the wrenches of the evaluation."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         base, samples = self.problem.engine.cycle.base_order, self.evaluation.samples
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
@@ -151,11 +154,11 @@ class BoxModel:
         return lines.subset(np.array(counted)[lines.points] & measure.counted(lines.orders))
 
     def stiffness(self, x: Array) -> Array:
-        """Return A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
+        """Return the stiffness matrix A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self.at("stiffness", x)
 
     def at(self, name: str, x: Array) -> Array:
-        """Return a matrix of `SQUARE` or `MAPS` at many designs, shape (boxes, n) to (boxes, ...)."""
+        """Return the matrix `name` of `SQUARE` or `MAPS` at many designs, shape (boxes, n) to (boxes, ...)."""
         return np.asarray(self._base[name] + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
     def expanded(self, lines: LoadedOrders, lower: Array, upper: Array) -> Expansion:
@@ -171,14 +174,17 @@ class BoxModel:
     def answer(
         self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices, factors: Array
     ) -> LinearResponse:
-        """Return selected rows of forces or travel, times factors, as linear functions over boxes (E37)."""
+        """Return mount forces or travels as linear functions on boxes (E37).
+
+        `rows` are the indices of the mount components, and `factors` the weights on them, shape (r,).
+        """
         value, slopes = self.maps(lines, expansion, channel, rows)
         return mapped(expansion, value * factors[:, None], None if slopes is None else slopes * factors[:, None])
 
     def maps(
         self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices
     ) -> tuple[ComplexArray, ComplexArray | None]:
-        """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m)."""
+        """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m) (E37)."""
         if is_travel(channel):
             flat = self.travels[rows].astype(complex)
             return np.broadcast_to(flat, (len(expansion.centres), len(lines.omegas), *flat.shape)), None
@@ -188,7 +194,7 @@ class BoxModel:
         return value, slopes * expansion.halves[:, None, None, self.sides.number_of_column]
 
     def largest_response(self, lines: LoadedOrders, channel: Channel) -> Array:
-        """Return upper bounds of the response of all mounts within all bounds, shape (lines,) (E41).
+        """Return upper bounds of the length of all mount forces or travels of any design, shape (lines,) (E41).
 
         Orders that are not above all natural frequencies have an infinite bound.
         """

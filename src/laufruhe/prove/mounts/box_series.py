@@ -1,20 +1,21 @@
 """Motion over a box of open numbers as a series in these numbers, with a bound of the remainder (E37).
 
-D is linear in the numbers x. About the centre c of a box, x_j = c_j + s_j h_j with s_j from -1 to 1, number j stiffens
-D along its directions, the columns of B_j, by C_j:
+The impedance D gives the motion y = D^-1 r under a load r. It is linear in the open numbers x. In a box with centre c
+and half widths h, x_j = c_j + s_j h_j with s_j from -1 to 1. Number j stiffens D along its directions, the columns of
+B_j, by the matrix C_j:
 
     D(x) = D(c) + sum_j s_j h_j B_j C_j B_j'
 
-With B = [root(h_j) B_j], L = D(c)^-1 B C, G = B' L, z0 = B' y0 and S = diag(s):
+With B = [root(h_j) B_j], column motions L = D(c)^-1 B C, gain G = B' L, column travels z0 = B' y0 and S = diag(s):
 
     y = y0 - L S z,    z = (1 + G S)^-1 z0,    y0 = D(c)^-1 r
 
-A force f = (V + sum_j s_j E_j B_j') y is, with P = E - V L,
+A force f = (V + sum_j s_j E_j B_j') y, with the map V at the centre and its slopes E_j, is, with P = E - V L,
 
     f = V y0 + P S z0 - P S G S z0 + P S (G S) (1 + G S)^-1 G S z0
 
-with a last term of at most |P T^-1| g / (1 - g) |T G S z0| for any diagonal T > 0 and g = |T G T^-1| < 1, because
-T and S commute. In the third term s_j^2 runs from 0 to 1: half of it belongs to the value.
+The length of the last term is at most |P T^-1| g / (1 - g) |T G S z0| for any diagonal T > 0 with g = |T G T^-1| < 1,
+because T and S commute. In the third term s_j^2 runs from 0 to 1: half of it belongs to the value.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 
 # share of the largest singular value under which a direction counts as none
 NEGLIGIBLE = 1e-12
-# squarings for the norm of a matrix, which exceeds it by at most the sixteenth root of the rank
+# number of squarings for the norm of a matrix; the result exceeds it by at most the sixteenth root of the rank
 SQUARED = 3
 # factor of branching scores of a series that may diverge
 DIVERGENT = 1e3
@@ -37,12 +38,12 @@ DIVERGENT = 1e3
 
 @dataclass(frozen=True, eq=False)
 class Sides:
-    """Directions along which open numbers stiffen.
+    """Directions along which open numbers stiffen the impedance; symbols are those of the module.
 
     Attributes
     ----------
     columns
-        All B_j side by side, orthonormal for each number, shape (d, m).
+        Directions B_j of all open numbers side by side, orthonormal for each number, shape (d, m).
     number_of_column
         Index of the open number of each column, rising, shape (m,).
     count
@@ -54,30 +55,30 @@ class Sides:
     count: int
 
     def inside(self, slopes: Any) -> Any:
-        """Return C from slopes of D by each number, (..., n, d, d) to (..., m, m)."""
+        """Return the matrix C from the slopes of D by each open number, shape (..., n, d, d) to (..., m, m)."""
         same = self.number_of_column[:, None] == self.number_of_column
         return np.where(same, np.swapaxes(self.columns, 0, 1) @ self.along(slopes), 0.0)
 
     def along(self, slopes: Any) -> Any:
-        """Return E from slopes of maps by each number, (..., n, r, d) to (..., r, m)."""
+        """Return E, the slopes of maps along the directions, from those by each number, (..., n, r, d) to (..., r, m)."""
         return np.einsum("...mrd,dm->...rm", np.take(slopes, self.number_of_column, axis=-3), self.columns)
 
     def maps_by_number(self, turned: Any) -> list[Any]:
-        """Return the maps E_j B_j' of each number, (..., r, d), from E, (..., r, m)."""
+        """Return the slopes E_j B_j' of a map by each open number, shape (..., r, d), from `turned` E, (..., r, m)."""
         return [
             turned[..., self.number_of_column == j] @ self.columns[:, self.number_of_column == j].T
             for j in range(self.count)
         ]
 
     def sum_by_number(self, values: Any) -> Any:
-        """Sum over the columns of each number, (..., m) to (..., n)."""
+        """Sum values over the directions of each open number, shape (..., m) to (..., n)."""
         if len(self.number_of_column) == self.count:
             return values
         return values @ (self.number_of_column[:, None] == np.arange(self.count))
 
 
 def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
-    """Return the directions of numbers: the row space of the matrices of each, shape (any, d)."""
+    """Return the directions of open numbers: the row space of the slopes by each number, shape (any, d)."""
     bases = []
     for slopes in matrices:
         rows = np.vstack([slope / max(float(np.abs(slope).max(initial=0.0)), 1e-300) for slope in slopes])
@@ -91,6 +92,8 @@ def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
 class Expansion:
     """Series of motion over boxes, shapes (boxes, lines, ...) unless given otherwise (E37).
 
+    Symbols are those of the module.
+
     Attributes
     ----------
     centres, halves
@@ -98,11 +101,11 @@ class Expansion:
     sides
         Directions of the open numbers.
     motion
-        y0, (..., d).
+        Motion y0 at the centre, (..., d).
     column_motions, gain, column_travels
         L, G and z0: (..., d, m), (..., m, m) and (..., m).
     balance
-        Diagonal of T, (..., m).
+        Diagonal of the balancing matrix T, (..., m).
     remainder
         Bound of g / (1 - g) |T G S z0|, (...); infinite if the series may diverge.
     """
@@ -119,7 +122,7 @@ class Expansion:
 
     @property
     def pull(self) -> Array:
-        """Branching scores: share of each side in the gain of the series, (..., n)."""
+        """Branching scores: contribution of each open number to the gain of the series, (..., n)."""
         even = self.gain * (self.balance[..., None] / self.balance[..., None, :])
         size = np.linalg.norm(even, axis=-2) + np.linalg.norm(even, axis=-1)
         return np.asarray(np.nan_to_num(self.sides.sum_by_number(size), nan=1.0, posinf=1.0))
@@ -127,16 +130,16 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """Forces or travel over boxes: value + slopes . s and a remainder (E37), shapes (boxes, lines, ...).
+    """Forces or travel on boxes: value + slopes . s and a remainder (E37), shapes (boxes, lines, ...).
 
     Attributes
     ----------
     value, slopes
         Shapes (..., r) and (..., n, r).
     remainder
-        Upper bound of the length of the remainder, (...).
+        Upper bound of the length of all further terms, (...).
     scores
-        Share of each side in the remainder, (..., n).
+        Branching scores: part of the remainder from each open number, (..., n).
     """
 
     value: ComplexArray
@@ -146,7 +149,7 @@ class LinearResponse:
 
     @property
     def maximum(self) -> Array:
-        """Upper bound of the length anywhere in a box, shape (...)."""
+        """Upper bound of the length of forces or travel anywhere in a box, shape (...)."""
         size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
         return np.asarray(size + self.remainder)
 
@@ -161,9 +164,9 @@ def series(
     centres, halves
         Centres and half widths of the boxes, (boxes, n).
     inverse, motion
-        D(c)^-1 and y0, (boxes, lines, d, d) and (boxes, lines, d).
+        Inverse impedance D(c)^-1 and motion y0 at the centres, (boxes, lines, d, d) and (boxes, lines, d).
     sides, inside
-        B, and C, (lines, m, m).
+        Directions B_j, and the stiffening C along them, (lines, m, m).
     """
     columns = sides.columns * np.sqrt(halves[:, sides.number_of_column])[:, None]
     column_motions = np.matmul(inverse, np.matmul(columns[:, None], inside))
@@ -175,7 +178,7 @@ def series(
 
 
 def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
-    """Return T that balances rows and columns of the gain, T G T^-1, and an upper bound of its norm."""
+    """Return the diagonal of T that balances rows and columns of the gain G, T G T^-1, and a bound g of its norm."""
     heights, widths = np.linalg.norm(gain, axis=-1), np.linalg.norm(gain, axis=-2)
     loaded = (heights > 0.0) & (widths > 0.0)
     balance = np.sqrt(np.where(loaded, widths, 1.0) / np.where(loaded, heights, 1.0))
@@ -209,9 +212,9 @@ def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearRespon
     expansion
         Series of the motion.
     value
-        V, (boxes, lines, r, d).
+        Map V from motion to forces or travel at the centres, (boxes, lines, r, d).
     turned
-        E times half the width of the box of each number, (..., r, m); None for constant maps.
+        Slopes E of the map, times half the width of each open number, (..., r, m); None for a constant map.
     """
     pulls = -np.matmul(value, expansion.column_motions)
     if turned is not None:
@@ -237,7 +240,7 @@ def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearRespon
 
 
 def norm_over(matrices: Any) -> Array:
-    """Bound the largest singular value by (trace (A* A)^k)^(1 / 2k), (..., r, m) to (...)."""
+    """Return an upper bound of the largest singular value of matrices A, (trace (A* A)^k)^(1 / 2k), (..., r, m) to (...)."""
     squares = np.matmul(np.swapaxes(np.conj(matrices), -2, -1), matrices)
     size = np.trace(squares, axis1=-2, axis2=-1).real
     squares = squares / np.where(size > 0.0, size, 1.0)[..., None, None]

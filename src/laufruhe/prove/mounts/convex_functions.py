@@ -1,7 +1,8 @@
 """Convex functions of mount stiffness, and bounds by their linear minorants (E16-E19).
 
-K is linear in the stiffnesses x, and called A in coordinates with unit mass. For any y, any V >= 0 with trace one, and
-any z with |z| <= 1,
+The stiffness matrix K is linear in the stiffnesses x, and is called A in coordinates with unit mass. w is the weight, t
+or q a turn about the torque-roll axis, W or root(s) its angular frequency, and M the mass matrix. For any y, any V >= 0
+with trace one, and any z with |z| <= 1,
 
     w' A^-1 w    >= 2 y' w - y' A(x) y          sag                                     (E16)
     lambda_max A >= <V, A(x)>                   highest natural frequency               (E17)
@@ -9,8 +10,8 @@ any z with |z| <= 1,
     |A t / W2 - t| >= z' (A(x) t / W2 - t)      torque-roll residual                    (E19)
     |K q - s M q|  >= z' K(x) q - max s z' M q  the same in raw coordinates, s open     (E46)
 
-with equality at the right y, V, z. Right sides are linear in x, so a weighted sum of them, limits included, has a
-minimum over the box of x in closed form: a lower bound of the objective, independent of the accuracy of a solver.
+with equality at the right y, V, z. The right sides are linear in x. A weighted sum of them, limits included, therefore
+has a minimum over the box of x in closed form. It is a lower bound of the objective, however accurate the solver was.
 """
 
 from __future__ import annotations
@@ -35,22 +36,22 @@ class ConvexFunction(Protocol):
         """Return the value at stiffnesses x, shape (n,)."""
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return constant and gradient of a linear function nowhere above this one, tight at x or by a dual."""
+        """Return constant and gradient of a linear lower bound: by a solver's dual array, or if None the tangent at x."""
 
 
 @dataclass(frozen=True, eq=False)
 class StiffnessMatrices:
-    """A(x) = base + sum_j x_j slopes_j, shapes (6, 6) and (n, 6, 6) (E16)."""
+    """Stiffness matrix A(x) = base + sum_j x_j slopes_j of stiffnesses x, shapes (6, 6) and (n, 6, 6) (E16)."""
 
     base: Array
     slopes: Array
 
     def at(self, x: Array) -> Array:
-        """Return A(x), shape (6, 6)."""
+        """Return the stiffness matrix A(x), shape (6, 6)."""
         return np.asarray(self.base + np.tensordot(x, self.slopes, axes=1))
 
     def between(self, left: Array, right: Array) -> tuple[float, Array]:
-        """Return constant and gradient of left' A(x) right."""
+        """Return constant and gradient of the linear function left' A(x) right, for vectors of shape (6,)."""
         return float(left @ self.base @ right), np.asarray(np.einsum("i,nij,j->n", left, self.slopes, right))
 
 
@@ -72,7 +73,7 @@ class LinearFunction:
 
 @dataclass(frozen=True, eq=False)
 class Compliance:
-    """Compliance factor w' A(x)^-1 w (E16)."""
+    """Compliance w' A(x)^-1 w under a load w, times a factor: the sag if w is the weight (E16)."""
 
     matrices: StiffnessMatrices
     load: Array
@@ -104,7 +105,7 @@ class Eigenvalue:
         return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return sign <V, A(x)> with V from the dual matrix, or from the eigenvector at x."""
+        """Return the linear function sign <V, A(x)> with V from the dual matrix, or if None from the eigenvector at x."""
         _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
         weights, columns = np.eye(6)[-1], vectors
         if dual is not None:
@@ -129,7 +130,7 @@ class Residual:
         return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return the linear function of the dual vector, or of the direction of the residual at x."""
+        """Return the linear function along the dual vector, or if None along the residual at x."""
         z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
         y, mass = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
         constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)
@@ -138,7 +139,7 @@ class Residual:
 
 @dataclass(frozen=True, eq=False)
 class ConvexLimit:
-    """Limit function <= maximum, with the index and side of the limit of the problem."""
+    """Limit function <= maximum, with the index and side of the problem's limit from which it comes."""
 
     function: ConvexFunction
     maximum: float
@@ -163,7 +164,7 @@ class ConvexProgram:
 
 @dataclass(frozen=True, eq=False)
 class ConvexDuals:
-    """Proposal of a solver: dual vectors of terms, prices and dual arrays of limits."""
+    """Duals that a solver proposes: dual arrays of terms and limits, and multipliers (prices) of limits."""
 
     terms: tuple[Array | None, ...]
     prices: tuple[float, ...]
@@ -171,13 +172,13 @@ class ConvexDuals:
 
     @classmethod
     def none(cls, program: ConvexProgram) -> ConvexDuals:
-        """Return no proposal: minorants are tangents at the design, and prices are zero."""
+        """Return duals without a proposal: linear bounds are tangents at the design, and prices are zero."""
         limits = len(program.limits)
         return cls((None,) * len(program.terms), (0.0,) * limits, (None,) * limits)
 
 
 def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[float, Array]:
-    """Return the lower bound of the objective by duals, and the gradient of its linear function (E16-E19)."""
+    """Return the lower bound of the objective by duals, and the gradient of the summed linear functions (E16-E19)."""
     constant, gradient = 0.0, np.zeros(len(x))
     for (weight, term), dual in zip(program.terms, duals.terms, strict=True):
         c, g = term.minorant(x, dual)
@@ -190,7 +191,7 @@ def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[fl
 
 
 def excludes(program: ConvexProgram, x: Array, duals: ConvexDuals) -> bool:
-    """Return True if duals of the limits prove that no stiffness in the box keeps all limits."""
+    """Return True if the duals of the limits prove that no stiffnesses in the box keep all limits."""
     proof, _ = dual_bound(replace(program, terms=()), x, replace(duals, terms=()))
     scale = sum(price * abs(limit.maximum) for limit, price in zip(program.limits, duals.prices, strict=True))
     return proof > CONTRADICTION * scale

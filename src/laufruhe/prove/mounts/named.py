@@ -1,4 +1,4 @@
-"""Channels that bounds of open mounts support; bounds ignore all other terms and limits."""
+"""Channels that lower bounds of designs on open mounts support; the bounds ignore all other terms and limits."""
 
 from __future__ import annotations
 

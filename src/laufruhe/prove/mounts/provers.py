@@ -20,14 +20,14 @@ from laufruhe.prove.mounts.subdivision import is_stiffness_problem, stiffness_bo
 from laufruhe.prove.witness import Witness
 
 EARLY = 0.2
-"""Share of the boxes of stiffness before other provers have their turn."""
+"""Share of the budget of boxes of stiffness that is spent before the other provers have their turn."""
 MIN_SECONDS = 0.5
-"""Time of the first bound after the end of the time budget [s]."""
+"""Time for the first bound, even after the end of the time budget [s]."""
 
 
 @dataclass(eq=False)
 class Question:
-    """Question to provers, if any design is better than the incumbent by more than the gap tolerance.
+    """Question to provers, whether any design is better than the incumbent by more than the gap tolerance.
 
     Attributes
     ----------
@@ -40,11 +40,11 @@ class Question:
     good_values
         Values of the decisions of a good design.
     witness
-        Incumbent by its numbers of the mounts, to check bounds; None without one.
+        Incumbent as the vector of its open mount numbers, to check bounds; None without an incumbent.
     in_batch
-        Whether many problems are bounded, so that cheap bounds come first.
+        Whether this is one of many problems, so that cheap bounds come first.
     open_throws
-        Phasing and candidate, if throws are open between bounds; None for a fixed crank.
+        Open phasing and the candidate crank, if throws are open between bounds; None for a fixed crank.
     bound
         Best lower bound so far [SI], raised by `run_provers`.
     """
@@ -66,16 +66,16 @@ class Prover:
     Attributes
     ----------
     name
-        Name of its boxes.
+        Name of the prover's boxes in messages.
     applies
         Function that returns True if the prover bounds a problem.
     bounds
-        Function that yields increasing bounds, each after more work, with the number of all boxes so far. Places are
-        start points for a search: numbers of the mounts, then columns of the unbalances.
+        Function that yields increasing bounds, each after more work, with the number of all boxes so far. The `places`
+        of a result are start points for a search: open mount numbers, then columns of the unbalances.
     before
         Name of the prover that this one precedes.
     for_open_throws
-        Whether it bounds only problems with throws open between bounds.
+        Whether the prover bounds only problems with throws that are open between bounds.
     """
 
     name: str
@@ -106,8 +106,7 @@ def run_provers(question: Question) -> BoxResult:
     """Run all provers that apply in rounds of growing work, until one closes the gap or time is over.
 
     The bound of the question is raised to the best one found. The result has this bound, the number of all boxes, and
-    the
-    start points of the last prover that has any.
+    the start points of the last prover that has any.
     """
     eligible = [prover for prover in provers() if prover.for_open_throws is (question.open_throws is not None)]
     running = [prover.bounds(question) for prover in eligible if prover.applies(question.problem)]

@@ -17,9 +17,9 @@ SLACK = 1e-6
 
 
 def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | None = None) -> tuple[Array, Array]:
-    """Return lower and upper bounds of the numbers of every spring, shape (springs, 14) each.
+    """Return lower and upper bounds of all numbers of every spring, fixed ones included, shape (springs, 14) each.
 
-    The open numbers of the mounts lie between `lower` and `upper`, shape (n,), or their bounds by default.
+    The open numbers lie between `lower` and `upper`, shape (n,), or by default between the bounds of the problem.
     """
     low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()
@@ -37,10 +37,11 @@ def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | N
 
 
 def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[tuple[float, float]]]:
-    """Return matrices L <= A by lowest frequency and sag (E31), U >= A (E43), and excluded bands (E53).
+    """Return bounds of the stiffness matrix A of any design that keeps the limits.
 
-    A is the stiffness in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are squares
-    of angular frequencies [rad^2/s^2], less the tolerance of limits.
+    The results are matrices L <= A by lowest frequency and sag (E31), matrices U >= A (E43), and bands without any
+    eigenvalue of A (E53). A is in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are
+    squares of angular frequencies [rad^2/s^2], less the tolerance of limits.
     """
     floors, ceilings, bands = [], [], []
     weight = weight_wrench(mounting_in(problem.engine).block)

@@ -37,7 +37,7 @@ from laufruhe.prove.witness import Witness
 MAX_OPEN = 6
 WORK = 2e7
 MAX_BOXES = 60_000
-# numbers in memory at a time
+# largest count of numbers in memory at a time
 MEMORY = 3e6
 # numbers of a simulation that cost as much as one number of an order
 SIMULATED_SHARE = 18
@@ -63,9 +63,9 @@ def stiffness_bounds(
     value
         Objective of the incumbent [SI]. Without one it is infinite, and an infinite bound proves infeasibility.
     shares
-        Shares of the box budget, one bound after each.
+        Rising shares of the box budget; a bound is yielded after each.
     witness
-        Incumbent by its stiffnesses, to check bounds; None without one.
+        Incumbent as the vector of its stiffnesses, to check bounds; None without an incumbent.
     """
     cutoff = value - GAP_SAFETY * gap_tolerance if value < math.inf else math.inf
     search = StiffnessBoxes(problem, LEFT_OUT * gap_tolerance, cutoff)
@@ -83,7 +83,7 @@ class SimulatedBoxes(Protocol):
         """Work of one box, in numbers."""
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None, /) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or only on those of a mask."""
+        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on those of `mask` alone."""
 
 
 class StiffnessBoxes:
@@ -92,16 +92,16 @@ class StiffnessBoxes:
     Attributes
     ----------
     constant
-        Part of the objective that is the same on all mounts: loads of the block and masses [SI].
+        Sum of the terms that do not depend on the mounts: loads of the block and masses [SI].
     simulated
         Bounds of simulated measures, or None.
 
     Parameters
     ----------
     left_out
-        Share of the objective for ignored small orders [SI].
+        Largest effect of ignored small orders on the objective [SI].
     cutoff
-        Bound from which a box needs no simulations; infinite without an incumbent.
+        Lower bound from which a box needs no simulations [SI]; infinite without an incumbent.
     """
 
     what = "boxes of stiffness"
@@ -134,7 +134,7 @@ class StiffnessBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Return True if sums of squares over orders equal those over samples, as remainders suppose."""
+        """Return True if sums of squares over orders equal those over samples, as the linear bounds suppose."""
         return all(lines.is_full for _, _, lines, _ in (*self._terms, *self._limits))
 
     @property
@@ -148,12 +148,12 @@ class StiffnessBoxes:
 
     @property
     def batch_size(self) -> int:
-        """Number of boxes in one round."""
+        """Number of boxes that are bounded together."""
         return int(np.clip(MEMORY / (3.0 * self._cost), 2, 64))
 
     @property
     def max_boxes(self) -> int:
-        """Box budget: as requested, or for a few seconds."""
+        """Largest number of boxes: as requested, or by default enough for a few seconds."""
         if not self.is_sampled_fully:
             return 0
         is_tractable = len(self.problem.mount_decisions) <= MAX_OPEN
@@ -247,7 +247,7 @@ class StiffnessBoxes:
 
 
 def _relevant_lines(model: BoxModel, measure: Measure, budget: float) -> tuple[LoadedOrders, float]:
-    # E41; leaves out small lines that sum to less than the budget, and returns their effect on the norm
+    # leaves out small orders whose responses sum to at most the budget, and returns their effect on the norm (E41)
     lines = model.lines(measure)
     size = max(measure.direction_weights or (1.0,)) * model.largest_response(lines, measure.channel)
     order = np.argsort(size, kind="stable")
