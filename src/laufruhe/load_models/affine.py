@@ -1,6 +1,7 @@
-"""Problem with objective and limits as norms of rows that are affine in the decisions (P1).
+"""Problem with objective and limits as norms of load rows that are affine in the decisions (P1).
 
-The coefficients are loads that the exact model computes once for each decision.
+A row is the vector of a load at one sampled angle and place. The coefficients are loads that the exact model computes
+once for each column, an entry of the decision vector.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, 
 from laufruhe.problem.problem import Problem
 
 MAXIMUM = NORMS["maximum"]
-# unit of a column over the size that balances the loads, and smallest unit over the bound of the column
+# largest unit of a column over the value that balances the loads, and smallest unit over the bound of the column
 UNIT_MARGIN, MIN_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative violation of a limit that counts as none."""
@@ -45,7 +46,7 @@ class AffineNorm:
     Attributes
     ----------
     constant
-        Rows V0 of the design with every decision at zero, shape (k, d).
+        Rows V0 of the load of the design with every decision at zero, shape (k, d).
     slope
         Derivative B of the rows, shape (k, d, n).
     """
@@ -88,7 +89,7 @@ class AffineProblem:
     Attributes
     ----------
     terms, limits
-        Pairs (weight, norm) of the objective, and (maximum, norm).
+        Pairs (weight, norm) of the objective, and pairs (maximum, norm) of the limits.
     samples
         Number of samples over the common period of the loads.
     groups
@@ -108,7 +109,7 @@ class AffineProblem:
 
     @property
     def start(self) -> Array:
-        """Decision vector of the baseline design, shape (n,)."""
+        """Decision vector of the initial design, shape (n,)."""
         return decision_vector(self.domains)
 
     @property
@@ -137,14 +138,14 @@ class AffineProblem:
         return np.array(units)
 
     def objective(self, x: Array) -> float:
-        """Return the weighted sum of the terms at x, or the largest of several sums."""
+        """Return the weighted sum of the terms at x, or the largest sum of several groups of terms."""
         values = np.array([weight * norm.value(x) for weight, norm in self.terms])
         return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
 
     def with_weighted_groups(self, shares: Array) -> AffineProblem:
-        """Return the problem with the mean of the sums by weights `shares`, shape (groups,), as objective.
+        """Return the problem whose objective is the mixture of the group sums with weights `shares`, shape (groups,).
 
-        Weights that add up to one give a lower bound of the largest sum.
+        Shares that are not negative and add up to one give a lower bound of the largest sum.
         """
         used = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
         terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in used)
@@ -156,7 +157,7 @@ class AffineProblem:
 
 
 def typical_size(problem: AffineProblem, norms: Sequence[AffineNorm]) -> float:
-    """Return a positive size of norms [SI]: the largest at x = 0, or of any slope times its unit."""
+    """Return a typical positive value of norms [SI]: the largest norm at x = 0, or slope times unit of its column."""
     sizes = [norm.value(np.zeros(problem.size)) for norm in norms]
     sizes += [float(np.abs(norm.slope * problem.units).max(initial=0.0)) for norm in norms]
     return max(sizes, default=0.0) or 1.0
@@ -228,7 +229,7 @@ class AffineModel:
             Whether rows of means are averages over the step about each sample. A lower bound of their mean is a lower
             bound of the mean over the whole cycle (P7).
         finer
-            Whether peaks have as many more samples as results have (M6).
+            Whether the rows of peaks have the finer samples of the final evaluation (M6).
         """
 
         def norm(measure: Measure) -> AffineNorm:
@@ -268,7 +269,7 @@ class AffineModel:
         averaged
             Whether the rows of a mean are averages over the step about each sample.
         peaks
-            Number of parts of a step over which rows of other norms are averaged, if `averaged`; 0 for no average.
+            Rows of norms other than means are averaged over 1/`peaks` of a step, if `averaged`; 0 for no average.
         """
         channel, linearised = measure.channel, self.problem.known_rows.get(measure)
         if linearised is not None:
@@ -341,7 +342,11 @@ def _only_changed(engine: Engine, change: _Change) -> Engine:
 def _loads(
     parts: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
 ) -> PointLoads:
-    """Return the loads that some parts of the engine cause at an operating point, at the speed of the whole engine."""
+    """Return the loads of some parts of the engine at an operating point, at the speed of the whole engine.
+
+    `parts` is the engine with these parts as its only masses. `shares` are names of geared shafts whose whole inertia
+    is added.
+    """
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(parts.rotors, problem.engine, point, problem.fidelity)
     if any(part != part.only({}) for part in parts.slider_cranks):

@@ -21,7 +21,7 @@ from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FOR
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Phasing, Problem
 
-# relative factor of an order that counts as zero
+# relative size of the factor of an order that counts as zero
 NEGLIGIBLE = 1e-13
 # largest number of directions of dual vectors
 DIRECTIONS = 400
@@ -33,8 +33,8 @@ _LEVERS: dict[Channel, int] = {SHAKING_FORCE: 0, SURGING_FORCE: 0, ROCKING_COUPL
 class AmplitudeTerm:
     """Term of the objective: w sqrt(sum_h (f_h |F_h|)^2 + (c_h |C_h|)^2) over the orders h (S3).
 
-    F_h is the sum of e^{i h theta} over the throws, C_h the same sum weighted by throw positions; `force` and `couple`
-    are the factors f_h and c_h of every order.
+    F_h is the sum of e^{i h theta} over the throw angles theta, and C_h the same sum weighted by throw positions. w is
+    the `weight` of the term. `force` and `couple` are the factors f_h and c_h of every order.
     """
 
     weight: float
@@ -50,7 +50,7 @@ class AmplitudeObjective:
     terms: tuple[AmplitudeTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:  # noqa: ARG002
-        """Return the objective of many stars, shape (n,), from the step of every throw, shape (n, throws).
+        """Return the objective of many crank stars, shape (n,), from the step of every throw, shape (n, throws).
 
         Other objectives of this interface may return any number above `maximum` in place of a larger value.
         """
@@ -131,38 +131,39 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
 
 
 def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
-    """Return dual vectors v_h = sum_t w_t c_th u_th with sum_h |u_th|^2 <= 1 for every term t (S4).
+    """Return dual vectors v of the couples C_h of a crank star, shape (directions, orders) (S4).
 
-    Each gives a lower bound Re sum_h v_h C_h of the objective. Orders with a small weight stay at zero, which keeps
-    the bound valid. The result has the shape (directions, orders).
+    v_h = sum_t w_t c_th u_th, with weight w_t and couple factors c_th of term t, and any vector u_t with
+    sum_h |u_th|^2 <= 1. Each v gives a lower bound Re sum_h conj(v_h) C_h of the objective. v is zero in all but the
+    three orders with the largest factors, which keeps the bound valid.
     """
     total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
-    heavy = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
-    if not heavy:
+    strongest = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
+    if not strongest:
         return np.zeros((1, len(objective.orders)), dtype=complex)
-    angles = max(4, int((DIRECTIONS / 3 if len(heavy) > 1 else DIRECTIONS) ** (1.0 / len(heavy))))
+    angles = max(4, int((DIRECTIONS / 3 if len(strongest) > 1 else DIRECTIONS) ** (1.0 / len(strongest))))
     vectors = []
-    for sizes in _sizes(objective, heavy):
-        for steps in itertools.product(range(angles), repeat=len(heavy)):
+    for sizes in _sizes(objective, strongest):
+        for steps in itertools.product(range(angles), repeat=len(strongest)):
             v = np.zeros(len(objective.orders), dtype=complex)
-            for h, size, step in zip(heavy, sizes, steps, strict=True):
+            for h, size, step in zip(strongest, sizes, steps, strict=True):
                 v[h] = size * np.exp(2j * np.pi * step / angles)
             vectors.append(v)
     return np.unique(np.array(vectors), axis=0)
 
 
-def _sizes(objective: AmplitudeObjective, heavy: Sequence[int]) -> Iterator[Array]:
-    """Yield sizes of the dual vector v on the orders `heavy` with the largest couples.
+def _sizes(objective: AmplitudeObjective, strongest: Sequence[int]) -> Iterator[Array]:
+    """Yield magnitudes |v_h| of dual vectors for the orders with the largest couple factors (S4).
 
-    A term with several of these orders divides its unit between them.
+    `strongest` are the indices of these orders. A term with several of them divides its unit vector between them.
     """
-    grid = [np.ones(len(heavy))]
-    if any(np.count_nonzero(np.take(term.couple, heavy) > 0.0) > 1 for term in objective.terms):
-        grid += [np.array(shares) for shares in itertools.product((0.25, 0.6, 0.95), repeat=len(heavy))]
+    grid = [np.ones(len(strongest))]
+    if any(np.count_nonzero(np.take(term.couple, strongest) > 0.0) > 1 for term in objective.terms):
+        grid += [np.array(shares) for shares in itertools.product((0.25, 0.6, 0.95), repeat=len(strongest))]
     for shares in grid:
-        sizes = np.zeros(len(heavy))
+        sizes = np.zeros(len(strongest))
         for term in objective.terms:
-            factors = np.array([term.couple[h] for h in heavy])
+            factors = np.array([term.couple[h] for h in strongest])
             unit = np.where(factors > 0.0, shares, 0.0)
             length = float(np.sqrt((unit**2).sum()))
             sizes += term.weight * factors * (unit / length if length > 0.0 else unit)

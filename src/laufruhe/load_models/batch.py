@@ -1,6 +1,6 @@
 """Evaluate the objective of many designs of one problem in one call (F12).
 
-The features of a design are 1 and its decision vector, side by side, and the rows of all norms are linear in them. The
+The feature vector of a design is 1 followed by its decision vector. The load rows of all norms are linear in it. The
 work is one matrix product and two passes over its result. Designs are processed in blocks that fit in the cache. The
 size of a block depends on the shapes only, so results do not depend on the number of threads.
 """
@@ -28,9 +28,12 @@ _PARTS_OF_COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """Norm of the loads f . R of many designs: R has the shape (components, features, k).
+    """Norm of the load rows f . R of a design with the feature vector f = (1, open unbalances), for many designs.
 
-    The features f of a design are 1 and its open unbalances, shape (features,).
+    Attributes
+    ----------
+    rows
+        Coefficients R of k load rows, shape (components, features, k).
     """
 
     norm: Norm
@@ -38,7 +41,7 @@ class BatchNorm:
     grid: Grid
 
     def values(self, features: Array, threads: int = 1) -> Array:
-        """Return the norm of each design, shape (designs,), from features, shape (designs, features)."""
+        """Return the norm of each design, shape (designs,), from the feature vectors, shape (designs, features)."""
         components, _, k = self.rows.shape
         block = max(CACHE_BYTES // (8 * (components + 1) * max(k, 1)), _MIN_BLOCK)
         norms = np.empty(len(features))
@@ -71,7 +74,10 @@ class BatchNorm:
         return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
 
     def _lengths(self, product: Array, output: Array) -> Array:
-        """Return the row lengths of every design, shape (designs, k); overwrites the products."""
+        """Return the row lengths of every design, shape (designs, k), from the product of features and coefficients.
+
+        The product is overwritten.
+        """
         components, _, k = self.rows.shape
         if components == 1:
             return np.absolute(product, out=output)
@@ -94,11 +100,11 @@ class Designs:
     limits: tuple[tuple[float, BatchNorm], ...] = ()
 
     def objective(self, values: Array, threads: int = 1) -> Array:
-        """Return the objective of every design, shape (designs,), from complex decisions (designs, decisions) (C4)."""
+        """Return the objective of each design, shape (designs,), from complex values, shape (designs, decisions) (C4)."""
         return self.objective_from_features(self._features(values), threads)
 
     def are_feasible(self, values: Array) -> Mask:
-        """Return which designs keep the limits on loads and masses within `FEASIBLE`, shape (designs,)."""
+        """Return the mask of designs that keep the limits on loads and masses within `FEASIBLE`, shape (designs,)."""
         features, feasible = self._features(values), np.ones(len(values), dtype=bool)
         for maximum, norm in self.limits:
             feasible &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
@@ -113,7 +119,7 @@ class Designs:
         return np.stack([np.ones(len(values)), *columns], axis=1)
 
     def objective_from_features(self, features: Array, threads: int = 1) -> Array:
-        """Return the objective of every design from its features, shape (designs, 1 + columns)."""
+        """Return the objective of every design from the vectors (1, decision vector), shape (designs, 1 + columns)."""
         total = np.zeros(len(features))
         for weight, norm in self.terms:
             total += weight * norm.values(features, threads)
@@ -158,7 +164,7 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
 
 
 def feature_rows(norm: AffineNorm) -> Array:
-    """Return V0 and the columns of B in the layout of `BatchNorm`, shape (d, 1 + n, k)."""
+    """Return the constant rows V0 and slopes B of a norm in the layout of `BatchNorm.rows`, shape (d, 1 + n, k)."""
     return np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
 
 

@@ -19,7 +19,7 @@ from laufruhe.problem.decision import column_scales
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
-# relative size below which an order is left out
+# size below which an order is left out, relative to the largest order
 MIN_SHARE = 1e-4
 # random designs at which sizes of orders are compared
 PROBES = 6
@@ -32,7 +32,7 @@ class FixedCrankLoads:
         self._model, self._unbalances = model, unbalances
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return the relevant orders of the wrench at every operating point, times a matrix of shape (6, 6)."""
+        """Return a matrix of shape (6, 6) times the wrench at every operating point, without negligible orders."""
         wrenches, bounds = [], column_scales(self._model.domains)
         for bare, slopes in self._model.wrenches():
             base, spectra = stacked_coefficients([bare, *slopes])
@@ -46,7 +46,7 @@ class FixedCrankLoads:
         return wrenches
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
-        """Return the rows of a measure that is not one of mounts, shape (k, d), and their grid (P1)."""
+        """Return the load rows of a measure that does not depend on the mounts, shape (k, d), and their grid (P1)."""
         norm = self._model.norm(measure, self._model.full_samples)
         return self._affine(norm.constant, np.moveaxis(norm.slope, -1, 0)), norm.grid
 
@@ -64,7 +64,7 @@ class OpenCrankLoads(UnevenModel):
     Parameters
     ----------
     problem
-        Problem of the star from which angles are counted.
+        Problem with the crank star from which the open angles are counted.
     moves
         Open angles and their bounds.
     deviations, unbalances
@@ -77,7 +77,10 @@ class OpenCrankLoads(UnevenModel):
         self._moves, self._variables = moves, [deviations, unbalances]
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return the orders of the wrench that matter at any of `PROBES` designs, times a matrix of shape (6, 6)."""
+        """Return a matrix of shape (6, 6) times the wrench at every operating point, without negligible orders.
+
+        An order is negligible if it is small at all of `PROBES` random designs.
+        """
         relevant, bounds = [], column_scales(self.domains)
         for point in self.problem.points:
             wrench = self.wrench(point).mapped(transform)
@@ -96,7 +99,7 @@ class OpenCrankLoads(UnevenModel):
 
 
 SymbolicLoads: TypeAlias = FixedCrankLoads | OpenCrankLoads
-"""Loads of a problem as expressions."""
+"""Loads of a fixed crank, or of a crank with open angles, as expressions."""
 
 
 def _relevant_orders(sizes: Array, orders: Array) -> NDArray[np.intp]:

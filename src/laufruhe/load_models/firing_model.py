@@ -1,8 +1,8 @@
-"""Problem with a decided firing order as norms of rows that are affine in the order and the decisions (V9, B8).
+"""Problem with an open firing order as norms of load rows that are affine in the order and the decisions (V9, B8).
 
 If every cylinder has a throw of its own, a firing order assigns the cylinders to the slots of the cycle, and thereby
-fixes the star. Loads on bearings and torques in the crankshaft are sums over the cylinders. Each cylinder adds its own
-rows, later by its slot.
+fixes the crank star. Loads on bearings and torques in the crankshaft are sums over the cylinders. Each cylinder adds
+its own load rows, later by its slot.
 """
 
 from __future__ import annotations
@@ -26,18 +26,21 @@ from laufruhe.problem.problem import Phasing, Problem
 
 
 def slot_space(cylinders: int, places: tuple[float, ...]) -> StarSpace:
-    """Return firing orders as a space of stars: n slots in a cycle, one cylinder on each, cylinder 1 on slot 0."""
+    """Return all firing orders of n cylinders as a space of crank stars whose steps are the n slots of a cycle.
+
+    Each slot has one cylinder, and cylinder 1 has slot 0. `places` are the positions of the throws along the crank [m].
+    """
     return StarSpace(cylinders, ((1,) * cylinders,), places)
 
 
 class FiringModel(StarModel):
-    """Star model whose steps are the slots of the cycle.
+    """Loads of all firing orders: a crank star model whose steps are the slots of the cycle.
 
-    Loads that do not depend on the firing order are those of the star. To loads inside the crankcase, the load of every
-    cylinder is added, later by its slot.
+    Loads that do not depend on the firing order are those of the crank star. To loads inside the crankcase, the load of
+    every cylinder is added, later by its slot.
 
-    The parameters are those of `StarModel`: `space` has the allowed firing orders, as stars of slots, and `origin` the
-    slot of every cylinder in the firing order from which moves are counted.
+    The parameters are those of `StarModel`: `space` has the allowed firing orders, as stars of slots. `origin` has the
+    slot of every cylinder in the firing order from which changes are counted.
     """
 
     def __init__(
@@ -69,7 +72,7 @@ class FiringModel(StarModel):
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
         stars, steps = super()._rows(samples, averaged), slot_steps(self.phasing.cycle, range(self.space.throws))
-        # norms of the star in terms of slots, in the order of terms and limits
+        # norms of the crank stars by slots, first of the terms and then of the limits
         star_norms = iter([norm.with_steps(steps) for _, norm in (*stars.terms, *stars.limits)])
         numbers = [(term.weight, term.measure) for term in self.problem.objective]
         numbers += [(limit.maximum, limit.measure) for limit in self.problem.load_limits]
@@ -78,7 +81,7 @@ class FiringModel(StarModel):
         return StarProblem(tuple(norms[:count]), tuple(norms[count:]), self.domains, samples)
 
     def _norm(self, measure: Measure, samples: int, averaged: bool, star_norms: Iterator[StarNorm]) -> StarNorm:
-        """Return a measure in all firing orders; `star_norms` yields the norms of the stars, in order."""
+        """Return the norm of a measure for all firing orders; `star_norms` yields the norms of the crank stars."""
         if not measure.is_inside:
             return next(star_norms)
         signals = [signal.with_base(self.base) for signal in self._origin_evaluation.signals(measure.load)]
@@ -106,7 +109,7 @@ class FiringModel(StarModel):
     def _loads_of_cylinder(self, load: LoadChannel, k: int) -> list[Spectrum]:
         """Return the load spectrum of cylinder k alone, fired in slot 0, at every operating point.
 
-        A load that depends on unbalances has only its gas part here; the rows of the star hold its inertia part.
+        A load that depends on unbalances has only its gas part here; the rows of the crank star hold its inertia part.
         """
         engine = self.problem.engine
         part = engine.slider_cranks[k]

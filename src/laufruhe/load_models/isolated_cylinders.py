@@ -17,7 +17,7 @@ from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.problem.problem import Problem
 
 BANK_SAMPLES = (0.0, 0.5 * math.pi, math.pi)
-"""Bank angles at which loads determine those at any bank angle [rad]: loads turn with the bank, or stay."""
+"""Bank angles [rad] whose loads determine the loads at any bank angle: components turn with the bank, or stay."""
 LEAD_DIGITS = 9
 """Decimal digits to which leads are compared [rad]."""
 
@@ -44,7 +44,10 @@ def isolate_rotors(engine: Engine, rotors: Sequence[Rotor], keep_places: bool) -
 
 
 def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
-    """Return the factors of cos(bank), sin(bank) and 1 in the loads of a cylinder, from those at `BANK_SAMPLES`."""
+    """Return the factors of cos(bank), sin(bank) and 1 in the load coefficients of a cylinder.
+
+    The parameters are the coefficients at the three bank angles of `BANK_SAMPLES`.
+    """
     constant = 0.5 * (upright + upside)
     return 0.5 * (upright - upside), across - constant, constant
 
@@ -63,7 +66,7 @@ def only_gas_of(problem: Problem, name: str) -> Problem:
 
 
 def motored(problem: Problem) -> Problem:
-    """Return the problem without gas."""
+    """Return the problem without gas forces, as if the engine were motored."""
     return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
 
 

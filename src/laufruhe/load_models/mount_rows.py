@@ -21,10 +21,10 @@ SAMPLES_PER_ORDER = 4
 
 
 def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure: Measure) -> tuple[Any, Grid]:
-    """Return the rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
+    """Return the load rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
 
     Rows are values at samples, or coefficients of orders for a root mean square (Parseval); their expression has the
-    shape (k, 3). `names` are those of the mounts, in the order of the response.
+    shape (k, 3). `points` are the responses at the operating points, and `names` the names of the mounts in them.
     """
     chosen = [response for response in points if measure.includes_point(response.point)]
     signals = [one.force if measure.channel is channels.MOUNT_FORCE else one.travel for one in chosen]
@@ -53,7 +53,10 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
 
 
 def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> list[tuple[Any, Any]]:
-    """Return sums of squares of forces on elastic and on rigid mounts, per operating point and order (E11)."""
+    """Return sums of squares of forces on elastic and on rigid mounts, for each operating point and order (E11).
+
+    If the measure names no orders, all orders above zero count together.
+    """
     pairs = []
     counted = [measure.orders] if measure.orders is None else [(order,) for order in measure.orders]
     for response in points:

@@ -1,7 +1,8 @@
 """Response of the mounted block as CasADi expressions, by the same kernels as the numeric model (E1-E5, E20).
 
-Motions are in coordinates y with q = R' y, in which the mass matrix is the unit matrix and the stiffness is R K R'. One
-complex symmetric system per order and operating point is solved in closed form, so that its derivatives are exact.
+The motion of the block is q = R' y, with coordinates y in which the mass matrix is the unit matrix. R is the inverse
+square root of the mass matrix, and the stiffness matrix K becomes R K R'. One complex symmetric system for each order
+and operating point is solved in closed form, so that its derivatives are exact.
 """
 
 from __future__ import annotations
@@ -31,16 +32,16 @@ class SymbolicMounts:
     Attributes
     ----------
     stiffness, loss, damping
-        R K R', R H R', R C R', shape (6, 6) (E3).
+        Stiffness K, loss H and damping C in coordinates with unit mass, R K R', R H R', R C R', shape (6, 6) (E3).
     travels
-        Deflection of the mounts per motion, G R', shape (3 mounts, 6) (E1).
+        Deflection of the mounts per motion y, G R' with the map G from q to deflections, shape (3 mounts, 6) (E1).
     springs, losses, dampers
-        Mount forces of stiffness, loss and damping per motion, shape (3 mounts, 6) (E5).
+        Mount forces of stiffness, loss and damping per motion y, shape (3 mounts, 6) (E5).
     rows, directions
-        For springs whose stiffness depends on frequency: deflection per motion, shape (n, 6), and direction of the
+        For n springs whose stiffness depends on frequency: deflection per motion y, shape (n, 6), and direction of the
         force, shape (3 mounts, n) (E50).
     spring_travels
-        Deflection of every spring along its own axes per motion, shape (3 springs, 6) (E55).
+        Deflection of every spring along its own axes per motion y, shape (3 springs, 6) (E55).
     laws
         Stiffness laws of the springs whose stiffness depends on frequency.
     """
@@ -161,10 +162,14 @@ class PointResponse:
 
 
 def response(mounts: SymbolicMounts, point: OperatingPoint, wrench: SymbolicSpectrum) -> PointResponse:
-    """Return the response of the block at one operating point to the wrench `wrench` of the loads."""
+    """Return the response of the mounted block at one operating point.
+
+    `wrench` is the wrench of the loads in coordinates with unit mass: R times the wrench about the centre of gravity,
+    with the inverse square root R of the mass matrix.
+    """
     real, imaginary, omegas = wrench.real, wrench.imaginary, wrench.orders * point.speed
     count, unit = len(omegas), ca.DM.eye(6)
-    # dynamic less static stiffness
+    # complex stiffness at each frequency less the static stiffness
     increases = np.array([law.at(omegas) - law.static for law in mounts.laws], dtype=complex).reshape(
         len(mounts.laws), count
     )

@@ -1,6 +1,6 @@
 """Root mean squares of the loads of a crank star as sums over pairs of throws (V9).
 
-Throw k stands on step p_k of the star and adds rows m_k(p_k). The square of the root mean square is
+Throw k stands on step p_k of the star and adds load rows m_k(p_k) to the rows V0. The square of the root mean square is
 
     |V0 + sum_k m_k(p_k)|^2 = c + sum_k L_k(p_k) + 2 sum_{k<l} m_k(p_k) . m_l(p_l).
 
@@ -24,16 +24,16 @@ _ROUNDING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class PairTable:
-    """Table of the square of one root mean square.
+    """Table of the square of one root mean square for all crank stars; symbols are those of the module.
 
     Attributes
     ----------
     constant
         Square c of the rows without any throw.
     linear
-        L_k(p), shape (throws, steps).
+        Summand L_k(p) of throw k on step p, shape (throws, steps).
     pairs
-        2 m_k(p) . m_l(q), shape (throws, throws, steps, steps).
+        Products 2 m_k(p) . m_l(q) of throw k on step p and throw l on step q, shape (throws, throws, steps, steps).
     rounding
         Largest rounding error of a square.
     """
@@ -44,7 +44,7 @@ class PairTable:
     rounding: float
 
     def squares(self, stars: Stars) -> Array:
-        """Return the squares of stars, shape (n,), from the step of every throw, shape (n, throws)."""
+        """Return the square for each of n crank stars, shape (n,), from the step of every throw, shape (n, throws)."""
         total = np.full(len(stars), self.constant)
         for k in range(stars.shape[1]):
             total += self.increments(stars, stars[:, k], k)
@@ -64,7 +64,7 @@ class PairTable:
 
 
 def pair_table(norm: StarNorm) -> PairTable:
-    """Return the table of a root mean square that has no decisions besides the star."""
+    """Return the table of a root mean square without decisions other than the crank star."""
     weights = np.sqrt(norm.grid.weights)[:, None]
     first = (norm.constant * weights).reshape(-1)
     throws, steps = norm.moves.shape[:2]
@@ -86,7 +86,7 @@ class PairObjective:
 
     @classmethod
     def from_problem(cls, problem: StarProblem) -> PairObjective:
-        """Build the objective of a problem of root mean squares whose only decision is the star."""
+        """Build the objective of a problem of root mean squares whose only decision is the crank star."""
         terms, limits = (
             tuple((number, pair_table(norm)) for number, norm in pairs) for pairs in (problem.terms, problem.limits)
         )
@@ -98,7 +98,7 @@ class PairObjective:
         return [table for _, table in (*self.terms, *self.limits)]
 
     def values(self, squares: Array) -> Array:
-        """Return the objective, shape (n,), infinite over a limit, from squares of all tables, shape (n, tables)."""
+        """Return the objective of n stars, infinite over a limit, from the squares of all tables, shape (n, tables)."""
         total = np.zeros(len(squares))
         for k, (weight, _) in enumerate(self.terms):
             total += weight * np.sqrt(np.maximum(squares[:, k], 0.0))

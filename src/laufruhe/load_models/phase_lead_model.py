@@ -1,4 +1,4 @@
-"""Loads of an engine with geared shafts whose leads are open, with derivatives in the leads (P13).
+"""Loads of an engine with geared shafts whose lead angles are open, with derivatives by the leads (P13).
 
 A load is the sum of the load of the fixed parts and of the loads of each shaft with an open lead. The load of a shaft,
 gas included, comes earlier by the lead of the shaft. Loads are affine in the unbalances (P1).
@@ -27,7 +27,7 @@ FINE = 1440
 
 @dataclass(frozen=True, eq=False)
 class LoadShare:
-    """Load of one shaft, or of the fixed parts.
+    """Share of one shaft, or of the fixed parts, in a load.
 
     Attributes
     ----------
@@ -41,11 +41,11 @@ class LoadShare:
     columns: list[list[Spectrum]]
 
     def earlier(self, lead: float) -> LoadShare:
-        """Return the load that comes earlier by a lead [rad]."""
+        """Return the share that comes earlier by a lead [rad]."""
         return self.mapped(lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else self
 
     def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
-        """Return the load with a change of every spectrum."""
+        """Return the share with the function `change` applied to every spectrum."""
         return LoadShare(
             [change(signal) for signal in self.bare], [[change(signal) for signal in column] for column in self.columns]
         )
@@ -53,7 +53,7 @@ class LoadShare:
 
 @dataclass(frozen=True, eq=False)
 class PhaseLeadNorm:
-    """Norm of affine rows at given leads, and the derivatives of the rows in each lead.
+    """Norm of affine load rows at given leads, and the derivatives of the rows by each lead.
 
     Attributes
     ----------
@@ -75,11 +75,11 @@ class PhaseLeadModel:
     Attributes
     ----------
     lower, upper, start
-        Bounds and baseline values of the leads [rad], shape (leads,).
+        Bounds and initial values of the leads [rad], shape (leads,).
     names
         Names of the shafts with an open lead.
     base_model
-        Loads of the whole engine with the leads at their baseline values.
+        Loads of the whole engine with the leads at their initial values.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -95,7 +95,7 @@ class PhaseLeadModel:
         self._cache: dict[Measure, tuple[LoadShare, list[LoadShare]]] = {}
 
     def shares(self, measure: Measure) -> tuple[LoadShare, list[LoadShare]]:
-        """Return the load of a measure from the fixed parts and from each shaft, over a common period."""
+        """Return the shares of the fixed parts and of each shaft in the load of a measure, over a common period."""
         if measure not in self._cache:
             shares = []
             for model in (self._fixed, *self._shafts):
@@ -111,7 +111,7 @@ class PhaseLeadModel:
         return self._cache[measure]
 
     def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
-        """Return a measure at given leads, with derivatives in the leads; see `at`."""
+        """Return the norm of a measure at given leads, with derivatives by the leads; see `at` for the parameters."""
         if not measure.is_load:
             norm = self.base_model.norm(measure, samples)
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
@@ -158,7 +158,7 @@ class PhaseLeadModel:
         """
 
         def norm(measure: Measure) -> PhaseLeadNorm:
-            # without open unbalances samples are cheap: peaks have those of results (M6), means short averages
+            # without open unbalances samples are cheap: peaks have those of results (M6), and means have short averages
             times = 1 if self.domains or not measure.is_load else measure.norm.refinement
             if times == 1 and averaged and not self.domains:
                 times = max(round(FINE / samples), 1)
@@ -174,7 +174,7 @@ class PhaseLeadModel:
         return program, tuple(norm for _, norm in (*terms, *limits))
 
     def counted(self, measure: Measure, shaft: int) -> list[Spectrum]:
-        """Return the counted orders of a shaft's load at its baseline lead, for each operating point with a weight."""
+        """Return the counted orders of a shaft's load at its initial lead, for each operating point that counts."""
         shares = measure.shares(self.problem.points)
         signals = self.shares(measure)[1][shaft].bare
         engine = self.problem.engine
@@ -182,7 +182,7 @@ class PhaseLeadModel:
 
 
 def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> Problem:
-    """Return the problem of an engine reduced to the parts on some shafts, by a test of the shaft name."""
+    """Return the problem of an engine reduced to the parts on those shafts whose name `is_included` accepts."""
     engine = problem.engine
     parts = tuple(part for part in engine.slider_cranks if is_included(part.shaft.name))
     # other rotors stay without unbalance, so that every decision keeps its column

@@ -11,7 +11,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 COARSE_STEP = 4
-"""Time step of simulations during a search, over that of the final evaluation."""
+"""Time step of simulations during a search, over the time step of the final evaluation."""
 
 
 class Peaks(Protocol):
@@ -37,7 +37,7 @@ class Peaks(Protocol):
 
 
 def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
-    """Return the simulated measures in the objective and the limits, except those with linearised rows.
+    """Return the simulated measures of objective and limits, except those that have linearised rows in the problem.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""Problem with a decided crank star as norms of rows that are affine in the star and the decisions (S11).
+"""Problem with an open crank star as norms of load rows that are affine in the star and the decisions (S11).
 
-Loads of throws add up. The rows of any star are those of one star, the origin, plus the change when each throw moves to
-its step. The exact model computes the change of one throw at a time. Gas is evaluated at the origin only, because even
-firing of equal cylinders gives the same roll moment in every order.
+Loads of throws add up. The rows of any star are the rows of one star, the origin, plus the change as each throw moves
+to its step. The exact model computes the change of one throw at a time. Gas is evaluated at the origin only, because
+even firing of equal cylinders gives the same roll moment in every order.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ _ROUNDING = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class StarNorm:
-    """Norm N(V0 + sum_k D[k, p_k] + (B + sum_k E[k, p_k]) x) for the star with throw k on step p_k.
+    """Norm N(V0 + sum_k D[k, p_k] + (B + sum_k E[k, p_k]) x) of the loads of crank stars.
+
+    Throw k stands on step p_k, and x is the decision vector.
 
     Attributes
     ----------
     constant
-        Rows V0 of the origin star, shape (k, d).
+        Load rows V0 of the origin star, shape (k, d).
     moves
         Change D of the rows when a throw moves to a step, shape (throws, steps, k, d).
     slope
@@ -67,14 +69,17 @@ class StarNorm:
         return AffineNorm(self.norm, total(self.constant, self.moves), slope, self.grid)
 
     def with_steps(self, steps: Sequence[int]) -> StarNorm:
-        """Return the norm with steps in place of the present ones, each equal to one of them."""
+        """Return the norm with another list of steps: new step j is the present step `steps[j]`."""
         slope_moves = None if self.slope_moves is None else self.slope_moves[:, list(steps)]
         return replace(self, moves=self.moves[:, list(steps)], slope_moves=slope_moves)
 
 
 @dataclass(frozen=True, eq=False)
 class StarProblem:
-    """Problem of all stars at one number of samples over the common period, with pairs as those of `AffineProblem`."""
+    """Problem of all crank stars at one number of samples over the common period.
+
+    `terms` are pairs (weight, norm) of the objective, and `limits` are pairs (maximum, norm).
+    """
 
     terms: tuple[tuple[float, StarNorm], ...]
     limits: tuple[tuple[float, StarNorm], ...]
@@ -83,7 +88,7 @@ class StarProblem:
 
     @property
     def compressed(self) -> StarProblem:
-        """Equivalent problem whose root mean squares have at most as many rows as columns (S12)."""
+        """Equivalent problem with fewer rows in root mean squares (S12); see `compress_norm`."""
         terms, limits = (
             tuple((number, compress_norm(norm) if norm.norm.is_euclidean else norm) for number, norm in pairs)
             for pairs in (self.terms, self.limits)
@@ -98,14 +103,14 @@ class StarProblem:
 
 
 class StarModel:
-    """Loads of the origin star, and of all stars that differ from it in one throw.
+    """Loads of the origin crank star, and of all stars that differ from it in one throw.
 
     Parameters
     ----------
     geometry
         Bank angle and split pin [rad], or None each.
     origin
-        Star from which moves of throws are counted; the first star of the space if None.
+        Step of every throw in the star from which moves are counted; the first star of the space if None.
     """
 
     def __init__(
@@ -135,7 +140,7 @@ class StarModel:
 
     @property
     def models(self) -> list[AffineModel]:
-        """Load models of the stars that determine all other stars."""
+        """Load models of the stars whose loads determine those of all other stars."""
         return [self._full_model, self._origin_motored, *self._one_moved.values()]
 
     @property
@@ -184,9 +189,10 @@ class StarModel:
 
 
 def with_upright_angles(problem: Problem) -> Problem:
-    """Return the problem with unbalances of free angle counted from upright, and not from their throw.
+    """Return the problem with the angles of open unbalances counted from upright, and not from their throw.
 
-    Their set, a disc, is the same from every angle. Counted from upright, they act alike in every star.
+    Only unbalances of free angle change: their set, a disc, is the same from every angle. Counted from upright, they
+    act alike in every star.
     """
     decisions = []
     for decision in problem.decisions:
@@ -205,8 +211,8 @@ def with_upright_angles(problem: Problem) -> Problem:
 def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
     """Return rows of shape (..., m, 1) whose sums have the same lengths as those of `parts`, shape (..., k, d) (S12).
 
-    They are the rows of R in a QR decomposition, because Q keeps every length. The result is None if R would have no
-    fewer rows than k d.
+    They come from the factor R of a QR decomposition, because the factor Q keeps every length. The result is None if R
+    would have no fewer rows than k d.
     """
     k, d = parts[0].shape[-2:]
     flat = [part.reshape(-1, k * d) for part in parts]
@@ -219,7 +225,7 @@ def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
 
 
 def compress_norm(norm: StarNorm) -> StarNorm:
-    """Return a root mean square with no more rows than it has columns (S12)."""
+    """Return the same root mean square with at most one row for each constant, move and slope (S12)."""
     root = np.sqrt(norm.grid.weights)[:, None]
     parts = [norm.constant * root, norm.moves * root, np.moveaxis(norm.slope * root[..., None], -1, 0)]
     if norm.slope_moves is not None:

@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import base_of
 
 @dataclass(frozen=True, eq=False)
 class SymbolicSpectrum:
-    """Spectrum of a signal with n orders whose coefficients are CasADi expressions, shape (d, n) for each part."""
+    """Spectrum of a signal with n orders; real and imaginary parts are CasADi expressions, shape (d, n) each."""
 
     orders: Array
     real: Any
@@ -52,7 +52,7 @@ class SymbolicSpectrum:
 
 
 def sum_spectra(spectra: Sequence[SymbolicSpectrum]) -> SymbolicSpectrum:
-    """Return the sum of spectra, order by order."""
+    """Return the sum of spectra with equal components, order by order."""
     orders = np.unique(np.concatenate([spectrum.orders for spectrum in spectra]))
     real, imaginary = 0.0, 0.0
     for spectrum in spectra:

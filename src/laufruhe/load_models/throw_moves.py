@@ -1,4 +1,4 @@
-"""Throws, bank angle and split pin as deviations from a star at a fixed firing order (S20).
+"""Throws, bank angle and split pin as deviations from a crank star at a fixed firing order (S20).
 
 Deviations may be numbers or CasADi symbols.
 """
@@ -33,7 +33,7 @@ class ThrowMoves:
     phasing
         Open crank star with the bounds of its angles.
     start
-        Star with firing order from which deviations are counted.
+        Crank star, with its firing order, from which deviations are counted.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class ThrowMoves:
 
     def candidate(self, x: Array) -> Candidate:
         """Return the crank at deviations x [rad], shape (size,)."""
-        # a rounding error from a step would count as another firing angle
+        # a rounding error of a deviation would count as another firing angle
         throws, bank, split = self.angles(np.where(np.abs(x) < ZERO_DEVIATION, 0.0, x))
         return replace(
             self.start,

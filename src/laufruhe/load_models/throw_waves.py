@@ -1,12 +1,12 @@
-"""Loads of throws as sums of waves in their angles, with coefficients from the exact model (S26, S30).
+"""Loads of throws as sums of waves in the throw angles, with coefficients from the exact model (S26, S30).
 
-Parts that turn with a throw at angle theta have the load c_h e^{i h theta} in order h: its slider-cranks, their gas and
-the unbalances on it. A measure of loads is a norm of rows that are affine in cos(h theta) and sin(h theta) of every
-throw, and in the unbalances.
+A throw at angle theta has the load c_h e^{i h theta} in order h, from its slider-cranks, their gas and the unbalances
+on it. A measure of loads is a norm of load rows that are affine in cos(h theta) and sin(h theta) of every throw, and in
+the unbalances.
 
-If the bank angle beta is open, the load of a cylinder on bank b = s beta, with s = 1 or -1, leans by b and comes later
-by b. Order h is e^{i h (theta - b)} (A_h cos b + B_h sin b + C_h), which are waves in b of the orders h - 1, h and
-h + 1. An open split pin only shifts the load in time.
+If the bank angle beta is open, a cylinder leans by b = s beta, with s = 1/2 or -1/2. Its load leans by b and comes
+later by b. Order h is e^{i h (theta - b)} (A_h cos b + B_h sin b + C_h) with coefficients A_h, B_h and C_h of the
+cylinder. These are waves in b of the orders h - 1, h and h + 1. An open split pin only shifts the load in time.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from laufruhe.problem.measure import Measure, mass_rows, narrow_signal
 from laufruhe.problem.phasing import NO_OPEN_ANGLES, OpenAngles
 from laufruhe.problem.problem import Problem
 
-# smallest share of the load that keeps one of the lowest orders, and number of these orders
+# share of the load above which one of the lowest orders is kept, and number of these orders
 _TINY_SHARE, _LOWEST_ORDERS = 1e-10, 24
 # number of orders with the stricter share of `share_left_out`
 _LOW_ORDERS = 96
@@ -77,14 +77,16 @@ class MovingPart:
 
 @dataclass(frozen=True, eq=False)
 class WaveNorm:
-    """Norm N(V0 + B x + sum_p Re sum_h W_ph e^{i h theta_p}) over parts p and orders h.
+    """Norm N(V0 + B x + sum_p Re sum_h W_ph e^{i h theta_p}) over moving parts p and orders h.
+
+    x is the decision vector of the unbalances, and theta_p the throw angle of part p.
 
     Attributes
     ----------
     fixed
-        Norm of the rows V0 + B x of all that does not turn with a throw.
+        Norm of the load rows V0 + B x of all that does not turn with a throw.
     waves
-        W of every moving part with all open angles at zero, shape (parts, orders, k, d).
+        Coefficients W of every moving part with all open angles at zero, shape (parts, orders, k, d).
     left_out
         Largest change of the norm by the omitted orders [SI].
     """
@@ -95,13 +97,16 @@ class WaveNorm:
 
 
 def uses_averages(problem: Problem, measure: Measure) -> bool:
-    """Return True if rows are averages about samples: of means (P7), or of peaks of loads with kinks by gas."""
+    """Return True if the load rows of a measure are averages about samples.
+
+    They are for means (P7), and for peaks of loads with kinks by gas.
+    """
     has_kinks = problem.has_gas and measure.depends_on_gas and measure.norm.refinement > 1
     return measure.is_load and (measure.norm.averages or has_kinks)
 
 
 def averaged_signal(problem: Problem, measure: Measure, signal: Spectrum, samples: int) -> Spectrum:
-    """Return the signal whose samples are the rows of a measure: the signal, or its averages over the steps."""
+    """Return the signal whose samples are the load rows of a measure: the signal, or its averages over the steps."""
     if not uses_averages(problem, measure):
         return signal
     return signal.averaged(signal.period / (samples if measure.norm.averages else PEAK_STEPS * samples))
@@ -119,7 +124,7 @@ class ThrowWaves:
     rest
         Loads of the remaining rotors, affine in the unbalances.
     times
-        Orders in time that are kept.
+        Orders of crank speed that are kept.
     base
         Order of the common period.
 
@@ -130,8 +135,8 @@ class ThrowWaves:
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
     turns
-        Change of all throw angles per unit of an open angle: the side of cylinder 1 if throws are counted from its
-        dead centre, or 0.
+        Change of all throw angles per unit of an open angle: the side (1/2 or -1/2) of cylinder 1 if throws are
+        counted from its dead centre, or 0.
     """
 
     share_left_out: tuple[float, float] = 1e-4, 1e-3
@@ -206,14 +211,14 @@ class ThrowWaves:
 
     @property
     def min_arc_share(self) -> float:
-        """Share of the largest order above which an order is bounded along its arc; smaller ones count by size."""
+        """Relative size above which a wave is bounded along its arc of angles; a smaller wave counts by its size."""
         return self._arc_shares[any(map(self._is_averaged_peak, self.problem.measures))]
 
     def _is_averaged_peak(self, measure: Measure) -> bool:
         return uses_averages(self.problem, measure) and not measure.norm.averages
 
     def counted(self, measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
-        """Return the counted orders of the load of a measure, for each operating point with a weight."""
+        """Return the counted orders of the load of a measure, for each operating point that counts."""
         engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
@@ -223,7 +228,7 @@ class ThrowWaves:
         ]
 
     def _kept_orders(self, measure: Measure) -> set[Fraction]:
-        """Return the orders that a load needs, so that higher ones have at most `share_left_out`."""
+        """Return the orders that a measure needs, so that omitted orders have at most the share `share_left_out`."""
         squares: dict[Fraction, float] = defaultdict(float)
         evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
         for signal in (signal for evaluation in evaluations for signal in self.counted(measure, evaluation)):
@@ -249,7 +254,7 @@ class ThrowWaves:
                 continue
             largest = 0.0
             for u, a, d in zip(*signals, strict=True):
-                # |A cos b + B sin b + C| is no more than all three
+                # |A cos b + B sin b + C| is at most |A| + |B| + |C|
                 constant = (u + d).mapped(lambda values: 0.5 * values)
                 cosine = (u + d.mapped(np.negative)).mapped(lambda values: 0.5 * values)
                 sine = a + constant.mapped(np.negative)
@@ -281,7 +286,7 @@ class ThrowWaves:
         return total
 
     def norm(self, measure: Measure, samples: int) -> WaveNorm:
-        """Return a measure at `samples` steps over the period; means are averaged over each step (P7)."""
+        """Return the norm of a measure at `samples` steps over the period; means are averaged over each step (P7)."""
         fixed = self.rest.norm(
             measure, samples, averaged=True, peaks=PEAK_STEPS if uses_averages(self.problem, measure) else 0
         )
@@ -322,7 +327,7 @@ class ThrowWaves:
         return [np.asarray((times == 1.0)[:, None, None] * phases * (real - 1j * imaginary))]
 
     def _rows_of(self, measure: Measure, by_point: Sequence[ComplexArray], samples: int) -> ComplexArray:
-        """Return rows of every order, shape (orders, k, d), from load coefficients at every operating point."""
+        """Return load rows of every order, shape (orders, k, d), from the coefficients at every operating point."""
         steps, times = [round(order / self.base) for order in self.times], np.array([float(t) for t in self.times])
         angles = math.tau / float(self.base) * np.arange(samples) / samples
         waves, blocks = np.exp(1j * np.outer(times, angles)), []
@@ -338,7 +343,7 @@ class ThrowWaves:
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((len(steps), 1, 1), complex)
 
     def throw_bounds(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return bounds of the throws [rad] in a box of open angles, with the turn by bank angle and split pin."""
+        """Return bounds of the throws [rad] in a box of open angles, turned by bank angle and split pin too."""
         ends = self._turns * lower[self.throws :].sum(), self._turns * upper[self.throws :].sum()
         return lower[: self.throws] + min(ends), upper[: self.throws] + max(ends)
 

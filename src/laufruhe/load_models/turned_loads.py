@@ -46,7 +46,7 @@ class OrderSelection:
     Attributes
     ----------
     rows
-        Components to which the rule applies, with those of all places in one row.
+        Components to which the rule applies, among the components of all places one after another.
     left_out
         Largest share of the root mean square of these components in the omitted orders together.
     gain
@@ -66,6 +66,8 @@ def turned_loads(
 
     Parameters
     ----------
+    point
+        Index of the operating point.
     signal
         Function from the loads of an engine to the spectrum of interest, shape (n, places, d).
     selections
@@ -73,7 +75,7 @@ def turned_loads(
     keep_places
         Whether idle cylinders keep their places, because the load has places at every cylinder.
     angles
-        Angles s and b of every cylinder [rad].
+        Angles s and b of every cylinder [rad], as in the formula of the module.
     banks_are_open
         Whether loads follow the bank angles b.
     unbalance

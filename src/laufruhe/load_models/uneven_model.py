@@ -71,7 +71,7 @@ class UnevenModel:
     Parameters
     ----------
     problem
-        Problem of the star from which a program starts, with its firing order.
+        Problem with the crank star and firing order from which a program starts.
     rotor_throws
         Index of the throw that each rotor turns with; rotors that turn with none are left out.
     symbols
@@ -97,7 +97,7 @@ class UnevenModel:
             self._angles.append((symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns, bank))
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
-        """Return the rows of a measure, shape (k, d), and their grid (P1).
+        """Return the load rows of a measure, shape (k, d), and their grid (P1).
 
         Rows are coefficients of orders for a root mean square (Parseval), and values at samples for other norms.
         """
@@ -184,7 +184,7 @@ class UnevenModel:
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
     def wrench(self, point: OperatingPoint, gain: Callable[[float], float] | None = None) -> SymbolicSpectrum:
-        """Return the wrench at an operating point; `gain` weights the orders of the roll moment for their selection."""
+        """Return the wrench at an operating point; `gain` weights the orders of the roll moment in their selection."""
         if gain is None and point in self._wrenches:
             return self._wrenches[point]
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
@@ -221,7 +221,7 @@ class UnevenModel:
 
 
 def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
-    """Return the index of the throw that each rotor turns with, by a trial move of one throw at a time."""
+    """Return the index of the throw that each rotor turns with, by its name, from trial moves of single throws."""
     count = len(candidate.throws)
     throws = tuple(math.tau * k / count for k in range(count))
     return dict(_rotor_throws_of(phasing, replace(candidate, throws=throws, firing_order=None, without_gas=True)))

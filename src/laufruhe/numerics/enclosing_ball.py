@@ -29,7 +29,7 @@ class EnclosingBalls:
     support
         Indices of the support points of each ball, shape (sets, d + 1); fewer than d + 1 points are repeated.
     shares
-        Weights with which the support points make the centre, shape (sets, d + 1); not negative, with sum one.
+        Weights of the support points whose mean is the centre, shape (sets, d + 1); not negative, with sum one.
     """
 
     radii: Array
@@ -76,7 +76,7 @@ def _squares(points: Array, centres: Array) -> Array:
 
 
 def _ball_of_candidates(points: Array) -> tuple[Indices, Array, Array, Array]:
-    """Return support indices, radii, centres and shares of the balls of d + 2 points, shape (sets, d + 2, d).
+    """Return support indices, radii, centres and weights of the balls of d + 2 points, shape (sets, d + 2, d).
 
     The last point lies outside the ball of the others, so it is a support point. Among the circumcentres of all subsets
     with it, the centre is the one whose farthest point is nearest.

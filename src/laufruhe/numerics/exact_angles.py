@@ -83,7 +83,7 @@ def _first_octant(turn: Fraction) -> tuple[float, float]:
 
 @lru_cache(maxsize=256)
 def _roots(denominator: int) -> NDArray[np.complex128]:
-    # `cis` of every fraction, in eighths of 1 / denominator
+    # `cis` of the turns 0, 1 / denominator, 2 / denominator ...
     eighths, remainder = np.divmod(8 * np.arange(denominator), denominator)
     small = np.where(eighths % 2 == 1, denominator - remainder, remainder)
     angles = (math.tau * (small / (8.0 * denominator))).tolist()
@@ -116,16 +116,16 @@ def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.c
 def star_sum(
     weights: NDArray[np.float64], turns: Sequence[Turn], multiples: NDArray[np.int64]
 ) -> NDArray[np.complex128]:
-    """Return the sums over a star sum_k w_k e^{2 pi i m t_k}, shape (multiples, c), with exact zeros.
+    """Return the sums over a crank star sum_k w_k e^{2 pi i m t_k}, shape (multiples, c), with exact zeros.
 
-    The n members have weights in c components, shape (n, c), and angles in turns. Real and imaginary parts below the
-    rounding error of their sum, (n + 2) eps sum |w|, are zero.
+    m are multiples of the base order. The n members k of the star have weights w in c components, shape (n, c), and
+    angles t in turns. Real and imaginary parts below the rounding error of their sum, (n + 2) eps sum |w|, are zero.
     """
     return _star_sum(phasors(turns, multiples), weights)
 
 
 def star_orders(weights: NDArray[np.float64], turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
-    """Return `star_sum` for the multiples 0 ... count - 1, shape (count, c), with cached phasors."""
+    """Return the sums of `star_sum` for the multiples 0 ... count - 1, shape (count, c), with cached phasors."""
     return _star_sum(_waves(turns, count), weights)
 
 
@@ -141,7 +141,7 @@ def _star_sum(waves: NDArray[np.complex128], weights: NDArray[np.float64]) -> ND
 
 
 def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) -> NDArray[np.complex128]:
-    """Return the sum of the values (n, c) with equal index, shape (largest index + 1, c).
+    """Return the sums of those values, shape (n, c), that have equal indices, shape (largest index + 1, c).
 
     Sums below their rounding error are zero.
     """

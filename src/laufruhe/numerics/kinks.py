@@ -63,7 +63,7 @@ class SignalKinks:
         return np.concatenate([self.angles[slopes & ~steps], breaks - SAME_ANGLE, breaks + SAME_ANGLE])
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
-        """Return the closed form of all kinks, or one of its derivatives, at angles [rad], shape (angles, ...)."""
+        """Return the sum of the closed forms of all kinks, or a derivative of it, at angles [rad], shape (angles, ...)."""
         k = len(self.jumps)
         weights = self.pieces(period, derivative)
         weights = weights.reshape(*weights.shape[:2], -1)
@@ -79,7 +79,10 @@ class SignalKinks:
         return values.reshape(len(angles), *self.jumps.shape[2:])
 
     def pieces(self, period: float, derivative: int = 0) -> Array:
-        """Return the polynomial coefficients after each kink, in powers of phi / P - 1/2, shape (powers, k, ...)."""
+        """Return coefficients of the polynomial after each kink in powers of phi / P - 1/2, shape (powers, k, ...).
+
+        phi is the angle from the kink, and P the period; the polynomials sum up to the closed form or its derivative.
+        """
         k, degrees = self.jumps.shape[:2]
         powers = [m - derivative for m in range(degrees)]
         table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
@@ -87,7 +90,11 @@ class SignalKinks:
         return np.asarray(factors.reshape(-1, k, *self.jumps.shape[2:]))
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
-        """Return the coefficients of orders 0, b, ... (count - 1) b, shape (count, ...); zero at order 0."""
+        """Return the coefficients of the closed form in orders 0, b, ... (count - 1) b, shape (count, ...); zero at
+        order 0.
+
+        b is the base order `base`.
+        """
         k, degrees = self.jumps.shape[:2]
         flat, orders = self.jumps.reshape(k, degrees, -1), np.arange(count) * base
         waves = np.exp(-1j * np.outer(orders, self.angles))
@@ -100,7 +107,7 @@ class SignalKinks:
         return np.where(np.abs(total) > _CANCELLED * size, total, 0.0).reshape(count, *self.jumps.shape[2:])
 
     def beyond(self, count: int, base: float) -> tuple[Array, Array]:
-        """Return upper bounds for all orders from `count` x base on, shape (...) each.
+        """Return upper bounds of the orders from `count` x base on in the closed form, shape (...) each.
 
         The first bounds the maximum of their sum over the period, the second its root mean square.
         """
@@ -113,7 +120,7 @@ class SignalKinks:
         return total, power
 
     def beyond_averaged(self, count: int, base: float, steps: float) -> Array:
-        """Return an upper bound for the orders from `count` x base on after averaging at `steps` samples (P7)."""
+        """Return an upper bound of the orders from `count` x base on, averaged at `steps` samples of a period (P7)."""
         total, last = np.zeros(self.jumps.shape[2:]), max(count - 1, 0.5)
         for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0)):
             # the factor sinc^2 of order j is at most (steps / (pi j))^2
@@ -126,7 +133,7 @@ class SignalKinks:
         return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 
     def mapped(self, linear: Callable[[Array], Array]) -> SignalKinks | None:
-        """Return the kinks after a real linear map of values (n, ...), or None if all vanish."""
+        """Return the kinks after a real linear map of values, shape (n, ...); None if no kink remains."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
         return _left(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
@@ -138,7 +145,7 @@ class SignalKinks:
 
     @property
     def derivative(self) -> SignalKinks | None:
-        """Kinks of the derivative of a continuous signal; None without any."""
+        """Kinks of the derivative of a continuous signal; None if it has no kinks."""
         return _left(self.angles, self.jumps[:, 1:])
 
     def folded(self, period: float, times: int) -> SignalKinks | None:
@@ -154,7 +161,7 @@ class SignalKinks:
 
 
 def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
-    """Return the kinks of a sum of signals."""
+    """Return the kinks of a sum of signals from the kinks of each; None if it has no kinks."""
     present = [kinks for kinks in parts if kinks is not None]
     if len(present) < 2:
         return present[0] if present else None
@@ -169,7 +176,7 @@ def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
 
 
 def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
-    """Merge kinks at equal angles; None if nothing is left."""
+    """Return kinks with one at each angle, the sum of those there; None if all jumps are zero."""
     _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
     np.add.at(total, inverse, jumps)

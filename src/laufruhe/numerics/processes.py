@@ -72,7 +72,7 @@ def run_concurrently(work: Callable[[], T], pays: bool = True) -> Iterator[Calla
     work
         Function without arguments; its result must be picklable.
     pays
-        True if the work takes longer than a fork, some milliseconds.
+        True if the work takes longer than a fork, which takes some milliseconds.
     """
     # the listener thread of a worker holds no lock that a copy needs
     if not (pays and processors() > 1 and hasattr(os, "fork") and (_SERVES or ForkedWorker.is_possible())):

@@ -70,7 +70,7 @@ def search_scope(what: str) -> Iterator[None]:
 def report_progress(
     what: str, done: int = 0, whole: int = 0, value: float = math.inf, bound: float = -math.inf
 ) -> None:
-    """Send a report to the listener, if there is one; parameters as in `Step`."""
+    """Send a report to the listener, if there is one; the parameters are attributes of `Step`."""
     listener = _listener.get()
     if listener is not None:
         listener(Step(_within.get(), what, done, whole, value, bound))

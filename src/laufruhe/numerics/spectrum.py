@@ -1,4 +1,4 @@
-"""Periodic signals by their complex coefficients per order (C8)."""
+"""Periodic signals, represented by a complex coefficient for each order (C8)."""
 
 from __future__ import annotations
 
@@ -205,7 +205,7 @@ class Spectrum:
         return gcd(*nonzero.nonzero()[0].tolist())
 
     def repeat_order(self, also: tuple[Fraction, ...] = ()) -> Fraction:
-        """Return the base order of the shortest period of the signal and of further orders `also`."""
+        """Return the base order of the shortest period in which the signal and the orders `also` repeat."""
         orders, step = [order for order in also if order > 0], self.step
         if step:
             orders.append(self.base * step)
@@ -322,7 +322,7 @@ def common_base(orders: Sequence[Fraction]) -> Fraction:
 
 
 def stacked_coefficients(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
-    """Return the common base order of spectra and `bases`, and all coefficients in it, shape (spectra, n, ...)."""
+    """Return the common base order of spectra and `bases`, and the coefficients with it, shape (spectra, n, ...)."""
     base = common_base([*bases, *(spectrum.base for spectrum in spectra)])
     series = [spectrum.with_finer_base(base).coefficients for spectrum in spectra]
     count = max(map(len, series))
@@ -362,7 +362,7 @@ def spectrum_with_kinks(
     breaks
         Angles where a derivative may jump, shape (k,) [rad].
     maximum
-        Largest number of kinks in closed form: the strongest ones.
+        Largest number of kinks in closed form; the strongest ones are kept.
     """
     period = math.tau / float(base)
     angles = period * np.arange(samples) / samples
@@ -380,7 +380,10 @@ def spectrum_with_kinks(
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Return the largest magnitude of vectors c, shape (..., components), on their ellipses Re c e^{i h phi} (M5)."""
+    """Return the largest length of the vector Re c e^{i h phi} over the angle phi (M5).
+
+    c are complex coefficients, shape (..., components) to (...).
+    """
     total = np.sum(np.abs(coefficient) ** 2, axis=-1)
     # an undamped resonance has infinite coefficients and an infinite amplitude
     finite = np.where(np.isfinite(total)[..., None], coefficient, 0.0)

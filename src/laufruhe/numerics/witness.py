@@ -28,9 +28,9 @@ def is_over(bound: float, value: float, zero_level: float = 0.0) -> bool:
 
 
 def check_bound(what: str, bound: float, value: float, zero_level: float = 0.0) -> bool:
-    """Return True if a lower bound does not exceed the value of a known design; else report that `what` contradicts it.
+    """Return True if a lower bound does not exceed the value of a known design; else report a contradiction.
 
-    An absolute difference up to `zero_level` counts as zero.
+    `what` names the bound in the report. An absolute difference up to `zero_level` counts as zero.
     """
     if not is_over(bound, value, zero_level):
         return True

@@ -1,7 +1,7 @@
 """Concurrent maps over pieces of work, on processes of this machine, a cluster, or any other executor.
 
-All concurrent work uses this module: points of studies, problems of a trade, boxes, stars, starts. The executor changes
-the time of a search, never its result.
+All concurrent work uses this module: points of studies, problems of a comparison of fidelities, boxes, crank stars and
+start points. The executor changes the time of a search, never its result.
 
 `Speculation` computes likely next steps of a search ahead of time. The main process alone decides which step follows
 and takes a result that is ready, so results, their order and proofs are the same to the last bit.
@@ -59,11 +59,11 @@ SERIAL = SerialExecutor()
 
 
 class TimeIsOver(SolverError):
-    """End of the time limit before all pieces were done."""
+    """End of the time limit before all pieces of work were done."""
 
 
 class WorkersGone(SolverError):
-    """Loss of all workers, or of each worker that worked on a certain piece."""
+    """Loss of all workers, or of every worker that had tried one piece of work."""
 
 
 @contextmanager
@@ -130,16 +130,16 @@ def worker_count(executor: Executor | None = None) -> int:
 def unordered_map(
     work: Callable[[T], A], pieces: Iterable[T], executor: Executor, patient: bool = False
 ) -> Generator[tuple[int, A], None, None]:
-    """Yield (index, result) of each piece in the order of completion; raise the error of the first that fails.
+    """Yield (index, result) of each piece of work in the order of completion; raise the error of the first failure.
 
     A piece that is lost with its worker is submitted again.
 
     Parameters
     ----------
     work
-        Function of one piece, picklable.
+        Picklable function of one piece of work.
     pieces
-        Arguments, taken as workers become free.
+        Arguments of the calls, taken as workers become free.
     patient
         True to wait at the time limit (`laufruhe.numerics.budget`) for running pieces and to drop the others.
 

@@ -167,7 +167,7 @@ class Multipliers:
 
 @dataclass(frozen=True, eq=False)
 class Minorant:
-    """Affine lower bound constant + gradient . x of the objective at a feasible decision vector x, and its dual rows."""
+    """Affine lower bound constant + gradient . x of the objective at feasible decision vectors x, by its dual rows."""
 
     constant: float
     gradient: Array

@@ -60,12 +60,12 @@ class Maximum(Norm):
         return np.asarray(lengths.max(axis=-1))
 
     def cones(self, grid: Grid) -> Cones:
-        """Return a single head over all rows."""
+        """Return cones for all rows with one common head."""
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Add an epigraph variable to the nonlinear program and return it; no softened row exceeds it (E22)."""
+        """Return an epigraph variable of the program that no softened row length exceeds (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)

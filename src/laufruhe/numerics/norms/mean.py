@@ -88,7 +88,7 @@ class Mean(Norm):
         return grid.weights / size, 0.5 * float(grid.weights @ size)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return one cone with a head of its own for each row."""
+        """Return one cone for each row, with a head of its own."""
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
@@ -99,7 +99,7 @@ class Mean(Norm):
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Return the root mean square of each place, averaged over places and points."""
+        """Return the root mean square at each place, averaged over places and operating points."""
         squares = np.array([mean_square(signal) for signal in signals])
         return float(shares @ np.sqrt(squares).mean(axis=1))
 

@@ -25,7 +25,7 @@ _SMALLEST, _LARGEST = 1e-140, 1e150
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Weights and grouping of the rows of signals.
+    """Weights and grouping of the rows of signals; a row is a signal's vector at one sampled angle and place.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Grid:
 
 
 LONGEST_TOL, ZERO_TOL, DUAL_TOL = 1e-5, 1e-6, 1e-4
-"""Relative tolerances: rows as long as the longest; rows that count as zero; dual rows that are in use."""
+"""Relative tolerances: for rows as long as the longest, for rows that count as zero, and for dual rows in use."""
 MAX_KINKS = 64
 """Largest number of dual rows of which mixtures are formed."""
 
@@ -74,7 +74,7 @@ class Subdifferential:
 
 
 def hull(subgradients: Sequence[Array]) -> Subdifferential | None:
-    """Return the convex combinations of subgradients; None without any, or of more than `MAX_KINKS`."""
+    """Return all convex combinations of subgradients; None if there are none, or more than `MAX_KINKS`."""
     if not 0 < len(subgradients) <= MAX_KINKS:
         return None
     return Subdifferential(subgradients[0], others=tuple(subgradients[1:]))
@@ -82,9 +82,9 @@ def hull(subgradients: Sequence[Array]) -> Subdifferential | None:
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """Norm as a second-order cone program: the minimum of value . t over epigraph variables t ("heads") (P1).
+    """Norm as a second-order cone program: the minimum of value . t over epigraph variables t, called heads (P1).
 
-    Cone c requires t[head[c]] >= |factors * rows of cone c|.
+    Cone c requires that its head t[head[c]] is at least the length of its load rows, each times its factor.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class Norm(ABC):
     name
         Name in problem files and reports.
     refinement
-        Factor on the number of samples when the value of a result is computed (M6).
+        Factor on the number of samples for the value in a result (M6).
     averages
         True if the norm of rows averaged about their angles is a lower bound of the norm over the cycle (P7).
     is_euclidean
@@ -205,14 +205,14 @@ class Norm(ABC):
     def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
         """Return the second derivative of the norm across the direction of each row, shape (k,) (P10).
 
-        None if the norm is not a sum over rows.
+        The result is None if the norm is not a sum over rows.
         """
         return None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return the dual norm of Z, shape (k, d): the smallest t with <Z, V> <= t norm(V) for every V (P3).
 
-        Infinite if no such t exists.
+        It is infinite if no such t exists.
         """
         raise self._unclaimed("dual norm")
 
@@ -224,7 +224,7 @@ class Norm(ABC):
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential | None:
         """Return all subgradients at rows V, shape (k, d), starting from dual rows Z of a solver (P19).
 
-        None if they are unknown or too many.
+        The result is None if they are unknown or too many.
         """
         return None
 
@@ -256,16 +256,17 @@ class Norm(ABC):
         return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Return the norm of each design from its row lengths, shape (..., k) to (...); overwrites the lengths.
+        """Return the norm of each design from its row lengths, shape (..., k) to (...).
 
-        `weights` has shape (k,).
+        `weights` are those of the rows, shape (k,). The lengths are overwritten.
         """
         raise TypeError(f"{self.name} is not known from lengths alone")
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float] | None:
-        """Return a quadratic upper bound of the norm that is exact at these row lengths, shape (k,); None without (R6).
+        """Return a quadratic upper bound of the norm that is exact at given row lengths, shape (k,) (R6).
 
-        It has coefficients a, shape (k,), and a constant c with norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V.
+        It has coefficients a, shape (k,), and a constant c with norm(V) <= c + sum_k a_k |v_k|^2 / 2 for every V. The
+        result is None if the norm has no such bound.
         """
         return None
 
@@ -283,7 +284,8 @@ class Norm(ABC):
         rows
             CasADi matrix, shape (k, d).
         unit, share
-            The expression differs from the norm by at most share x unit.
+            Size of the norm in its unit, and relative softness: the expression differs from the norm by at most
+            share x unit.
         """
         raise self._unclaimed("smooth form")
 
@@ -393,7 +395,7 @@ def jumped(signal: Spectrum) -> Array:
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:
-    """Return row lengths at `steps` samples for each of `times` shifted starts, and the fine step [rad].
+    """Return the lengths of a signal at `steps` samples for each of `times` shifted starts, and the fine step [rad].
 
     The lengths have the shape (steps, times, places).
     """

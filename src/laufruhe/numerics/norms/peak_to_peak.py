@@ -33,7 +33,7 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
 from laufruhe.numerics.spectrum import Spectrum
 
 SAME_WAY = 1e-3
-"""Relative tolerance within which directions to support points count as equal."""
+"""Tolerance within which unit vectors to support points count as equal."""
 
 
 class PeakToPeak(Norm):
@@ -102,7 +102,7 @@ class PeakToPeak(Norm):
         return np.asarray(blocks - blocks.mean(axis=1, keepdims=True)).reshape(z.shape)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return one head for all rows, with a free centre for each signal."""
+        """Return cones for all rows with one common head, and a free centre for each signal."""
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 

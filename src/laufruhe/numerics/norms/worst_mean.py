@@ -72,7 +72,7 @@ class WorstMean(Norm):
         return np.where(small[:, None], z, directions)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return one head for each row, and one that exceeds the mean of every operating point."""
+        """Return one cone and head for each row, and one head that is at least the mean of every operating point."""
         count, size = len(grid.weights), _size(grid)
         point = np.arange(count) // size
         value = np.zeros(count + 1)

@@ -1,1 +1,1 @@
-"""Lower bounds over boxes of leads, sizes, flywheels and crankshafts."""
+"""Lower bounds over boxes of lead angles, sizes of the running gear, flywheels and crankshafts."""

@@ -1,10 +1,11 @@
-"""Lower bounds of the degree of irregularity over boxes of leads (P14).
+"""Lower bounds of the degree of irregularity delta over boxes of lead angles (P14).
 
-At two angles a and b the squares u = w^2 of the speed differ by twice (E + W_a) / m_a - (E + W_b) / m_b, with E the
-energy at the start (F2-F4). Work and inertia on a shaft change by no more than a lead times the largest torque and
-slope of the inertia. E falls with W and rises with m, so the same equation with changed W and m bounds it:
+At two crank angles a and b the squares u = w^2 of the speed differ by twice (E + W_a) / m_a - (E + W_b) / m_b. E is the
+energy at the start, W the work of the torque, and m the inertia (F2-F4). A change of a lead changes work and inertia on
+its shaft by at most this change times the largest torque, and times the largest slope of the inertia. E falls with W
+and rises with m, so the equation of E with changed W and m bounds it. With the mean speed w_0,
 
-    delta >= (u_a - u_b) / (w_a + w_b) / w_0,   numerator from below, denominator from above.
+    delta >= (u_a - u_b) / (w_a + w_b) / w_0,   with a lower bound of the numerator and upper bounds of w_a and w_b.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from laufruhe.problem.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Work and inertia on one shaft, or of the fixed parts, and upper bounds of their slopes by the angle."""
+    """Work and inertia on one shaft, or of the fixed parts, with upper bounds of their slopes (`torque`, `slope`)."""
 
     work: Spectrum
     inertia: Spectrum
@@ -63,7 +64,7 @@ class LeadSwing:
                 self._points.append((point.speed, parts))
 
     def minimum_over(self, middle: Array, half: Array) -> float:
-        """Return a lower bound on a box [rad], the largest of all operating points."""
+        """Return a lower bound on a box of leads [rad], shape (leads,): the largest bound of any operating point."""
         return max(self._minimum_at_point(speed, parts, middle, half) for speed, parts in self._points)
 
     def _minimum_at_point(self, speed: float, parts: Sequence[_Part], middle: Array, half: Array) -> float:
@@ -102,7 +103,7 @@ def _earlier(signal: Spectrum, lead: float) -> Spectrum:
 
 
 def largest_torque(torque: Spectrum) -> float:
-    """Return an upper bound of |torque - mean torque| [N m]."""
+    """Return an upper bound of |torque - mean torque| over the cycle [N m]."""
     swing = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
     values = np.concatenate([swing.sample(steps), swing.values(swing.kink_angles)])

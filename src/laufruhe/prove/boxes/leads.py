@@ -1,15 +1,17 @@
-"""Lower bounds of the objective over boxes of phase leads (P13, P14).
+"""Lower bounds of the objective over boxes of lead angles of geared shafts (P13, P14).
 
-Dual rows Z of the loads V(c, x) at the middle c of a box with half widths r_s, and multipliers of the limits, give a
-function of leads and unbalances that is a lower bound of the objective. In the box the function differs from its value
-at c by a part linear in the leads, which is minimal at a corner, and by a remainder of second order:
+V(c, x) are the rows of the loads at the middle c of a box with half widths r_s, for unbalances x. Dual rows Z of these
+rows, and multipliers of the limits, give a function of leads and unbalances that is a lower bound of the objective. In
+the box the function differs from its value at c by a part linear in the leads, which is minimal at a corner, and by a
+remainder of second order:
 
     N(V(c + d, x)) >= <Z, V(c, x)> + sum_s d_s <Z, V_s'(c, x)> - sum_s r_s^2 K_s / 2,                (P13)
 
-K_s bounds the norm of the second derivative of the load of shaft s for every lead. Unbalances on a shaft of ratio n
-turn by n d_s. Their share of V lies on an arc, between its end points and the tangents there. d_s is sin(n d_s) / n
-up to |n^2 r_s^3| / 6. The minimum over unbalances is concave in this share, so minimal at one of these corners. For
-peaks the remainder counts the rows of Z alone: a kink of slope J at a distance a < r_s from an angle adds J (r_s - a).
+K_s bounds the norm of the second derivative of the load of shaft s for every lead. A change d_s of its lead turns the
+unbalances on a shaft of speed ratio n by n d_s. Their part of V lies on an arc, within the triangle of the end points
+of the arc and the crossing of the tangents there. d_s is sin(n d_s) / n up to |n^2 r_s^3| / 6. The minimum over
+unbalances is concave in this part of V, so it is least at a corner of the triangle. For peaks the remainder counts the
+nonzero rows of Z alone: a kink with a jump of slope J at a distance a < r_s from the angle of a row adds J (r_s - a).
 """
 
 from __future__ import annotations
@@ -32,23 +34,23 @@ from laufruhe.prove.boxes.lead_swing import LeadSwing
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 
 WIDE = 1.2
-"""Half an arc [rad] beyond which unbalances on it have no bound."""
+"""Half an arc [rad] beyond which the unbalances on the arc have no bound."""
 SLACK = 1e-6
 """Relative violation of a limit that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
 class LeadBound:
-    """Bound of a box, infinite if no design is feasible.
+    """Lower bound of the objective on a box of leads; infinite if no design in the box is feasible.
 
     Attributes
     ----------
     at_middle
         Lower bound at the middle of the box.
     pull
-        Loss of the bound by each side, shape (leads,).
+        Branching scores: loss of the bound by the width of each side, shape (leads,).
     broken
-        Names of limits on the degree of irregularity that all designs of the box violate.
+        Names of the limits on degrees of irregularity that all designs in the box violate.
     """
 
     value: float
@@ -59,16 +61,16 @@ class LeadBound:
 
 @dataclass(frozen=True, eq=False)
 class _SecondDerivative:
-    """Bounds of the second derivative of a measure by the lead of a shaft.
+    """Upper bounds of the second derivative of a measured load by the lead of a shaft.
 
     Attributes
     ----------
     norm
-        Upper bound of its norm.
+        Upper bound of the norm of the second derivative.
     maximum
-        Upper bound of its length between kinks, by signal, shape (signals,).
+        Largest length of the second derivative between kinks, for each signal, shape (signals,).
     kinks
-        Angles of kinks at the start leads, and jumps of slope and value there, by signal.
+        For each signal: angles of the kinks at the initial leads, and jumps of slope and value there.
     """
 
     norm: float
@@ -77,7 +79,7 @@ class _SecondDerivative:
 
 
 class LeadBoxes:
-    """Bounds of boxes of leads, for a model with open leads and perhaps open unbalances."""
+    """Lower bounds on boxes of leads, for a model with open leads and perhaps open unbalances."""
 
     def __init__(self, model: PhaseLeadModel) -> None:
         self.model = model
@@ -92,11 +94,14 @@ class LeadBoxes:
         self._swings = {measure: LeadSwing(problem, model, measure) for measure in swinging}
 
     def numbers(self, leads: Array) -> list[float]:
-        """Return every degree of irregularity of the problem at some leads."""
+        """Return every degree of irregularity that the problem measures at given leads [rad], shape (leads,)."""
         return [swing.minimum_over(leads, np.zeros_like(leads)) for swing in self._swings.values()]
 
     def degrees(self, middle: Array, half: Array) -> tuple[float, dict[str, float]]:
-        """Return a lower bound of the degrees of irregularity in the objective, and of violations of their limits."""
+        """Return a lower bound of the weighted degrees of irregularity, and their violated limits, on a box of leads.
+
+        The second result has a lower bound of the relative violation by the name of each limit that is violated.
+        """
         problem = self.model.problem
         degrees = {measure: swing.minimum_over(middle, half) for measure, swing in self._swings.items()}
         total = sum(term.weight * degrees[term.measure] for term in problem.objective if term.measure in degrees)
@@ -107,16 +112,16 @@ class LeadBoxes:
         self, middle: Array, half: Array, program: AffineProblem, norms: Sequence[PhaseLeadNorm],
         multipliers: Multipliers,
     ) -> LeadBound:  # fmt: skip
-        """Return the bound of a box by multipliers of the program at its middle, on any grid.
+        """Return the bound of a box by dual rows of the affine program at its middle, on any grid.
 
-        Multipliers of a program without terms prove that no design in the box is feasible, or prove nothing.
+        Dual rows of a program without terms prove that no design in the box is feasible, or prove nothing.
 
         Parameters
         ----------
         middle, half
             Middle and half widths of the box [rad], shape (leads,).
         norms
-            Norms of the program with their slopes by the leads, terms before limits.
+            Norms of the program with their derivatives by the leads, terms before limits.
         """
         degree, broken = self.degrees(middle, half)
         degree_at_middle, broken_at_middle = self.degrees(middle, 0.0 * half)
@@ -124,7 +129,7 @@ class LeadBoxes:
         rows = [*(w * z for (w, _), z in zip(program.terms, affine.multipliers.terms, strict=True)),
                 *affine.multipliers.limits]  # fmt: skip
         slopes, remainders = np.zeros(len(middle)), np.zeros(len(middle))
-        # by shaft, pairing of the dual rows with slopes and curvatures of the unbalances
+        # by shaft: dual rows times the slopes by unbalances, and times the lead derivatives of these slopes
         tilts = np.zeros((2, len(middle), len(affine.gradient)))
         measures = [*(self._terms if program.terms else ()), *self._limits]
         for measure, lead_norm, z in zip(measures, norms, rows, strict=True):
@@ -191,17 +196,18 @@ def minimum_on_arcs(
 ) -> float:
     """Return a lower bound of a function of leads and unbalances in a box of leads (P13).
 
-    It is d . slopes + x . (gradient + sum_s ((cos(n_s d_s) - 1) tilts[0, s] + sin(n_s d_s) / n_s tilts[1, s]))
-    with leads |d_s| <= half_s [rad] and unbalances x of the domains; n_s are the ratios of the shafts.
+    d . slopes + x . (gradient + sum_s ((cos(n_s d_s) - 1) tilts[0, s] + sin(n_s d_s) / n_s tilts[1, s]))
+    is the function, with changes of the leads |d_s| <= half_s [rad], unbalances x in the domains, and speed ratios n_s.
 
     Parameters
     ----------
     domains
         Sets of the unbalances.
     ratios, half, slopes
-        Shape (shafts,).
+        Speed ratio, half width of the box, and slope by the lead of every shaft, shape (shafts,).
     gradient, tilts
-        Shapes (columns,) and (2, shafts, columns).
+        Gradient by the unbalances at the middle, shape (columns,). Part of it from each shaft, and derivative of this
+        part by the lead, shape (2, shafts, columns).
     """
     if not domains:
         return -float(np.abs(slopes) @ half)

@@ -1,8 +1,8 @@
 """Minimum of a weighted sum of functions that are monotone in each open number, under limits on such functions (T9).
 
 On a box such a function is minimal at one corner. A box is dropped if its minimum is not below the objective of the
-incumbent, or if a limit is violated everywhere in it. Slices at the sides of other boxes are cut off by the same rule,
-and the boxes are halved. The minimum over the remaining boxes is a lower bound of the objective.
+incumbent, or if a limit is violated everywhere in it. Slices at the sides of a remaining box are cut off by the same
+rule, and the box is halved. The minimum over the remaining boxes is a lower bound of the objective.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Monotone:
         return np.where(self.signs > 0.0, lower, upper)
 
     def minimum_over(self, lower: Array, upper: Array) -> float:
-        """Return the minimum on a box."""
+        """Return the minimum of the function on a box."""
         return self.value(self.lowest_corner(lower, upper))
 
 
@@ -53,20 +53,20 @@ class MonotoneProblem:
     upper: Array
 
     def value(self, x: Array) -> float:
-        """Return the weighted sum."""
+        """Return the weighted sum of the terms at open numbers x, shape (n,)."""
         return sum(weight * term.value(x) for weight, term in self.terms)
 
     def minimum_over(self, lower: Array, upper: Array) -> float:
-        """Return a lower bound of the sum on a box."""
+        """Return a lower bound of the weighted sum on a box."""
         return sum(weight * term.minimum_over(lower, upper) for weight, term in self.terms)
 
     @property
     def is_monotone(self) -> bool:
-        """Return True if the sum is monotone in each number."""
+        """Return True if all terms rise and fall together in each open number, so that their sum is monotone."""
         return all(np.array_equal(term.signs, self.terms[0][1].signs) for _, term in self.terms)
 
     def with_cutoff(self, cutoff: float) -> MonotoneProblem:
-        """Return the problem with the cutoff as a limit on a monotone sum."""
+        """Return the problem with the objective limited to the cutoff, if it is monotone; else the problem itself."""
         if not self.terms or not self.is_monotone or not math.isfinite(cutoff):
             return self
         return replace(self, limits=(*self.limits, (cutoff, Monotone(self.value, self.terms[0][1].signs))))
@@ -118,7 +118,7 @@ def bisect_monotone(
 
 
 def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-    # cuts slices off the sides that violate a limit; None if nothing is left
+    # bounds of the box without slices at its sides that violate a limit; None if nothing is left
     if any(function.minimum_over(lower, upper) > maximum for maximum, function in problem.limits):
         return None
     lower, upper = lower.copy(), upper.copy()

@@ -1,14 +1,15 @@
-"""Lower bounds over leads of a crank that shares gas chambers with another crank (P15).
+"""Lower bounds over the lead angle of a crank that shares gas chambers with another crank (P15).
 
-The mixed cycle is one function p of the volume v over its displacement for every lead d; only v depends on d. With
-the travels x_1 of the fixed piston and x_2 of the leading one, both towards their cranks, X = x_1 + x_2,
+In the mixed cycle the pressure p is the same function of v, the volume over the displacement, for every lead d. Only v
+depends on d. x_1 and x_2 are the travels of the fixed and the leading piston, both towards their cranks, and
+X = x_1 + x_2. A is the piston area, p_c the crankcase pressure, and gamma the crank angle. The torque T is
 
     T = A (p - p_c) X'(gamma),       dT/dd = A p'(v) v_d X' + A (p - p_c) x_2'',
     v_d = (x_2' - x_2'(top) - v (x_2'(bottom) - x_2'(top))) / H,       H = X(bottom) - X(top),
 
-since a minimum over angles moves no more than the function itself. p jumps at dead centres alone, where X' = 0, so that
-T follows from its slope. The value at the middle of cells of d and gamma and the next derivative bound every factor.
-A norm then changes by no more than the norm of the changes of mass loads and torques.
+because the minimum of X over angles moves by no more than X itself. p jumps at dead centres alone, where X' = 0, so
+that the change of T follows from dT/dd. d and gamma are divided into cells. The value in the middle of a cell and the
+next derivative bound every factor. A norm then changes by at most the norm of the changes of mass loads and torques.
 """
 
 from __future__ import annotations
@@ -68,9 +69,10 @@ class _Travel:
 
 
 def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
-    """Return an upper bound of the change of torque of a shared chamber [N m], on cells from the dead centre of `part`.
+    """Return an upper bound of the torque change of a shared chamber [N m], on cells of a cycle, shape (cells,).
 
-    The crank of `part` is fixed, and the lead of the other piston changes by at most `half` [rad].
+    The cells start at the dead centre of `part`. The crank of `part` is fixed, and the lead of the other piston changes
+    by at most `half` [rad].
     """
     facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(facing, Facing)
@@ -115,7 +117,10 @@ def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycl
 def _pressed(
     gas: Seiliger, cycle: Cycle, low: Array, high: Array, strokes: Sequence[NDArray[np.bool_]]
 ) -> tuple[Array, Array]:
-    """Return upper bounds of the pressure difference at the pistons, and of its slope by volume, between volumes."""
+    """Return upper bounds of the pressure difference at the pistons [Pa], and of its slope by relative volume.
+
+    The relative volumes lie between `low` and `high`, shape (cells,). `strokes` are the masks of `_strokes`.
+    """
     small = 1.0 / (gas.compression_ratio - 1.0)
     n1, n2, cut = gas.compression_exponent, gas.expansion_exponent, small * seiliger_cut_off(gas, cycle)
     squeezed, later = (gas.intake_pressure * ((1.0 + small) / v) ** n1 for v in (low, high))
@@ -133,7 +138,7 @@ def _pressed(
 
 
 class SharedGasBoxes:
-    """Bounds of boxes of leads for cranks that share gas chambers."""
+    """Lower bounds on boxes of leads for cranks that share gas chambers."""
 
     what = "boxes of leads"
     batch_size = 1
@@ -154,7 +159,7 @@ class SharedGasBoxes:
         return list(dict.fromkeys(measure for measure in self.problem.measures if measure.is_load))
 
     def _fixed_pistons(self, engine: Engine) -> list[str]:
-        """Return the fixed piston of every shared chamber."""
+        """Return the name of the piston with the fixed crank in every shared chamber."""
         fixed = []
         for part in engine.slider_cranks:
             for other in engine.slider_cranks:
@@ -234,7 +239,7 @@ class SharedGasBoxes:
         return torques
 
     def _gas_change(self, measure: Measure, changes: Sequence[Array]) -> float:
-        """Return an upper bound of the change of a norm by changes of torque."""
+        """Return an upper bound of the change of a norm by torque changes, shape (cells,) at every operating point."""
         shares, gains, norm = measure.shares(self.problem.points), self._gains[measure], measure.norm
         squares = [float(np.mean(change**2)) for change in changes]
         if norm.refinement == 1:

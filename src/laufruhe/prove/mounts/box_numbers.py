@@ -50,7 +50,7 @@ def sag(model: BoxModel, x: Array) -> Array:
 
 
 def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> LinearBound:
-    """Return the tangent of the convex sag at the middle of boxes; zero if a mode is free at the softest corner (E9)."""
+    """Return the tangent of the convex sag at the middle of boxes; zero with a free mode at the softest corner (E9)."""
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
     stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
@@ -60,7 +60,7 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
 
 
 def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
-    """Return lower bounds of the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
+    """Return lower bounds of the convex torque-roll residual by tangents at the middle, shape (boxes,) (E19, E46)."""
     assert measure.channel.axis_residual is not None
     axis = measure.channel.axis_residual(model.mounting(model.lower).block, measure.frequency)
     bounds = np.zeros(len(lower))

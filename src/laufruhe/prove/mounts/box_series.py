@@ -60,7 +60,7 @@ class Sides:
         return np.where(same, np.swapaxes(self.columns, 0, 1) @ self.along(slopes), 0.0)
 
     def along(self, slopes: Any) -> Any:
-        """Return E, the slopes of maps along the directions, from those by each number, (..., n, r, d) to (..., r, m)."""
+        """Return E, slopes of maps along the directions, from those by each number, (..., n, r, d) to (..., r, m)."""
         return np.einsum("...mrd,dm->...rm", np.take(slopes, self.number_of_column, axis=-3), self.columns)
 
     def maps_by_number(self, turned: Any) -> list[Any]:
@@ -240,7 +240,7 @@ def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearRespon
 
 
 def norm_over(matrices: Any) -> Array:
-    """Return an upper bound of the largest singular value of matrices A, (trace (A* A)^k)^(1 / 2k), (..., r, m) to (...)."""
+    """Bound the largest singular value of matrices A by (trace (A* A)^k)^(1 / 2k), shape (..., r, m) to (...)."""
     squares = np.matmul(np.swapaxes(np.conj(matrices), -2, -1), matrices)
     size = np.trace(squares, axis1=-2, axis2=-1).real
     squares = squares / np.where(size > 0.0, size, 1.0)[..., None, None]

@@ -36,7 +36,7 @@ class ConvexFunction(Protocol):
         """Return the value at stiffnesses x, shape (n,)."""
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return constant and gradient of a linear lower bound: by a solver's dual array, or if None the tangent at x."""
+        """Return constant and gradient of a linear lower bound, by a solver's dual array or else the tangent at x."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +105,7 @@ class Eigenvalue:
         return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return the linear function sign <V, A(x)> with V from the dual matrix, or if None from the eigenvector at x."""
+        """Return the linear function sign <V, A(x)>, with V from the dual matrix or else from the eigenvector at x."""
         _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
         weights, columns = np.eye(6)[-1], vectors
         if dual is not None:
@@ -130,7 +130,7 @@ class Residual:
         return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return the linear function along the dual vector, or if None along the residual at x."""
+        """Return the linear function along the dual vector, or else along the residual at x."""
         z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
         y, mass = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
         constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)

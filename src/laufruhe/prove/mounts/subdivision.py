@@ -83,7 +83,7 @@ class SimulatedBoxes(Protocol):
         """Work of one box, in numbers."""
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None, /) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on those of `mask` alone."""
+        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on those in `mask` only."""
 
 
 class StiffnessBoxes:

@@ -1,1 +1,1 @@
-"""Lower bounds over crank stars and throws."""
+"""Lower bounds of the objective over crank stars and throw angles."""

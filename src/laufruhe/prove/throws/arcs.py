@@ -1,9 +1,10 @@
 """Bounds of sums of waves over arcs of throw angles (S27, S30).
 
-With given multipliers, objective and limits are no less than a constant and, for every throw by itself, a function
-Re sum_h c_h e^{i h theta} + s theta of its angle. Its minimum between two bounds is taken on a grid, less the most that
-it can fall between two angles. An open bank or split-pin angle is shared by all these functions: with it fixed they are
-of one throw each again, so the minimum of the sum is that over the shared angle of the sum of minima.
+With given multipliers, the objective with its limits has a lower bound: a constant plus, for every throw by itself, a
+function Re sum_h c_h e^{i h theta} + s theta of the throw angle theta. The minimum of this function between two bounds
+is taken on a grid, less its largest fall between two angles. All these functions share an open bank or split-pin angle.
+With the shared angle fixed, each depends on one throw only. The minimum of the sum is therefore the minimum over the
+shared angle of the sum of minima.
 """
 
 from __future__ import annotations
@@ -16,16 +17,16 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, ComplexArray
 
 GRIDS = (65, 33, 17)
-"""Angles of every throw and shared angle, by how many shared angles are open."""
+"""Number of grid angles of every throw and shared angle, for no, one and two shared angles."""
 
 
 class ArcBox:
-    """Box of throws and shared angles, with the waves e^{i (h theta + m . beta)} at its angles.
+    """Box of throw angles theta and shared angles beta, with the waves e^{i (h theta + m . beta)} on its grid.
 
     Parameters
     ----------
     orders
-        h and m of the waves whose phase counts, shape (waves, 1 + shared angles); of further waves only the size does.
+        Multiples h and m of the waves to evaluate, shape (waves, 1 + shared angles). Further waves count by size.
     lower, upper
         Bounds of every throw, then of every shared angle [rad].
     """
@@ -37,8 +38,8 @@ class ArcBox:
         self._shared = np.array(list(product(*self.angles[self.throws :]))).reshape(grid**shared, shared)
         self._by_throw = np.exp(1j * self.angles[: self.throws, :, None] * orders[:, 0])
         self._by_shared = np.exp(1j * self._shared @ orders[:, 1:].T)
-        # between angles a function leaves its chord by no more than the sum of a'' step^2 / 8 over them, and no wave
-        # by more than twice its size
+        # between two grid angles a function leaves its chord by at most the sum of a'' step^2 / 8 over the angles, and
+        # a wave by at most twice its size
         steps = np.square((upper - lower) / (grid - 1)) / 8.0
         curvatures = (
             np.square(orders[:, 0]) * steps[: self.throws, None] + np.square(orders[:, 1:]) @ steps[self.throws :]
@@ -46,23 +47,23 @@ class ArcBox:
         self._chord_errors = np.minimum(curvatures, 2.0)
 
     def functions(self, waves: ComplexArray, slopes: Array, shared: Array) -> Arcs:
-        """Evaluate a separable function on arcs: the windows of throw angles theta and shared angles beta.
+        """Return the minima of a function of throw angles theta and shared angles beta over the box.
 
-        It is the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
+        The function is the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, plus sigma . beta.
 
         Parameters
         ----------
         waves, slopes
-            c, shape (throws, waves), and s of every throw.
+            Coefficients c, shape (throws, waves), and slope s of every throw.
         shared
-            sigma of every shared angle.
+            Slope sigma of every shared angle.
         """
         count, size = self._chord_errors.shape[1], np.abs(waves)
         shifted = waves[:, None, :count] * self._by_shared
         values = np.matmul(shifted, self._by_throw.swapaxes(1, 2)).real
         values += slopes[:, None, None] * self.angles[: self.throws, None, :]
         bend = float((size[:, :count] * self._chord_errors).sum() + size[:, count:].sum())
-        # minimum over each throw by itself where shared angles are fixed, and what that leaves of the sum
+        # with the shared angles fixed: minimum over each throw by itself, and their sum
         minima = values.min(axis=2)
         total = minima.sum(axis=0) + self._shared @ shared
         throw_minima = (values + (total - minima)[:, :, None]).min(axis=1)
@@ -89,11 +90,11 @@ class Arcs:
 
     @property
     def minimum(self) -> float:
-        """Lower bound of the sum."""
+        """Lower bound of the sum over the box."""
         return float(self.values[0].min()) - self.bend
 
     def cut(self, margin: float) -> tuple[Array, Array] | None:
-        """Return bounds of the angles at which the sum may be less than `margin` above its minimum; None if nowhere."""
+        """Return bounds of the angles where the sum may be less than `margin` above `minimum`; None without any."""
         # between two angles of the grid both ends bound the sum
         is_open = np.minimum(self.values[:, :-1], self.values[:, 1:]) - self.bend - self.minimum < margin
         if not is_open.any(axis=1).all():

@@ -1,8 +1,9 @@
-"""Lower bound of all even stars: the orders of their firing, which every star has (S40).
+"""Lower bound of the objective over all crank stars that fire evenly, by the orders of their firing (S40).
 
-Alike cylinders that fire evenly load by the same function, each later by whole firing intervals. Averaged over shifts
-by that interval the loads of every such star are the same: orders that are no multiples of the firing's drop out, and
-with them all rotors of other orders. A norm that no shift changes is convex, so that of the average is no larger.
+Equal cylinders that fire evenly cause the same load, each later by whole firing intervals. The average of the loads
+over shifts by this interval is the same for every such star. Only multiples of the firing order remain in it, so that
+all rotors of other orders drop out. A norm is convex, and no shift changes it. The norm of the average is therefore at
+most that of the loads.
 """
 
 from __future__ import annotations
@@ -21,14 +22,14 @@ from laufruhe.problem.problem import Problem
 
 
 def firing_bound(problem: Problem, design: Evaluation) -> float:
-    """Return a lower bound of the objective over all even stars of this geometry, or zero where none is known [SI].
+    """Return a lower bound of the objective over all crank stars that fire evenly, or zero if none is known [SI].
 
-    The design is one of the stars, with any weights.
+    `design` is the evaluation of one of these stars, with any counterweights; all have its bank angle and split pin.
     """
     engine = design.engine
     if any(term.measure.is_load and term.measure.is_inside for term in problem.objective) or problem.fidelity.is_uneven:
         return 0.0
-    # shafts that are not built here may be elsewhere
+    # shafts that are not built in this design may be built in others
     if not _is_alike(engine) or not _is_alike(problem.engine) or gas_distinguishes_cylinders(problem):
         return 0.0
     total = 0.0

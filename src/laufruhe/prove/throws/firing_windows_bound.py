@@ -1,10 +1,11 @@
-"""Lower bounds of slightly uneven stars (S22, S24).
+"""Lower bounds of the objective over crank stars that fire slightly unevenly (S22, S24).
 
-As in S4 a direction v bounds the couples by sum_k x_k a_k, but a throw on step p may now stand anywhere in a window
-around it: as far as the intervals before and after it let its firing move. The minimum of x_k a_p over the window is
-a number for each throw and step. A sum of them bounds every star, and the smallest sum bounds all stars.
+As in S4, a direction v bounds the couples from below by sum_k x_k a_k. x_k is the position of throw k, and a_k the
+component of its rotating load along v. Here a throw on step p may stand anywhere in a window around the step, as far as
+the firing intervals before and after it allow. The minimum of x_k a_k over the window is a number for each throw and
+step. The sum of these numbers bounds a star, and the smallest sum bounds all stars.
 
-Gas has a mean torque that no throw changes, and a norm is never less than that of the mean over the cycle (S24).
+Gas has a mean torque that no throw changes. A norm is at least the norm of the mean load over the cycle (S24).
 """
 
 from __future__ import annotations
@@ -31,14 +32,14 @@ BATCH = 32
 def uneven_bound(
     phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals
 ) -> float:  # fmt: skip
-    """Return a lower bound over all stars of in-line cylinders with these firing intervals [SI].
+    """Return a lower bound of the objective over all in-line crank stars with bounded firing intervals [SI].
 
     It is zero, which is always valid, if there are more than `MAX_STARS` stars.
 
     Parameters
     ----------
     space, objective
-        The even stars, and norms of couples.
+        Crank stars that fire evenly, and objective as norms of couples.
     intervals
         Bounds of every firing interval [rad].
     """
@@ -53,7 +54,7 @@ def uneven_bound(
 
 
 def steady_bound(problem: Problem) -> float:
-    """Return the objective that the mean of the loads over the cycle leaves, on mounts as given (S24) [SI]."""
+    """Return a lower bound of the objective for any throws [SI]: that of the mean loads, on given mounts (S24)."""
     initial, total = evaluate(problem), 0.0
     for term in problem.objective:
         measure = term.measure
@@ -64,9 +65,10 @@ def steady_bound(problem: Problem) -> float:
 
 
 def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
-    """Return the minimum of `star_bounds` over stars, shape (stars, throws), and of the minimum over earlier stars.
+    """Return the minimum of `star_bounds` over stars, shape (stars, throws), or `incumbent` if that is less.
 
-    Directions are evaluated in batches. A star whose bound exceeds the minimum needs no further directions.
+    `costs` are those of `throw_costs`, and `incumbent` is the minimum over earlier stars. Directions are evaluated in
+    batches. A star whose bound exceeds the minimum needs no further directions.
     """
     bounds = np.full(len(stars), -math.inf)
     for first in range(0, len(costs), BATCH):
@@ -80,7 +82,7 @@ def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
 
 
 def star_bounds(costs: Array, stars: Stars) -> Array:
-    """Return the best bound of every star over all directions, shape (n,)."""
+    """Return the largest bound of every star over all directions, shape (n,), from the `costs` of `throw_costs`."""
     total = np.zeros((len(stars), len(costs)))
     for k in range(stars.shape[1]):
         total += costs[:, k, stars[:, k]].T
@@ -88,9 +90,9 @@ def star_bounds(costs: Array, stars: Stars) -> Array:
 
 
 def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
-    """Return the minimum of x_k a over the angle window of each step, shape (directions, throws, steps).
+    """Return the minimum of x_k a_k over the angle window of each step, shape (directions, throws, steps).
 
-    x_k is the position of throw k [m], and a the component of its rotating load along a dual direction.
+    x_k is the position of throw k [m], and a_k the component of its rotating load along a dual direction.
     """
     lower, upper = windows(phasing, intervals)
     v = dual_directions(objective)
@@ -100,7 +102,7 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
     for p in range(space.phases):
         angles = math.tau * p / space.phases + np.linspace(lower[p], upper[p], POINTS)
         values = (v.conj() @ np.exp(1j * np.outer(orders, angles))).real
-        # between two points a function bends away from its chord by at most a'' step^2 / 8
+        # between two points the component a bends away from its chord by at most a'' step^2 / 8
         step = (upper[p] - lower[p]) / (POINTS - 1)
         bend = (np.abs(v) @ orders**2) * step**2 / 8.0
         low, high = values.min(axis=1) - bend, values.max(axis=1) + bend
@@ -109,10 +111,10 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
 
 
 def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
-    """Return how far a throw of every step may stand from it, low and high [rad], cylinder 1 at its dead centre.
+    """Return the lowest and highest deviation of a throw from each step [rad], shape (steps,) each.
 
-    The s-th firing follows the first by s minimum to s maximum intervals, and precedes the next cycle by the others.
-    A throw fires later the less far ahead it stands.
+    Cylinder 1 stays at its dead centre. The s-th firing follows the first by s minimum to s maximum intervals, and the
+    other intervals remain until the next cycle. A throw that stands less far ahead fires later.
     """
     count, cycle, even = phasing.cylinders, phasing.cycle.angle, phasing.even_interval
     lattice = firing_lattice(phasing.cycle, count)

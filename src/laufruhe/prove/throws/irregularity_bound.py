@@ -1,11 +1,13 @@
-"""Lower bound of the degree of irregularity by the work that is stored at even speed (T11).
+"""Lower bound of the degree of irregularity delta by the work that is stored at constant speed (T11).
 
-With u = w^2 between its bounds u_1 < u_2 and m = J_0 + J, F2 is m u / 2 - W = E, a constant. By the work S that is
-stored at even speed (T2), tight where the inertia is large,
+w is the crank speed, w_0 its mean, and u = w^2 lies between u_1 and u_2. m = J_0 + J is the inertia of the crank and
+all moving parts, and W the work of the excess torque. F2 then says that m u / 2 - W is constant. With the stored work
+S, the peak to peak of W at constant speed (T2),
 
     u_2 - u_1 >= S / (m_max / 2 + (J_max - J_min) / 4),      delta >= (1 + (u_2 - u_1) / w_0^2)^(1/2) - 1,
 
-for m (u - u_mid) / 2 has a peak to peak of at most m_max (u_2 - u_1) / 2, and w_0^2 lies between u_1 and u_2.
+because m (u - u_mid) / 2, with u_mid halfway from u_1 to u_2, has a peak to peak of at most m_max (u_2 - u_1) / 2, and
+w_0^2 lies between u_1 and u_2. The bound is tight if the inertia is large.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.uneven_speed import moving_inertia
 
 SAMPLED = 1e-4
-"""Largest relative error by which a degree from samples is too small."""
+"""Largest relative error by which a degree of irregularity from samples is too small."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +31,7 @@ class IrregularityBound:
 
     Stored work is the peak to peak of the excess work of the loads at constant speed.
 
-    The energy is (m_max / 2 + (J_max - J_min) / 4) w_0^2, valid for cylinders at any phases [J].
+    `energy` is (m_max / 2 + (J_max - J_min) / 4) w_0^2 [J], and holds for any firing angles of the cylinders.
     """
 
     energy: float

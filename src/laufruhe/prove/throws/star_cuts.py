@@ -1,4 +1,4 @@
-"""Bounds of all stars from the dual rows of one (S14)."""
+"""Lower bounds of all crank stars from the dual rows of one star (S14)."""
 
 from __future__ import annotations
 
@@ -18,14 +18,15 @@ from laufruhe.prove.certificate import ROUNDING, Multipliers
 class Cut:
     """Lower bound of the objective of every star from the dual rows of one star (S14).
 
-    With throw k on step p_k it is c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x.
+    With throw k on step p_k it is c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x, with x
+    in the set of each decision.
 
     Attributes
     ----------
     constant, moves
-        c and A, shape (throws, steps).
+        Constant c, and its changes A by throw and step, shape (throws, steps).
     gradient, gradient_moves
-        g and G, shapes (n,) and (throws, steps, n); G is None if the gradient is the same for every star.
+        Gradient g, shape (n,), and its changes G, shape (throws, steps, n); None if all stars have one gradient.
     domains
         Sets of the decisions.
     rounding
@@ -40,19 +41,20 @@ class Cut:
     rounding: float
 
     def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
-        """Return lower bounds of stars with sets of shafts, shape (stars, sets), at least zero.
+        """Return lower bounds of stars with sets of built shafts, shape (stars, sets), at least zero.
 
         Parameters
         ----------
         stars
             Step of every throw, shape (stars, throws).
         sets, owners
-            Indices of the optional shafts that are built, for each set; that of every decision, -1 for none.
+            Indices of the optional shafts that are built, for each set; index of the optional shaft that carries each
+            decision, -1 if no optional shaft does.
         """
         return np.maximum(self._sums(stars, sets, owners), 0.0)
 
     def excludes(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Mask:
-        """Return True for infeasible stars, shape (stars, sets), by the dual rows of limits alone (S45)."""
+        """Return True for infeasible stars, shape (stars, sets), if the cut is from dual rows of limits alone (S45)."""
         return np.asarray(self._sums(stars, sets, owners) > self.rounding)
 
     def _sums(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
@@ -91,7 +93,7 @@ class Cut:
 
 
 def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
-    """Return the cut that dual rows of one star give, on the grid of the problem of all stars (S14)."""
+    """Return the cut by the dual rows of one star, on the grid of the problem `fine` of all stars (S14)."""
     throws, steps = fine.terms[0][1].moves.shape[:2]
     size = fine.terms[0][1].slope.shape[-1]
     constant, moves, scale = 0.0, np.zeros((throws, steps)), 0.0
