@@ -23,9 +23,9 @@ ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 25
 SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30, 40, 60, 80, 120))
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
 PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
-"""Fractions of the tolerance for all omitted physics, for the samples of the gas, and for the omission of one part."""
+"""Fractions of the tolerance: for all omitted physics, for the gas samples, and for the omission of one part."""
 TRIED = (1e-2, 1e-3, 1e-4)
-"""Tolerances at which a trade tries the automatic choice."""
+"""Tolerances at which a trade, the comparison of fidelities, tries the automatic choice."""
 TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
 """Names of variants of a trade that reports mention."""
 GAS_ORDERS = 12
@@ -36,7 +36,7 @@ TIME_ORDERS, TIME_SAMPLES = 12, 360
 
 @dataclass(frozen=True)
 class OmittedPart:
-    """Part of the physics that is not computed.
+    """Part of the physics that a fidelity leaves out.
 
     Attributes
     ----------
@@ -101,16 +101,16 @@ class Choice:
 
 
 def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
-    """Return the cheapest sufficient fidelity for an objective, by default at the design of the problem (F10).
+    """Return the cheapest fidelity whose relative error of the objective is within the tolerance (F10).
 
-    Its error bound is below the tolerance, if the reference is that exact. If the objective is zero, all parts that are
-    not zero are computed. An uneven crank speed stays uneven.
+    The error is bounded at one design, by default that of the problem; this needs a reference that is exact enough. If
+    the objective is zero, all parts of the physics that are not zero are computed. An uneven crank speed stays uneven.
     """
     return choose_from_scale(ErrorReference.of(problem, engine), tolerance)
 
 
 def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
-    """Choose the cheapest fidelity as `choose` does, from error bounds relative to a known reference."""
+    """Choose the cheapest fidelity as `choose` does; `scale` is the reference to which errors are relative."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
     estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
@@ -132,9 +132,9 @@ def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
     )
 
 
-def _cheapest(scale: ErrorReference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
-    """Return the cheapest sufficient fidelity; the allowed error is relative, and from all options together (F10)."""
-    problem, loss = scale.problem, scale.relative_loss
+def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
+    """Return the cheapest fidelity whose relative error from all options together is at most `allowed_error` (F10)."""
+    problem, loss = reference.problem, reference.relative_loss
     # at an uneven speed, gas and inertia affect all loads
     is_even = not fidelity.is_uneven
     fidelity = replace(fidelity, gas_samples=REFERENCE_SAMPLES)
@@ -148,16 +148,16 @@ def _cheapest(scale: ErrorReference, allowed_error: float, fidelity: Fidelity) -
         fidelity = replace(fidelity, gas_samples=None)
     if is_even:
         fidelity = _first(fidelity, "orders", (*ORDERS, None), lambda f: loss(f) <= PHYSICS_SHARE * allowed_error)
-    if scale.mounting is not None and not problem.mount_decisions:
+    if reference.mounting is not None and not problem.mount_decisions:
         rigid = replace(fidelity, mounts="rigid")
         try:
             is_sufficient = loss(rigid) <= loss(fidelity) + PART_SHARE * allowed_error
         except UncarriedLoadError:
             is_sufficient = False
-        fidelity = rigid if is_sufficient else _with_few_modes(scale, fidelity, PART_SHARE * allowed_error)
+        fidelity = rigid if is_sufficient else _with_few_modes(reference, fidelity, PART_SHARE * allowed_error)
     if is_even:
         lost, steps = loss(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
-        sampling_error = scale.relative_sampling_error
+        sampling_error = reference.relative_sampling_error
         fidelity = _first(fidelity, "samples", steps, lambda f: lost + sampling_error(f) <= allowed_error)
     return fidelity
 
@@ -165,7 +165,7 @@ def _cheapest(scale: ErrorReference, allowed_error: float, fidelity: Fidelity) -
 def _first(
     fidelity: Fidelity, key: str, values: Sequence[int | None], is_sufficient: Callable[[Fidelity], bool]
 ) -> Fidelity:
-    """Return the fidelity with the first sufficient value of an option; with the last value if none is sufficient."""
+    """Return the fidelity with the first sufficient value of option `key`, or with the last value if none suffices."""
     candidate = fidelity
     for value in values:
         changed: dict[str, Any] = {key: value}
@@ -175,22 +175,25 @@ def _first(
     return candidate
 
 
-def _with_few_modes(scale: ErrorReference, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
-    """Return the fidelity without modes of small response; modes that open rotors excite stay."""
-    maximum = scale.relative_loss(fidelity) + allowed_loss
-    result, modes = fidelity, scale.excited_modes
-    for mode in sorted(set(modes) - scale.open_rotor_modes, key=lambda mode: scale.mode_contributions[mode]):
+def _with_few_modes(reference: ErrorReference, fidelity: Fidelity, allowed_loss: float) -> Fidelity:
+    """Return the fidelity without modes of small response, within a relative change of the objective `allowed_loss`.
+
+    Modes that open rotors excite stay.
+    """
+    maximum = reference.relative_loss(fidelity) + allowed_loss
+    result, modes = fidelity, reference.excited_modes
+    for mode in sorted(set(modes) - reference.open_rotor_modes, key=lambda mode: reference.mode_contributions[mode]):
         modes = tuple(m for m in modes if m != mode)
         candidate = replace(fidelity, modes=modes)
-        if scale.relative_loss(candidate) > maximum:
+        if reference.relative_loss(candidate) > maximum:
             break
         result = candidate
     return result
 
 
-def _description(scale: ErrorReference, fidelity: Fidelity) -> list[str]:
+def _description(reference: ErrorReference, fidelity: Fidelity) -> list[str]:
     """Return descriptions of the physics that a fidelity computes."""
-    problem, mounting = scale.problem, scale.mounting
+    problem, mounting = reference.problem, reference.mounting
     orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
     lines = [f"exact kinematics, {orders} of pistons and rods"]
     if ROD.is_active(problem, fidelity):
@@ -202,51 +205,51 @@ def _description(scale: ErrorReference, fidelity: Fidelity) -> list[str]:
     if mounting and fidelity.mounts == "rigid":
         lines.append("mounts as if they gave no way")
     if mounting and fidelity.mounts == "frequency":
-        modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
+        modes = reference.excited_modes if fidelity.modes is None else fidelity.modes
         note = "; modes are of the stiffness at rest, loads of that at each frequency" if mounting.dynamic else ""
         lines.append(f"{mode_names(mounting, modes)} of the block on its mounts{note}")
     return [*lines, f"{fidelity.samples} steps over the cycle"]
 
 
-def _omitted_parts(scale: ErrorReference, fidelity: Fidelity) -> list[OmittedPart]:
-    """Return the parts that a fidelity omits, with upper bounds of their effect."""
+def _omitted_parts(reference: ErrorReference, fidelity: Fidelity) -> list[OmittedPart]:
+    """Return the parts of the physics that a fidelity omits, with upper bounds of their effect on the objective."""
     parts = []
 
     def omit(what: str, why: str, **restored: Any) -> None:
         whole = replace(fidelity, **restored)
-        share = scale.relative_loss(fidelity, scale.evaluation(whole))
+        share = reference.relative_loss(fidelity, reference.evaluation(whole))
         parts.append(OmittedPart(what, why if share > 0.0 else "the objective does not count them", share, whole))
 
     for part in (ROD, GAS):
-        if not part.is_there(scale.problem):
+        if not part.is_there(reference.problem):
             parts.append(OmittedPart(part.what, "the problem describes none"))
-        elif not part.is_active(scale.problem, fidelity):
+        elif not part.is_active(reference.problem, fidelity):
             omit(part.what, "the objective hardly sees its roll moment", **part.whole)
-    wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.open_wrenches]
+    wrenches = [*(loads.wrench for loads in reference.best.loads), *reference.open_wrenches]
     idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
     if idle:
         parts.append(OmittedPart("loads " + ", ".join(idle), "nothing drives them"))
     last = min(float(fidelity.orders or 8), 12.0)
     orders = [order for order in wrenches[0].orders if 0.0 < order <= last]
-    silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in scale.exciting_signals)]
+    silent = [f"{order:g}" for order in orders if not any(s.at(order).any() for s in reference.exciting_signals)]
     if silent:
         parts.append(OmittedPart("orders " + ", ".join(silent), "the crank star cancels them, or nothing has them"))
     if fidelity.orders is not None:
         omit(f"orders above {fidelity.orders}", "their forces are small", orders=None)
-    if scale.mounting is not None:
+    if reference.mounting is not None:
         if fidelity.mounts == "rigid":
             omit("motion of the block", "its mounts hardly give way at these orders", mounts="frequency")
-        still = [mode for mode in range(1, 7) if mode not in scale.excited_modes]
+        still = [mode for mode in range(1, 7) if mode not in reference.excited_modes]
         if still:
-            parts.append(OmittedPart(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+            parts.append(OmittedPart(f"{mode_names(reference.mounting, still)} of the block", "nothing excites them"))
         if fidelity.modes is not None:
-            small = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
-            omit(f"{mode_names(scale.mounting, small)} of the block", "what they answer is small", modes=None)
-    if scale.repeats > 1:
-        repeated = f"{scale.repeats - 1} of {scale.repeats} parts of the cycle"
+            small = [mode for mode in reference.excited_modes if mode not in fidelity.modes]
+            omit(f"{mode_names(reference.mounting, small)} of the block", "what they answer is small", modes=None)
+    if reference.repeats > 1:
+        repeated = f"{reference.repeats - 1} of {reference.repeats} parts of the cycle"
         parts.append(OmittedPart(repeated, "the loads repeat after each"))
     finer = replace(fidelity, samples=REFERENCE_SAMPLES, gas_samples=fidelity.gas_steps)
-    share = scale.relative_sampling_error(fidelity) + scale.relative_sampling_error(finer)
+    share = reference.relative_sampling_error(fidelity) + reference.relative_sampling_error(finer)
     between = f"angles between {fidelity.samples} steps"
     return [*parts, OmittedPart(between, "the force runs smoothly through them", share, finer)]
 
@@ -259,7 +262,7 @@ def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
 
 
 def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None = None) -> Problem:
-    """Return the problem at its automatic fidelity; `scale` is the reference if it is known."""
+    """Return the problem at its automatic fidelity; `scale` is the reference for its errors, if it is known."""
     if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
         # simulations have no error bound for omitted orders
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
@@ -267,7 +270,10 @@ def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None =
 
 
 def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
-    """Return the fidelities that a trade compares: (name, problem at this fidelity) (F13)."""
+    """Return the fidelities that a trade compares, as pairs (name, problem at this fidelity) (F13).
+
+    `scale` is the reference of the problem.
+    """
     problem, mounting = scale.problem, scale.mounting
     has_gas = GAS.is_there(problem)
     gas_samples = EXACT.samples if has_gas else None

@@ -49,7 +49,7 @@ def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
 
 
 def relative(bound: float, value: float) -> float:
-    """Return bound / value; infinite if only the value is zero, zero if both are."""
+    """Return bound / value; it is infinite if only the value is zero, and zero if both are."""
     return bound / value if value > 0.0 else (math.inf if bound > 0.0 else 0.0)
 
 
@@ -74,16 +74,16 @@ def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int
 
 
 class ErrorReference:
-    """Evaluation of one design by the best model, to which error bounds of cheaper models are relative.
+    """Reference for the errors of cheaper models: the evaluation of one design by the best model.
 
     Attributes
     ----------
     best
-        Evaluation at the reference.
+        Evaluation by the best model.
     terms
         Terms of the objective that are norms of loads, which a fidelity can change.
     value
-        Objective of loads and masses at the reference [SI].
+        Objective of loads and masses by the best model [SI].
     """
 
     def __init__(self, problem: Problem, best: Evaluation) -> None:
@@ -103,7 +103,7 @@ class ErrorReference:
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
     def largest_change(self, ours: Evaluation, theirs: Evaluation) -> float:
-        """Return an upper bound of the change of the objective between the signals of two evaluations (F6)."""
+        """Return an upper bound of the change of the objective between two evaluations of the design (F6)."""
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
@@ -150,7 +150,7 @@ class ErrorReference:
     def error_of(self, evaluation: Evaluation) -> float:
         """Return an upper bound of the error of the objective of an evaluation of the same design (F6-F9).
 
-        The error is relative to the objective of this evaluation; infinite if only that objective is zero.
+        The error is relative to the objective of this evaluation, and infinite if only that objective is zero.
         """
         value = value_of_loads(self.problem, evaluation)
         sampling_error = self.sampling_error(evaluation, self.best.samples)
@@ -159,7 +159,7 @@ class ErrorReference:
 
     @cached_property
     def repeats(self) -> int:
-        """Number of times that all measured signals repeat within the cycle, for any values of decisions."""
+        """Number of periods of all measured signals within the working cycle, for any values of the decisions."""
         rotors = [r for r in self.problem.engine.rotors if r.unbalance != 0 or r.name in self.open_rotors]
         ratios = tuple(as_order(abs(rotor.shaft.ratio)) for rotor in rotors)
         bases = [signal.repeat_order(ratios) for signal in self.exciting_signals]
@@ -219,7 +219,7 @@ class ErrorReference:
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     """Return an upper bound of the relative error of the objective from samples of loads and gas (F7-F9).
 
-    The physics is that of the fidelity of `evaluation`. Infinite if only the objective is zero.
+    The physics is that of the fidelity of `evaluation`. The bound is infinite if only the objective is zero.
     """
     scale = ErrorReference(problem, evaluation)
     bound = scale.sampling_error(evaluation) + ROUNDING * scale.value

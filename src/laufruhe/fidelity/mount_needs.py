@@ -1,7 +1,7 @@
-"""Physics that measures of a block on its mounts depend on, tested by removing parts (F15).
+"""Physics on which measures of a block on its mounts depend, tested by the removal of parts (F15).
 
 Sag, natural frequencies and the torque-roll axis are no loads, and do not depend on some parts of the physics. Each
-part is removed, or changed by a tenth if it cannot be removed, and all measures are computed again. If they stay the
+part is removed, or changed by a tenth if it cannot be removed. All measures are then computed again. If they stay the
 same to the last digits, they do not depend on the part.
 """
 
@@ -27,11 +27,11 @@ from laufruhe.problem.problem import Problem
 SAME = 1e-12
 """Relative change below which a value counts as unchanged."""
 MORE = 1.1
-"""Factor on numbers that cannot be removed."""
+"""Factor on numbers of parts that cannot be removed."""
 
 
 def needs(problem: Problem) -> Choice:
-    """Return the physics that the measures of a problem depend on; omitted parts have no effect on them."""
+    """Return the physics on which the measures of a problem depend; the omitted parts have no effect on them."""
     initial, dependences, left = _values(problem), [], []
     parts = [*_loads(problem)] if _moved(initial, _values(replace(problem, points=()))) else []
     if not parts:

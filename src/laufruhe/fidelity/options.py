@@ -1,4 +1,4 @@
-"""Fidelity options that a file may set: keys of the table [fidelity], and the problems that may have them (F1, F10).
+"""Fidelity options that a problem file may set: keys of [fidelity], and the problems that may have them (F1, F10).
 
 The schema and the reader of problem files use the list `OPTIONS` only. A new option needs a field of
 `physics.fidelity.Fidelity`, physics that reads the field, and an entry here. If the automatic choice decides it, it
@@ -15,12 +15,12 @@ from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Kinematics, MountM
 from laufruhe.problem.problem import Problem
 
 Refusal = tuple[str, str] | None
-"""Rule that a value breaks, and its remedy; None if a problem can have the value."""
+"""Rule that a value breaks, and its remedy as text; None if a problem can have the value."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """Field of the fidelity in a file.
+    """Fidelity option: a field of the fidelity that a file may set.
 
     Attributes
     ----------
@@ -29,7 +29,7 @@ class Option:
     is_decided
         True if the automatic choice decides it; a file with the automatic choice then may not set it.
     refusal
-        Return the rule that a value breaks in a problem.
+        Function of a problem and a value that returns the rule that the value breaks there, or None.
     """
 
     key: str
@@ -46,18 +46,18 @@ def has_gas(problem: Problem) -> bool:
 
 
 def _refuse_without_gas(problem: Problem, _: Any) -> Refusal:
-    return None if has_gas(problem) else ("is a choice of gas", "leave it out, or add [gas]")
+    return None if has_gas(problem) else ("needs working gas", "leave it out, or add [gas]")
 
 
 def _refuse_without_bearings(problem: Problem, _: Any) -> Refusal:
-    return None if problem.engine.bearings else ("is a choice of main bearings", "leave it out, or list them")
+    return None if problem.engine.bearings else ("needs main bearings", "leave it out, or list them")
 
 
 def _refuse_without_fixed_mounts(problem: Problem, value: Any) -> Refusal:
     if value == EXACT.mounts:
         return None
     if problem.engine.block is None:
-        return "is a choice of elastic mounts", 'leave it out, or add mounts of kind "elastic"'
+        return "needs elastic mounts", 'leave it out, or add mounts of kind "elastic"'
     if problem.mount_decisions:
         return "cannot be set while mounts are open", "leave it out, or fix the mounts"
     return None

@@ -41,14 +41,14 @@ MAX_NUMBERS = 60_000_000
 
 @dataclass(frozen=True, eq=False)
 class AffineNorm:
-    """Norm of rows that are affine in the decision vector x: N(V0 + B x).
+    """Norm of load rows that are affine in the decision vector x: N(V0 + B x).
 
     Attributes
     ----------
     constant
         Rows V0 of the load of the design with every decision at zero, shape (k, d).
     slope
-        Derivative B of the rows, shape (k, d, n).
+        Derivative B of the rows by x, shape (k, d, n).
     """
 
     norm: Norm
@@ -57,7 +57,7 @@ class AffineNorm:
     grid: Grid
 
     def rows(self, x: Array) -> Array:
-        """Return the rows V0 + B x, shape (k, d)."""
+        """Return the load rows V0 + B x, shape (k, d)."""
         moved = self.slope.reshape(self.constant.size, len(x)) @ x
         return self.constant + moved.reshape(self.constant.shape)
 
@@ -74,7 +74,7 @@ class AffineNorm:
         return np.asarray(z.ravel() @ self.slope.reshape(z.size, -1))
 
     def dual_norm(self, z: Array) -> float:
-        """Return the dual norm of rows z, shape (k, d) (P3)."""
+        """Return the dual norm of dual rows z, shape (k, d) (P3)."""
         return self.norm.dual_norm(self.grid, z)
 
     def dual_feasible(self, z: Array) -> Array:
@@ -121,7 +121,7 @@ class AffineProblem:
     def units(self) -> Array:
         """Unit of every column for a solver, shape (n,): its bound, or less if a small value balances the loads.
 
-        The unit is at most `UNIT_MARGIN` times the size that balances the constant rows. Otherwise a huge bound of one
+        The unit is at most `UNIT_MARGIN` times the value that balances the constant rows. Otherwise a huge bound of one
         column would leave no significant digits for the others.
         """
         norms = [norm for _, norm in (*self.terms, *self.limits)]
@@ -171,9 +171,9 @@ class AffineModel:
     Parameters
     ----------
     keep_all
-        Whether rows keep components that are zero, so that several models can be added up.
+        Whether load rows keep components that are zero, so that several models can be added up.
     whole_cycle
-        Whether rows cover the whole working cycle, even if the loads repeat within it.
+        Whether load rows cover the whole working cycle, even if the loads repeat within it.
 
     Attributes
     ----------
@@ -262,7 +262,7 @@ class AffineModel:
         ]
 
     def norm(self, measure: Measure, samples: int, averaged: bool = False, peaks: int = 0) -> AffineNorm:
-        """Return a measure as the norm of affine rows.
+        """Return a measure as the norm of load rows that are affine in the decision vector.
 
         Parameters
         ----------

@@ -74,9 +74,9 @@ class AmplitudeObjective:
 def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> AmplitudeObjective | None:
     """Return the objective as norms of the amplitudes |F_h| and |C_h|, or None if it depends on anything else.
 
-    Amplitudes suffice if all of the following hold. Equal throws cause all forces and couples, and only the star is
-    open. Limits have the same value for all even stars. Every term is a root mean square, or has a single order, so
-    that no phase between orders matters.
+    Amplitudes suffice if all of the following hold. Equal throws cause all forces and couples, and only the crank star
+    is open. Limits have the same value for all crank stars that fire evenly. Every term is a root mean square, or has a
+    single order, so that no phase between orders matters.
     """
     engine = problem.engine
     if problem.decisions or phasing.shafts.optional or not problem.objective:

@@ -100,7 +100,7 @@ class Designs:
     limits: tuple[tuple[float, BatchNorm], ...] = ()
 
     def objective(self, values: Array, threads: int = 1) -> Array:
-        """Return the objective of each design, shape (designs,), from complex values, shape (designs, decisions) (C4)."""
+        """Return the objective of each design, shape (designs,), from complex values (designs, decisions) (C4)."""
         return self.objective_from_features(self._features(values), threads)
 
     def are_feasible(self, values: Array) -> Mask:

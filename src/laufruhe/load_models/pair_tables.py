@@ -29,7 +29,7 @@ class PairTable:
     Attributes
     ----------
     constant
-        Square c of the rows without any throw.
+        Square c of the load rows V0 without any throw.
     linear
         Summand L_k(p) of throw k on step p, shape (throws, steps).
     pairs
@@ -51,9 +51,9 @@ class PairTable:
         return total
 
     def increments(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """Return the increase of the squares, shape (n,), when one throw on `steps`, shape (n,), is added.
+        """Return the increase of the squares, shape (n,), when one throw on `steps`, shape (n,), is added to stars.
 
-        `stars` has the steps of the throws before it, shape (n, at least `throw`).
+        `stars` has the steps of the throws before this one, shape (n, at least `throw`).
         """
         total = self.linear[throw, steps]
         count = self.linear.shape[1]

@@ -44,7 +44,7 @@ class StarNorm:
     slope
         Derivative B of the rows of the origin star, shape (k, d, n).
     slope_moves
-        Change E of the derivative, shape (throws, steps, k, d, n); None if unbalances act alike in every star.
+        Change E of the derivative, shape (throws, steps, k, d, n); None if unbalances act alike in all crank stars.
     """
 
     norm: Norm
@@ -55,7 +55,7 @@ class StarNorm:
     grid: Grid
 
     def at(self, star: Sequence[int]) -> AffineNorm:
-        """Return the norm of one star, from the step of every throw."""
+        """Return the norm of one crank star, given by the step of every throw."""
         indices = np.arange(len(star)), np.asarray(star, dtype=np.intp)
 
         def total(first: Array, changes: Array) -> Array:
@@ -96,7 +96,7 @@ class StarProblem:
         return replace(self, terms=terms, limits=limits)
 
     def at(self, star: Sequence[int]) -> AffineProblem:
-        """Return the problem of one star, from the step of every throw."""
+        """Return the problem of one crank star, given by the step of every throw."""
         terms = tuple((weight, norm.at(star)) for weight, norm in self.terms)
         limits = tuple((maximum, norm.at(star)) for maximum, norm in self.limits)
         return AffineProblem(terms, limits, self.domains, self.samples)
@@ -154,7 +154,7 @@ class StarModel:
         return AffineModel(with_upright_angles(self.phasing.realise(candidate)), keep_all=True)
 
     def at(self, samples: int, averaged: bool = False) -> StarProblem:
-        """Return the problem of all stars at a number of samples over the period of the loads.
+        """Return the problem of all crank stars at a number of samples over the period of the loads.
 
         Rows of means are averages over the step about each sample if `averaged` (P7).
         """

@@ -122,7 +122,7 @@ class ThrowWaves:
     parts
         Cylinders and unbalances that turn with the throws.
     rest
-        Loads of the remaining rotors, affine in the unbalances.
+        Loads of the rotors that turn with no throw, affine in the unbalances.
     times
         Orders of crank speed that are kept.
     base

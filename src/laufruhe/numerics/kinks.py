@@ -63,7 +63,7 @@ class SignalKinks:
         return np.concatenate([self.angles[slopes & ~steps], breaks - SAME_ANGLE, breaks + SAME_ANGLE])
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
-        """Return the sum of the closed forms of all kinks, or a derivative of it, at angles [rad], shape (angles, ...)."""
+        """Return the closed form of all kinks together, or a derivative of it, at angles [rad], shape (angles, ...)."""
         k = len(self.jumps)
         weights = self.pieces(period, derivative)
         weights = weights.reshape(*weights.shape[:2], -1)
@@ -90,10 +90,9 @@ class SignalKinks:
         return np.asarray(factors.reshape(-1, k, *self.jumps.shape[2:]))
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
-        """Return the coefficients of the closed form in orders 0, b, ... (count - 1) b, shape (count, ...); zero at
-        order 0.
+        """Return the coefficients of the closed form in orders 0, b, ... (count - 1) b, shape (count, ...).
 
-        b is the base order `base`.
+        b is the base order `base`; the coefficient of order 0 is zero.
         """
         k, degrees = self.jumps.shape[:2]
         flat, orders = self.jumps.reshape(k, degrees, -1), np.arange(count) * base

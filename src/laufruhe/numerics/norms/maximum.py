@@ -27,14 +27,14 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class Maximum(Norm):
-    """Largest length of the rows."""
+    """Largest length of the rows v_k."""
 
     name = "maximum"
     refinement = 8
     is_largest = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return max_k |v_k|."""
+        """Return the largest row length, max_k |v_k|."""
         return float(lengths(rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
@@ -52,7 +52,7 @@ class Maximum(Norm):
         return Subdifferential(z, np.flatnonzero(counts & (size > 0.0)))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return sum_k |z_k|."""
+        """Return the sum of the lengths of the dual rows, sum_k |z_k|."""
         return float(lengths(z).sum())
 
     def norm_from_lengths(self, lengths: Array, weights: Array) -> Array:

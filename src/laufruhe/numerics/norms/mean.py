@@ -32,35 +32,35 @@ MAJORANT_FLOOR = 1e-9
 
 
 class Mean(Norm):
-    """Weighted sum of the lengths."""
+    """Weighted sum of the lengths of rows v_k with weights w_k."""
 
     name = "mean"
     averages = True
     sums_lengths = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return sum_k w_k |v_k|."""
+        """Return the weighted sum of row lengths, sum_k w_k |v_k|."""
         return float(grid.weights @ lengths(rows))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return w_k v_k / |v_k|."""
+        """Return the dual rows w_k v_k / |v_k|, zero for zero rows."""
         size = lengths(rows)
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
 
     def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
-        """Return w_k / |v_k|, with the length of a zero row replaced by a small one."""
+        """Return w_k / |v_k| of each row, with a small length in place of zero."""
         size = lengths(rows)
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return w_k v_k / |v_k| as base, and the rows that vanish."""
+        """Return w_k v_k / |v_k| as base, and the indices of zero rows."""
         size = lengths(rows)
         vanishing = size <= ZERO_TOL * float(size.max(initial=0.0))
         base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
         return Subdifferential(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return max_k |z_k| / w_k; infinite if a row without weight is not zero."""
+        """Return max_k |z_k| / w_k over dual rows z_k; infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf

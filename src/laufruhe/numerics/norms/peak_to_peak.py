@@ -44,7 +44,7 @@ class PeakToPeak(Norm):
     is_diameter = is_convex = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return the largest diameter."""
+        """Return the largest diameter of the smallest enclosing ball of any signal."""
         return _diameter(_signals(rows, grid.steps))
 
     def values(self, grid: Grid, row_sets: Array) -> Array:
@@ -87,7 +87,7 @@ class PeakToPeak(Norm):
         return hull(subgradients)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return half the sum of lengths; infinite if the rows of a signal do not sum to zero."""
+        """Return half the sum of lengths of the dual rows; infinite if those of a signal do not sum to zero."""
         sums = np.array([signal.sum(axis=0) for signal in _signals(z, grid.steps)])
         total = float(lengths(z).sum())
         return 0.5 * total if np.abs(sums).max(initial=0.0) <= 1e-12 * total else math.inf

@@ -14,13 +14,13 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class RootMeanSquare(Norm):
-    """Euclidean norm of weighted rows."""
+    """Euclidean norm of rows v_k with weights w_k."""
 
     name = "rms"
     is_euclidean = is_convex = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return sqrt(sum_k w_k |v_k|^2)."""
+        """Return the weighted root mean square of the row lengths, sqrt(sum_k w_k |v_k|^2)."""
         size = np.where(grid.weights > 0.0, lengths(rows), 0.0)
         largest = float(size.max(initial=0.0))
         if largest == 0.0:
@@ -28,7 +28,7 @@ class RootMeanSquare(Norm):
         return largest * float(np.sqrt(grid.weights @ np.square(size / largest)))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return w_k v_k / norm(V)."""
+        """Return the dual rows w_k v_k / norm(V), zero if the norm is."""
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
 
@@ -37,7 +37,7 @@ class RootMeanSquare(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return sqrt(sum_k |z_k|^2 / w_k); infinite if a row without weight is not zero."""
+        """Return sqrt(sum_k |z_k|^2 / w_k) over dual rows z_k; infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf

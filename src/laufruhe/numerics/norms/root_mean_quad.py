@@ -23,19 +23,19 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class RootMeanQuad(Norm):
-    """Fourth root of the weighted mean of fourth powers."""
+    """Fourth root of the weighted mean of the fourth powers of row lengths."""
 
     name = "rmq"
     is_convex = is_monotone_in_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return (sum_k w_k |v_k|^4)^(1/4)."""
+        """Return (sum_k w_k |v_k|^4)^(1/4) over rows v_k with weights w_k."""
         size = np.where(grid.weights > 0.0, lengths(rows), 0.0)
         longest = float(size.max(initial=0.0))
         return longest and longest * float(grid.weights @ (size / longest) ** 4) ** 0.25
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return w_k |v_k|^2 v_k / norm(V)^3."""
+        """Return the dual rows w_k |v_k|^2 v_k / norm(V)^3, zero if the norm is."""
         value = self.value(grid, rows)
         if value == 0.0:
             return np.zeros_like(rows)
@@ -47,7 +47,7 @@ class RootMeanQuad(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4); infinite if a row without weight is not zero."""
+        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4) over dual rows z_k; infinite if z_k is without weight."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf

@@ -36,7 +36,7 @@ class WorstMean(Norm):
     is_largest_mean = is_convex = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """Return max_p mean_p |v_k|."""
+        """Return the largest mean row length of any operating point, max_p mean_p |v_k|."""
         return float(self._means(grid, rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
@@ -60,7 +60,7 @@ class WorstMean(Norm):
         return hull(subgradients)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return sum_p max_k |z_k| / w_k, with the weights of each operating point summing to one."""
+        """Return sum_p max_k |z_k| / w_k over dual rows z_k; the weights w_k of each operating point p sum to one."""
         return float(self._prices(grid, z).sum())
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:

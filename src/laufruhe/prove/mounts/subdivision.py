@@ -56,7 +56,7 @@ def is_stiffness_problem(problem: Problem) -> bool:
 def stiffness_bounds(
     problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance [SI].
+    """Yield lower bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance [SI].
 
     Parameters
     ----------
@@ -197,7 +197,7 @@ class StiffnessBoxes:
         return np.where(violated, np.inf, bounds), np.asarray(sides)
 
     def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
-        """Add bounds of simulated measures (E65), and return branching scores, shape (boxes, n)."""
+        """Add the bounds of simulated measures to the boxes (E65), and return branching scores, shape (boxes, n)."""
         assert self.simulated is not None
         scores, problem = np.zeros_like(lower), self.problem
         weights = {term.measure: term.weight for term in problem.objective}
