@@ -32,7 +32,10 @@ class FixedCrankLoads:
         self._model, self._unbalances = model, unbalances
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return a matrix of shape (6, 6) times the wrench at every operating point, without negligible orders."""
+        """Return the product of `transform`, shape (6, 6), and the wrench at every operating point.
+
+        Negligible orders are left out.
+        """
         wrenches, bounds = [], column_scales(self._model.domains)
         for bare, slopes in self._model.wrenches():
             base, spectra = stacked_coefficients([bare, *slopes])
@@ -77,9 +80,9 @@ class OpenCrankLoads(UnevenModel):
         self._moves, self._variables = moves, [deviations, unbalances]
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return a matrix of shape (6, 6) times the wrench at every operating point, without negligible orders.
+        """Return the product of `transform`, shape (6, 6), and the wrench at every operating point.
 
-        An order is negligible if it is small at all of `PROBES` random designs.
+        Orders that are small at all of `PROBES` random designs are left out.
         """
         relevant, bounds = [], column_scales(self.domains)
         for point in self.problem.points:

@@ -147,7 +147,9 @@ class PhaseLeadModel:
         return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope(columns), grid), tuple(derivatives), angles)
 
     def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[PhaseLeadNorm, ...]]:
-        """Return the problem in the unbalances at given leads, and its norms with derivatives, terms before limits.
+        """Return the affine problem of the unbalances at given leads [rad], and its norms with lead derivatives.
+
+        The norms of the terms stand before those of the limits.
 
         Parameters
         ----------

@@ -23,7 +23,7 @@ from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
-# relative difference of slopes that counts as none
+# relative difference of slopes that counts as zero
 _SAME_SLOPE = 1e-11
 # relative rounding error of rows that cancel
 _ROUNDING = 1e-14

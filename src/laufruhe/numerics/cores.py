@@ -19,7 +19,7 @@ def processors() -> int:
 
 
 def end_with_parent(parent: int) -> None:
-    """Let the system end this process together with its parent (Linux only)."""
+    """Let the system end this process together with its parent, whose process number is `parent` (Linux only)."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:

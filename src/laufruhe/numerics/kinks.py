@@ -175,7 +175,7 @@ def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
 
 
 def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
-    """Return kinks with one at each angle, the sum of those there; None if all jumps are zero."""
+    """Return the kinks with those at equal angles added up; None if all jumps are zero."""
     _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
     np.add.at(total, inverse, jumps)

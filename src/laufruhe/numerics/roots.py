@@ -8,7 +8,7 @@ _MAX_HALVINGS = 200
 
 
 def rising_root(function: Callable[[float], float], below: float, above: float) -> float:
-    """Return the zero of a function that never falls to the last digit of a float, by bisection.
+    """Return the zero of a function that never falls, exact to the last digit of a float, by bisection.
 
     The value is at most zero at `below`, and above zero at `above`.
     """
@@ -24,7 +24,7 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
 
 
 def bisect_property(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
-    """Return the last argument where a property holds and the first where it does not, after some halvings.
+    """Return an argument where a property holds and one where it does not, after some halvings of their interval.
 
     The property holds at `start` and not at `end`.
     """

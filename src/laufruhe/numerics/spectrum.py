@@ -41,7 +41,7 @@ def _thousandths(orders: ArrayLike) -> NDArray[np.float64]:
 
 
 def as_order(order: float) -> Fraction:
-    """Round an order, or a speed over crank speed, to a fraction."""
+    """Round an order, or the ratio of a speed to crank speed, to a fraction."""
     return Fraction(order).limit_denominator(MAX_ORDER_DENOMINATOR)
 
 

@@ -63,7 +63,7 @@ class BranchAndBound(Generic[P]):
     Attributes
     ----------
     what
-        Name of the parts in progress reports.
+        Name of the parts in progress reports and messages.
     batch_size
         Number of parts that are divided together.
     value

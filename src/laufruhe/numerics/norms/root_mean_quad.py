@@ -47,7 +47,7 @@ class RootMeanQuad(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4) over dual rows z_k; infinite if z_k is without weight."""
+        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4) of dual rows z_k; infinite if one with w_k = 0 is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf

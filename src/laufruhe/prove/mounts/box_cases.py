@@ -146,7 +146,8 @@ def _stop_errors(
     expansion
         Series of the motion with some stops as springs.
     corner
-        Cholesky factor L of the stiffness matrix at the softest corner of each box, shape (boxes, 6, 6).
+        Cholesky factor L of the stiffness matrix at the softest corner of each box, these stops included, shape
+        (boxes, 6, 6).
     signs
         +1 or -1 for a stop that counts as a spring in that direction, 0 for an open stop, shape (boxes, stops).
     equilibrium
