@@ -121,8 +121,8 @@ class ErrorReference:
     def gas_step_error(self) -> float:
         """Upper bound of the error of the reference from the steps of the gas torque, in units of the objective (F9).
 
-        With kinks in closed form the error falls at least in proportion to the step, so the change to half as many
-        steps is at least the remaining error.
+        With kinks in closed form the error falls at least in proportion to the step. The change to half as many steps
+        is therefore at least the remaining error.
         """
         fidelity = self.best.fidelity
         if all(fidelity.gas_of(loads.point) is None for loads in self.best.loads):

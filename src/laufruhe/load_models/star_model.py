@@ -108,7 +108,7 @@ class StarModel:
     Parameters
     ----------
     geometry
-        Bank angle and split pin [rad], or None each.
+        Bank angle and split pin [rad]; None for one that the layout does not have.
     origin
         Step of every throw in the star from which moves are counted; the first star of the space if None.
     """

@@ -9,9 +9,10 @@ remainder of second order:
 
 K_s bounds the norm of the second derivative of the load of shaft s for every lead. A change d_s of its lead turns the
 unbalances on a shaft of speed ratio n by n d_s. Their part of V lies on an arc, within the triangle of the end points
-of the arc and the crossing of the tangents there. d_s is sin(n d_s) / n up to |n^2 r_s^3| / 6. The minimum over
-unbalances is concave in this part of V, so it is least at a corner of the triangle. For peaks the remainder counts the
-nonzero rows of Z alone: a kink with a jump of slope J at a distance a < r_s from the angle of a row adds J (r_s - a).
+of the arc and the crossing of the tangents there. The difference of d_s and sin(n d_s) / n is at most |n^2 r_s^3| / 6.
+The minimum over unbalances is concave in this part of V, so it is least at a corner of the triangle. For peaks the
+remainder counts the nonzero rows of Z alone: a kink with a jump of slope J at a distance a < r_s from the angle of a
+row adds J (r_s - a).
 """
 
 from __future__ import annotations

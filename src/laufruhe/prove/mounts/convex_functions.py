@@ -1,8 +1,8 @@
 """Convex functions of mount stiffness, and bounds by their linear minorants (E16-E19).
 
-The stiffness matrix K is linear in the stiffnesses x, and is called A in coordinates with unit mass. w is the weight, t
-or q a turn about the torque-roll axis, W or root(s) its angular frequency, and M the mass matrix. For any y, any V >= 0
-with trace one, and any z with |z| <= 1,
+The stiffness matrix K is linear in the stiffnesses x, and is called A in coordinates with unit mass. w is the
+weight, and M the mass matrix. t or q is a turn about the torque-roll axis, and W or root(s) its angular frequency. For
+any y, any V >= 0 with trace one, and any z with |z| <= 1,
 
     w' A^-1 w    >= 2 y' w - y' A(x) y          sag                                     (E16)
     lambda_max A >= <V, A(x)>                   highest natural frequency               (E17)

@@ -1,6 +1,6 @@
 """Bounds of sums of waves over arcs of throw angles (S27, S30).
 
-With given multipliers, the objective with its limits has a lower bound: a constant plus, for every throw by itself, a
+With given multipliers, the objective with its limits has a lower bound. It is a constant plus, for every throw, a
 function Re sum_h c_h e^{i h theta} + s theta of the throw angle theta. The minimum of this function between two bounds
 is taken on a grid, less its largest fall between two angles. All these functions share an open bank or split-pin angle.
 With the shared angle fixed, each depends on one throw only. The minimum of the sum is therefore the minimum over the
