@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TypeVar
 
-from laufruhe.errors import BoundError
+from laufruhe.errors import BoundError, ModelError
 from laufruhe.fidelity.error_bounds import measure_sampling_error, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
-from laufruhe.problem.decision import Decision
+from laufruhe.problem.decision import Decision, Kind
 from laufruhe.problem.dependence import depends, open_kinds
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure, Side
@@ -40,6 +40,8 @@ VIOLATION_PENALTY = 10.0
 MAX_REFINEMENTS = 3
 """Largest number of refinements of the samples while a lower bound exceeds the objective."""
 # prices below this share of the objective are rounding errors
+STEP, UNCHANGED = 1e-3, 1e-9
+"""Step of a decision relative to its scale, and relative change of a measure that counts as none."""
 _PRICE_FLOOR = 1e-7
 # a limit is active if relaxing it by all of its value gains more than this share of the objective
 _ACTIVE_PRICE = 1e-3
@@ -377,7 +379,7 @@ def _limit_value(
     if prices is None:
         # no decision can move
         price = Price.both(math.nan)
-    elif standing.violation >= -ACTIVE and not depends(limit.measure.channel, open_kinds(problem), problem):
+    elif standing.violation >= -ACTIVE and not _is_moved(problem, evaluation, limit):
         # no decision changes the measure: relaxing gains nothing, and tightening excludes every design
         price = Price(0.0, math.inf)
     else:
@@ -392,6 +394,32 @@ def _limit_value(
         limit.name, standing.value, standing.edge, limit.measure.unit, active, price.relaxed, standing.side, error,
         price.other,
     )  # fmt: skip
+
+
+def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
+    """Return True if a small step of a decision from its start changes the limited measure of a design."""
+    channel = limit.measure.channel
+    if not depends(channel, open_kinds(problem), problem):
+        return False
+    # no step of a decision moves a throw
+    moves_throws = problem.phasing is not None and depends(channel, {Kind.STAR}, problem)
+    if channel.is_load or channel.is_mass or moves_throws:
+        return True
+    values, at_design = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
+    steps = (
+        (decision, STEP * decision.set.scale * (direction if decision.is_affine else 1.0))
+        for decision in problem.decisions for direction in decision.set.directions
+    )  # fmt: skip
+    for decision, step in steps:
+        try:
+            shifted = evaluate(problem, at_design.design([decision.start + step], [decision])).values(limit.measure)
+        except ModelError:
+            return True
+        if len(shifted) != len(values) or any(
+            abs(x - y) > UNCHANGED * abs(x) for x, y in zip(values, shifted, strict=True)
+        ):
+            return True
+    return False
 
 
 def with_constant_limits(result: Result, limits: tuple[Limit, ...]) -> Result:

@@ -25,6 +25,7 @@ from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import STIFFNESS
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
@@ -86,9 +87,42 @@ class RestLimits:
 
     def over(self, lower: Array, upper: Array) -> list[Array]:
         """Return Bernstein coefficients of lower bounds of the relative violation of each limit, shape (4^n,) each."""
-        violations: list[Array] = []
         if not self._limits:
+            return []
+        count, bernstein = len(lower), coefficients(len(lower))
+        middle, form = open_stiffness(self._problem, lower, upper)
+
+        def sag(limit: Limit) -> list[Array]:
+            maximum = limit.maximum * self._weight * (1.0 + SLACK)
+            if not 0.0 < maximum < math.inf:
+                return []
+            y = np.asarray(np.linalg.solve(middle, self._pull), dtype=np.float64)
+            powers, remainder = form(y)
+            return [(2.0 * float(self._pull @ y) - bernstein @ powers - remainder - maximum) / maximum]
+
+        def frequencies(limit: Limit) -> list[Array]:
+            # modes at the middle by rising frequency
+            modes: Array = np.linalg.eigh(0.5 * (middle + middle.T))[1]
+            violations = []
+            if limit.minimum > 0.0:
+                powers, remainder = form(modes[:, 0])
+                minimum = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2
+                violations.append((minimum - bernstein @ powers - remainder) / minimum)
+            if limit.maximum < math.inf:
+                powers, remainder = form(modes[:, -1])
+                maximum = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2
+                violations.append((bernstein @ powers - remainder - maximum) / maximum)
             return violations
+
+        def total_stiffness(limit: Limit) -> list[Array]:
+            ends = [float(numbers[:, STIFFNESS].sum()) for numbers in number_ranges(self._problem, lower, upper)]
+            slopes = 0.5 * (upper - lower) * self._stiffness_slopes
+            total = bernstein @ np.concatenate([[0.5 * sum(ends)], slopes, np.zeros(count**2)])
+            edges = ((1.0, limit.maximum), (-1.0, limit.minimum))
+            return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
+
+        violations_of = dict(zip(CHANNELS, (sag, frequencies, total_stiffness), strict=True))
+        return [violation for limit in self._limits for violation in violations_of[limit.measure.channel](limit)]
         count, bernstein = len(lower), coefficients(len(lower))
         middle, form = open_stiffness(self._problem, lower, upper)
         for limit in self._limits:

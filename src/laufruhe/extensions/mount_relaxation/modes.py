@@ -24,6 +24,7 @@ from laufruhe.prove.mounts.ranges import SLACK
 
 # smallest squared radius of the ball of modes, over the squared length of its centre
 NO_SIZE = 1e-8
+LIMITS_OF_SHARES = frozenset({DECOUPLING})
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +55,7 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
         return ()
     shares: dict[int, float] = {}
     for limit in problem.mount_limits:
-        if limit.measure.channel is DECOUPLING and limit.minimum > 0.0:
+        if limit.measure.channel in LIMITS_OF_SHARES and limit.minimum > 0.0:
             for motion in motion_indices(limit.measure):
                 shares[motion] = max(shares.get(motion, 0.0), limit.minimum * (1.0 - SLACK))
     return tuple(mode_basis(mounts.root, motion, share) for motion, share in shares.items())

@@ -19,6 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.box_series import Expansion, LinearResponse
 
+RATIOS = frozenset({channels.TRANSMISSIBILITY})
 PARTS = ("value", "slopes", "remainder", "scores")
 # halvings of the interval that contains the bound of a transmissibility
 HALVINGS = 45
@@ -194,7 +195,7 @@ def root_of(weights: Array, parts: Array) -> Array:
 
 def is_ratio(measure: Measure) -> bool:
     """Return True if a measure is a transmissibility."""
-    return measure.channel is channels.TRANSMISSIBILITY
+    return measure.channel in RATIOS
 
 
 def ratio_under(
