@@ -123,32 +123,3 @@ class RestLimits:
 
         violations_of = dict(zip(CHANNELS, (sag, frequencies, total_stiffness), strict=True))
         return [violation for limit in self._limits for violation in violations_of[limit.measure.channel](limit)]
-        count, bernstein = len(lower), coefficients(len(lower))
-        middle, form = open_stiffness(self._problem, lower, upper)
-        for limit in self._limits:
-            if limit.measure.channel is channels.SAG:
-                maximum = limit.maximum * self._weight * (1.0 + SLACK)
-                if 0.0 < maximum < math.inf:
-                    y = np.asarray(np.linalg.solve(middle, self._pull), dtype=np.float64)
-                    powers, remainder = form(y)
-                    violations.append(
-                        (2.0 * float(self._pull @ y) - bernstein @ powers - remainder - maximum) / maximum
-                    )
-            elif limit.measure.channel is channels.FREQUENCIES:
-                # modes at the middle by rising frequency
-                modes: Array = np.linalg.eigh(0.5 * (middle + middle.T))[1]
-                if limit.minimum > 0.0:
-                    powers, remainder = form(modes[:, 0])
-                    minimum = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2
-                    violations.append((minimum - bernstein @ powers - remainder) / minimum)
-                if limit.maximum < math.inf:
-                    powers, remainder = form(modes[:, -1])
-                    maximum = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2
-                    violations.append((bernstein @ powers - remainder - maximum) / maximum)
-            else:
-                ends = [float(numbers[:, STIFFNESS].sum()) for numbers in number_ranges(self._problem, lower, upper)]
-                slopes = 0.5 * (upper - lower) * self._stiffness_slopes
-                total = bernstein @ np.concatenate([[0.5 * sum(ends)], slopes, np.zeros(count**2)])
-                edges = ((1.0, limit.maximum), (-1.0, limit.minimum))
-                violations += [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
-        return violations
