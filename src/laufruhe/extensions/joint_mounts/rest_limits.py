@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
@@ -23,7 +24,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
-from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.channels import Channel, mounting_in
 from laufruhe.problem.decision import STIFFNESS
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
@@ -121,5 +122,7 @@ class RestLimits:
             edges = ((1.0, limit.maximum), (-1.0, limit.minimum))
             return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
 
-        violations_of = dict(zip(CHANNELS, (sag, frequencies, total_stiffness), strict=True))
+        violations_of: dict[Channel, Callable[[Limit], list[Array]]] = {
+            channels.SAG: sag, channels.FREQUENCIES: frequencies, channels.TOTAL_STIFFNESS: total_stiffness,
+        }  # fmt: skip
         return [violation for limit in self._limits for violation in violations_of[limit.measure.channel](limit)]
