@@ -65,7 +65,7 @@ def test_patterns_are_all_the_even_stars(cycle, cylinders):
 def test_a_vee_that_cannot_fire_evenly_says_why():
     with pytest.raises(NoEvenStarError, match=r"multiple of 120 deg, and they make 90 deg"):
         even_patterns(FOUR, vee(6, 1.0, RIGHT))
-    with pytest.raises(NoEvenStarError, match="alike"):
+    with pytest.raises(NoEvenStarError, match="the same arrangement of cylinders"):
         even_patterns(FOUR, boxer(4, 1.0, 0.1))
 
 

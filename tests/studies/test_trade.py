@@ -133,7 +133,7 @@ def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr("laufruhe.cli.fidelity.trade", out_of_time)
     monkeypatch.setattr("laufruhe.cli.fidelity.is_time_over", lambda: True)
-    with working_on(SERIAL), pytest.raises(SolverError, match="1 of 2 problems are measured"):
+    with working_on(SERIAL), pytest.raises(SolverError, match="ended the trade after 1 of 2 problems"):
         traded([quick, never], tmp_path / "trade", lambda _: None)
     assert (tmp_path / "trade/boxer-four.md").is_file()
 

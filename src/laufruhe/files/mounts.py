@@ -383,7 +383,9 @@ def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple
         if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):
             raise Refused(f"load_cases[{k}]", table.name, "has no load", "give times_weight, torque or force")
         if table.place is not None and table.force is None:
-            raise Refused(f"load_cases[{k}].place", table.place, "has no force", "give the force, or leave it out")
+            raise Refused(
+                f"load_cases[{k}].place", table.place, "has no force", "give the force, or leave out the place"
+            )
         weight, force, place = (
             (three[0], three[1], three[2]) if three else (0.0, 0.0, 0.0)
             for three in (table.times_weight, table.force, table.place)

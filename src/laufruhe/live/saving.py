@@ -49,7 +49,7 @@ NOT_SAVED = Saved()
 
 
 def saved_file(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
-    """Return the problem file of a design; placeholders stand for the decisions with sliders.
+    """Return the problem file of a design; placeholders stand for the decisions of `moving`, which have sliders.
 
     The file is empty if the reader would not accept it.
     """

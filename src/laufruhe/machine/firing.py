@@ -96,7 +96,9 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
     if len(set(pins)) > 1:
-        raise NoEvenStarError("open throws need throws of one kind; use layout inline or vee")
+        raise NoEvenStarError(
+            "open throws need the same arrangement of cylinders on every throw; use layout inline or vee"
+        )
     steps, maximum, pin = lattice.steps, lattice.slots.count(0), pins[0]
     # last place whose throws load each step; a step that is not full after it stays so
     last = {(step - p) % steps: p for p in range(steps) for step in pin}

@@ -46,7 +46,7 @@ FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings",
 
 
 def places_of(result: Result) -> list[Places]:
-    """Return the quantities that a result shows by place.
+    """Return the quantities that a result shows for each mount, bearing, pin or other place.
 
     Inside the crankcase these are the requested quantities, or all if the engine has bearings.
     """

@@ -56,7 +56,7 @@ class Part(Table):
     )
 
     def by_reading(self) -> list[Part]:
-        """Return the part once per reading of a doubtful number; itself without readings."""
+        """Return one part for each interpretation ("reading") of a doubtful printed number; itself without readings."""
 
         def read(value: Any, changes: dict[str, Value]) -> Any:
             if isinstance(value, list):

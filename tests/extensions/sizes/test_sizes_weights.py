@@ -218,7 +218,7 @@ def test_the_best_star_is_the_best_of_all_stars_each_with_its_sizes() -> None:
             "throws = [0, { between = [100, 200] }, { between = [100, 200] }, 0]",
             "open sizes of the running gear need",
         ),
-        ("cylinders = 4", "cylinders = 8", "more than 60 stars"),
+        ("cylinders = 4", "cylinders = 8", "more than 60 crank stars"),
     ],
 )
 def test_stars_that_are_too_many_or_uneven_are_refused_beside_sizes(old: str, new: str, rule: str) -> None:

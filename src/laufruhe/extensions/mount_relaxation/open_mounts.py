@@ -145,7 +145,7 @@ class OpenMounts:
 
     @property
     def at_rest(self) -> Array:
-        """Static part of the stiffness matrix A, from springs that depend on frequency, shape (k, k)."""
+        """Static part of the stiffness matrix A of the block, from springs that depend on frequency, shape (k, k)."""
         rows = self.dynamic.rows @ self.root.T
         return np.asarray(rows.T @ np.diag([law.static for law in self.dynamic.laws]) @ rows).reshape(
             self.size, self.size

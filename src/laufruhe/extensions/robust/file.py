@@ -304,7 +304,10 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
     if table is None or table.residual_unbalance is None:
         if table is not None and table.rotor_mass is not None:
             raise Refused(
-                "tolerances.rotor_mass", None, "needs a balance grade", "add residual_unbalance, or leave it out"
+                "tolerances.rotor_mass",
+                None,
+                "needs a balance grade",
+                "add residual_unbalance, or leave rotor_mass out",
             )
         return []
     grade = grade_of(table.residual_unbalance)
