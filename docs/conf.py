@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).parent / "extensions"))
 project = "Laufruhe"
 author = "Laufruhe developers"
 version = release = version_of("laufruhe")
+
 extensions = [
     "labels",
     "mathml",

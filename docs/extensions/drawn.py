@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, TypeAlias
+from typing import Any
 
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
-
-ImageScraper: TypeAlias = Callable[[tuple[str, str, int], Mapping[str, Any], Mapping[str, Any]], str]
 
 
 def scraper(block: tuple[str, str, int], block_vars: Mapping[str, Any], gallery_conf: Mapping[str, Any]) -> str:
@@ -23,5 +21,5 @@ def scraper(block: tuple[str, str, int], block_vars: Mapping[str, Any], gallery_
     return figure_rst(paths, gallery_conf["src_dir"])
 
 
-def _get_sg_image_scraper() -> ImageScraper:
+def _get_sg_image_scraper() -> Callable[..., str]:
     return scraper

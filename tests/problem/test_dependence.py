@@ -190,15 +190,14 @@ def test_no_engine_refutes_an_entry(rounds: int) -> None:
 
 @pytest.mark.slow
 def test_samples_of_one_engine_refute_most_stronger_claims() -> None:
-    """Where samples could not tell an entry from a stronger one, they would guard nothing."""
-    entries: dict[tuple[str, Kind], list[tuple[Dependence, list[np.ndarray]]]] = {}
+    """Sample one engine: each stronger claim is refuted, except those of channels that are constant on it."""
+    samples: dict[tuple[str, Kind, Dependence], list[list[np.ndarray]]] = {}
     for _, channel, kind, claim, at in _entries([ALL_OPEN], 5):
-        entries.setdefault((channel.name, kind), []).append((claim, at))
-    claims = {entry: (rows[0][0], STRONGER.get(rows[0][0], [])) for entry, rows in entries.items()}
+        samples.setdefault((channel.name, kind, claim), []).append(at)
     survivors = {
         (name, kind.name, str(stronger))
-        for (name, kind), (claim, more) in claims.items() for stronger in more
-        if not any(refuted(stronger, at) for _, at in entries[name, kind])
+        for (name, kind, claim), rows in samples.items() for stronger in STRONGER.get(claim, ())
+        if not any(refuted(stronger, at) for at in rows)
     }  # fmt: skip
     assert survivors == {(name, kind, str(claim)) for claim, kind, names in CONSTANT_HERE for name in names.split(", ")}
 

@@ -149,8 +149,9 @@ class MeasureContext:
                 rule = f"needs a constant stiffness, and that of mount '{mount.name}' depends on frequency"
                 raise Refused(where, name, rule, "use transmissibility, mount force or mount travel")
         self._check_keys(channel, table, key)
-        for places in (places for places in PLACES if places in channel.keys):
-            _check_known(getattr(table, places), channel.places(self.engine), f"{key}.{places}", PLACES[places])
+        for places in PLACES:
+            if places in channel.keys:
+                _check_known(getattr(table, places), channel.places(self.engine), f"{key}.{places}", PLACES[places])
         measure = table.measure(name)
         names = getattr(table, "of", None)
         if measure.is_mass:

@@ -232,8 +232,9 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
         remedy = f"fix one of the two, or let the firing be uneven: {uneven}"
         raise Refused("engine.split_pin_angle", None, rule, remedy)
-    throws = count // kind.cylinders_per_throw
-    if isinstance(engine.throws, list) and len(engine.throws) != throws:
+    # the layout refuses a count that is no multiple
+    throws, remainder = divmod(count, kind.cylinders_per_throw)
+    if isinstance(engine.throws, list) and not remainder and len(engine.throws) != throws:
         raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "make the numbers agree")
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:

@@ -111,7 +111,7 @@ def path_text(tables: Any, place: Sequence[str | int]) -> str:
     parts, node = list[str](), tables
     for key in place:
         names = {k: name for name, k in _options(node).items() if isinstance(key, str) or "." not in name}
-        parts.append(names[key])
+        parts.append(names[key] if key in names else str(int(key) + 1))
         node = node[key]
     return ".".join(parts)
 

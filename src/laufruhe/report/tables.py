@@ -99,14 +99,14 @@ def _measures(result: Result) -> Table:
 
 def _transmissibility(result: Result) -> Table:
     speeds, orders = transmissibility_speeds(result), facts_of(result.final).orders
-    columns = {
-        f"{design}, {point.name}: order {orders[k]:g}": curve
+    columns = [
+        (f"{design}, {point.name}: order {orders[k]:g}", curve)
         for design, evaluation in designs_with_loads(result).items()
         for point in result.problem.points
         for k, curve in transmissibility_of(evaluation, point, speeds, orders)
-    }
-    rows = np.column_stack([RPM * speeds, *columns.values()]).tolist() if columns else []
-    return Table(["speed [rpm]", *columns], rows)
+    ]
+    rows = np.column_stack([RPM * speeds, *(curve for _, curve in columns)]).tolist() if columns else []
+    return Table(["speed [rpm]", *(head for head, _ in columns)], rows)
 
 
 def _rankings(result: Result) -> Table:
@@ -190,8 +190,7 @@ def _indicator(result: Result) -> Table:
         pressures = (diagram.pressures.get(name, np.full(STEPS, math.nan)) for name in chamber_names)
         columns = np.column_stack([np.degrees(TURN), diagram.travel, diagram.force, diagram.needed, *pressures])
         rows += [[point, part, *row] for row in columns.tolist()]
-    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke",
-            "force of the gas on the piston [N]",
+    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
             "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in chamber_names)]  # fmt: skip
     return Table(head, rows)
 

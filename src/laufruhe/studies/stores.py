@@ -54,12 +54,15 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         self._records: Record = {}
         self.seconds: dict[str, float] = {}
         self._stream: FileIO | None = None
-        for line in path.read_bytes().split(b"\n") if path.is_file() else []:
-            checksum, _, content = line.partition(b" ")
-            if checksum == _checksum(content):
-                mark, seconds, record = json.loads(content)
-                if mark in marks:
-                    self._records[mark], self.seconds[mark] = record, seconds
+        if path.is_file():
+            # line by line: the file may exceed memory
+            with path.open("rb") as lines:
+                for line in lines:
+                    checksum, _, content = line.rstrip(b"\n").partition(b" ")
+                    if checksum == _checksum(content):
+                        mark, seconds, record = json.loads(content)
+                        if mark in marks:
+                            self._records[mark], self.seconds[mark] = record, seconds
 
     def read(self, mark: str) -> Record:
         """Return the record of a point."""

@@ -26,9 +26,8 @@ def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str
         return {}
     verdicts = []
     for statement in statements:
-        values = [{**names, "value": number_of(statement.value, names)} for names in readings.values()]
-        whys = (fill_in(statement.why, names) for names in values)
-        verdicts.append([(n["value"], verdict(statement, n), why) for n, why in zip(values, whys, strict=True)])
+        known = ({**names, "value": number_of(statement.value, names)} for names in readings.values())
+        verdicts.append([(n["value"], verdict(statement, n), fill_in(statement.why, n)) for n in known])
     texts = [one.text + (f" ({one.where})" if one.where else "") for one in statements]
     return {
         "by_reading": list(readings),

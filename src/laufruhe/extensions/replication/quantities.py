@@ -116,6 +116,11 @@ def _turning(part: slice, result: Result, table: QuantityQuery) -> Labelled:
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
 
 
+def _firing_intervals(result: Result, _: QuantityQuery) -> Labelled:
+    values = [math.degrees(angle) for angle in result.final.engine.firing_intervals]
+    return Labelled(values, {"firing": list(range(1, len(values) + 1))})
+
+
 RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "mount forces": _signal,
     "mean force by mount": partial(_by_mount, "mean"),
@@ -124,10 +129,7 @@ RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "free couple": partial(_by_order, COUPLE),
     "turning force": partial(_turning, FORCE),
     "turning couple": partial(_turning, COUPLE),
-    "firing intervals": lambda result, _: Labelled(
-        [math.degrees(angle) for angle in result.final.engine.firing_intervals],
-        {"firing": list(range(1, len(result.final.engine.firing_intervals) + 1))},
-    ),
+    "firing intervals": _firing_intervals,
     "energy shares": lambda result, _: Labelled(
         mounting_in(result.final.engine).modes.energy.tolist(), {"motion": list(MOTIONS), "mode": list(range(1, 7))}
     ),

@@ -46,7 +46,11 @@ class Page:
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:
         self.watched = FileWatcher(path)
         folder = files("laufruhe.extensions.served_page") / "static"
-        texts = {file.name: file.read_text(encoding="utf-8") for file in folder.iterdir() if file.is_file()}
+        texts = {
+            file.name: file.read_text(encoding="utf-8")
+            for file in folder.iterdir()
+            if file.name.endswith((".html", ".js", ".css"))
+        }
         self.server = _start_server(port, {**texts, **page_assets()})
         self._follow, self._measure = LatestWorker(_HASTE), LatestWorker(_HASTE)
         self._settle, self._front = LatestWorker(_PATIENCE), LatestWorker(_PATIENCE)

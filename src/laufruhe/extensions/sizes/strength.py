@@ -254,9 +254,10 @@ def gear_mass(engine: Engine) -> float:
     total = 0.0
     for part in pins.values():
         total += 0.0 if part.big_end is None else ring_area(part.big_end[0], 0.0) * part.big_end[1]
+    journal = smallest_journal(engine.bearings)
     for part in pins.values() if gear.webs else ():
         diameter = part.big_end[0] if part.big_end else 0.0
-        reach = part.crank_radius + 0.5 * diameter + 0.5 * smallest_journal(engine.bearings)
+        reach = part.crank_radius + 0.5 * diameter + 0.5 * journal
         total += 2.0 * _part(engine, "webs", Webs).area * reach
     for part in engine.slider_cranks:
         if gear.rod is not None and not math.isinf(part.rod_length):

@@ -62,7 +62,7 @@ function colour(k) {
 }
 
 /** A scale that grows with what is drawn, and shrinks only when it is far too large. */
-class ErrorReference {
+class Scale {
   constructor() { this.top = 0; }
   /** Update the scale; return true if it changed. */
   follow(value) {

@@ -34,7 +34,7 @@ function peakOf(now, was) {
 /** A figure of a design and a reference, which is redrawn when it or the scale changes. */
 class Compared {
   constructor(signal, was, key, title) {
-    Object.assign(this, { signal, was, key, title, scale: new ErrorReference(), isNew: true });
+    Object.assign(this, { signal, was, key, title, scale: new Scale(), isNew: true });
   }
 
   compare(was) {
@@ -186,7 +186,7 @@ const MOST_ORDERS = 12;
 /** Amplitudes of the largest orders of all known designs, a bar per place. */
 class Orders {
   constructor(signal, k, designs) {
-    Object.assign(this, { signal, point: signal.points[k], scale: new ErrorReference() });
+    Object.assign(this, { signal, point: signal.points[k], scale: new Scale() });
     Object.assign(this, { key: "orders", title: `Amplitude by order [${signal.shown}]` });
     this.orders = this.counted(designs);
     this.root = picture(420, 194, "");

@@ -50,7 +50,7 @@ def figure(result: Result) -> Figure:
             )
             axes.set_xlabel("part of the stroke from the head end" if part is parts[-1] else "")
     lines = "Left: absolute pressure in every chamber. Right: force towards the crank, on the way out and back."
-    legend = [entry("force of the gas on the piston", color=INK, linewidth=1.4)]
+    legend = [entry("force of the chambers", color=INK, linewidth=1.4)]
     legend += [entry("force that accelerates the rod", color=FAINT, linestyle=(0, (4, 1.6)))]
     return finish_page(drawn, result, f"Indicator diagrams at {point.name}", lines, legend)
 

@@ -40,7 +40,7 @@ def figure(result: Result) -> Figure:
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
     for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
         words, (factor, symbol) = omitted_words(top, max(tops), unit), in_thousands(top, unit)
-        axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * factor * top or 1.0))
+        axes.set(xlim=(-0.6, max(last, SHORTEST) + 0.6), ylim=(0.0, 1.1 * factor * top if top > 0.0 else 1.0))
         axes.set_ylabel(f"{label} [{symbol}]")
         axes.xaxis.set_major_locator(MaxNLocator(12, integer=True, steps=[1, 2, 5, 10]))
         round_ticks(axes.yaxis, 5)

@@ -10,6 +10,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from laufruhe.errors import counted
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Side
@@ -127,7 +128,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
             bound=0.0 if design.rank[0] else bound,
             strength=ProofStrength.EXACT,
             kkt_residual=balance.certificate.kkt_residual if balance and balance.certificate else math.inf,
-            method=f"{method} {boxes} box{'es' * (boxes > 1)} of {numbers}",
+            method=f"{method} {counted(boxes, 'box')} of {numbers}",
             prices=(balance.prices if balance else {}) | self.prices(design),
         )
         return build_result(design, replace(initial, samples=design.evaluation.samples), proof, timing)

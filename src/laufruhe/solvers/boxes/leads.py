@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.affine import AffineProblem
 from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
@@ -217,7 +217,7 @@ def solve_shared_leads(problem: Problem) -> Result:
     timing = {"solve": time.perf_counter() - started}
     if best is None or (witness is None and math.isinf(division.bound)):
         return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
-    method = f"local searches; lower bound on {division.boxes} box{'es' * (division.boxes > 1)} of leads"
+    method = f"local searches; lower bound on {counted(division.boxes, 'box')} of leads"
     return build_result(best, initial, ProofData(division.bound, ProofStrength.EXACT, math.inf, method), timing)
 
 
@@ -235,7 +235,8 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
         return math.inf if candidate is None else candidate.value * (1.0 + 1e3 * max(candidate.violation, 0.0))
 
     start = np.array([d.real_start for d in problem.decisions])
-    ends = [*_search_from_grid(penalised, lower, upper, *GRID_OF_SHARED_GAS), start]
+    # the last of equal ends wins
+    ends = [*reversed(_search_from_grid(penalised, lower, upper, *GRID_OF_SHARED_GAS)), start]
     return min(filter(None, map(design, ends)), key=lambda design: design.rank, default=None)
 
 

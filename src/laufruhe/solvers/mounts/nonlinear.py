@@ -35,6 +35,7 @@ from laufruhe.solvers.conclusion import (
     infeasible_result,
     nearest_record,
     priced_decisions,
+    quote_names,
     unbalance_values,
 )
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
@@ -254,7 +255,7 @@ def failed_search(search: MountSearch, result: Result) -> Result:
         values = nearest.constraints
         excess = np.maximum(program.constraint_lower - values, values - program.constraint_upper)
         violated = [program.constraint_names[k] for k in np.flatnonzero(excess > 1e-6)]
-        names = " and ".join(f"'{name}'" for name in dict.fromkeys(violated) if name != "modes")
+        names = quote_names(name for name in dict.fromkeys(violated) if name != "modes")
     message = (
         f"no design was found that keeps {names or 'the limits'}, from {sum(o.starts for o in search.optima)} starts "
         f"(the nearest design violates a limit by {nearest.violation:.3g} of it); relax it, or open more numbers"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -48,8 +47,7 @@ class StaticCases:
         self, mounts: SymbolicMounts, mounting: ElasticMounting, root: Array, constraints: ConstraintCollector
     ) -> None:
         self._mounts, self._mounting, self._root, self._constraints = mounts, mounting, root, constraints
-        self._stops = stops_of(mounting)
-        self._response = cache(self._new_response)
+        self._stops, self._responses = stops_of(mounting), dict[LoadCase, MountResponse]()
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
         """Return an expression that is at least the length of each vector of a measure, from a new variable (E22)."""
@@ -66,6 +64,11 @@ class StaticCases:
         largest = collector.head(ca.MX(1.0))
         collector.hold(squares - largest * largest)
         return unit * largest
+
+    def _response(self, case: LoadCase) -> MountResponse:
+        if case not in self._responses:
+            self._responses[case] = self._new_response(case)
+        return self._responses[case]
 
     def _new_response(self, case: LoadCase) -> MountResponse:
         mounts, load = self._mounts, self._root @ case_wrench(self._mounting.block, case)

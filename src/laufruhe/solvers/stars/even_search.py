@@ -133,11 +133,11 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         search = enumerate_orders(pairs, phasing.cylinders, phasing.best, phasing.time_limit)
         result = enumeration_result(phasing, family, search, "all firing orders evaluated by pairs of throws")
         return replace(result, infeasible=0 if result.designs else search.nodes)
+    objectives = [objective for family in families if (objective := amplitudes(phasing, family)) is not None]
+    if len(objectives) < len(families):
+        return _search_by_cuts(problem, phasing, families)
     results = []
-    for family in families:
-        objective = amplitudes(phasing, family)
-        if objective is None:
-            return _search_by_cuts(problem, phasing, families)
+    for family, objective in zip(families, objectives, strict=True):
         search = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
         results.append(enumeration_result(phasing, family, search, "all stars evaluated"))
     return merge_results(results, phasing.best)

@@ -26,7 +26,7 @@ from laufruhe.prove.branch_and_bound import FathomedPart
 from laufruhe.prove.certificate import gap_tolerance_of
 from laufruhe.prove.witness import Witness, thin_box
 from laufruhe.solvers.boxes.search import BoxSearch, divide_boxes
-from laufruhe.solvers.conclusion import FEASIBLE, refine_objective
+from laufruhe.solvers.conclusion import FEASIBLE, is_sampled, refine_objective
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.stars.star_results import StarDesign
@@ -281,7 +281,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
                 steps = 4 * samples if term.measure.norm.averages else samples
                 rows = load_rows(term.measure, problem.points, averaged_signals, final.engine, steps)
                 loss += term.weight * max(final.value(term.measure) - rows.value, 0.0)
-            elif term.measure.is_load and not term.measure.norm.is_euclidean and samples < self._most_samples:
+            elif is_sampled(term.measure) and samples < self._most_samples:
                 loss += term.weight * peak_error(term.measure, best.result, samples)
         return loss
 
