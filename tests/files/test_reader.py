@@ -10,10 +10,10 @@ import pytest
 from _pytest.mark.structures import ParameterSet
 
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.files.reader import load
+from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.machine import Cycle, PressureTrace, Seiliger
 from laufruhe.problem.evaluation import evaluate
-from problem_files import FOUR, MOUNTS, changed, open_unbalance, shaft, written
+from problem_files import FOUR, MOUNTS, PROBLEMS, changed, open_unbalance, shaft, written
 
 WHOLE = "".join([
     FOUR, 'bore = "100 mm"\nthrows = [0, 180, 180, 0]\n', """
@@ -482,3 +482,11 @@ class TestTrace:
         assert complaint_about(path).startswith(
             'gas.file = "pressure.csv": cannot be read (No such file or directory); give'
         )
+
+
+def test_a_place_that_is_another_name_counts_from_one() -> None:
+    """A point without a name beside one whose name is the number of that point."""
+    tables = dict(tables_of(PROBLEMS / "tractor-single.toml"))
+    points = [{"name": "2", "speed": "1500 rpm"}, {"speed": "2000 rpm", "imep": {"between": ["5 bar", "8 bar"]}}]
+    problem = load_tables({**tables, "operating_points": points}, Path("points.toml"))
+    assert "operating_points.2.imep" in [decision.name for decision in problem.decisions]

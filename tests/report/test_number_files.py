@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import gc
 import math
+from dataclasses import replace
 from inspect import getsource
 from pathlib import Path
 
@@ -124,6 +125,16 @@ def test_the_same_numbers_make_the_same_files(
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
         path.name: path.read_bytes() for path in tmp_path.iterdir()
     }
+
+
+def test_points_of_one_name_have_a_column_each() -> None:
+    problem = load(PROBLEMS / "inline-five-elastic.toml")
+    point = problem.points[0]
+    points = (point, replace(point, speed=1.5 * point.speed))
+    one, two = (
+        number_tables(evaluate_only(problem.changed(points=points[:count])))["transmissibility"] for count in (1, 2)
+    )
+    assert len(two.head) - 1 == 2 * (len(one.head) - 1)
 
 
 @pytest.mark.slow

@@ -207,3 +207,8 @@ def test_what_is_not_known_of_shared_chambers_is_one_line(more: dict[str, Any], 
     with pytest.raises(ModelError, match=words) as caught:
         laufruhe.solve(problem(quantity, between(0, 40), **more))
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_without_boxes_the_whole_range_is_bounded_once() -> None:
+    found = laufruhe.solve(problem("rms roll moment", between(5, 40), search={"boxes": 0, "starts": 1}))
+    assert found.certificate.method.endswith("lower bound on 1 box of leads")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
 
@@ -90,8 +90,8 @@ class ErrorReference:
         self.problem, self.best = problem, best
         self.terms = [term for term in problem.objective if term.measure.is_load]
         self.value = value_of_loads(problem, best)
-        self._loss = cache(lambda f: relative(self.largest_change(self.evaluation(f), best), self.value))
-        self._sampling_error = cache(lambda f: relative(self.sampling_error(self.evaluation(f)), self.value))
+        self._losses: dict[Fidelity, float] = {}
+        self._sampling_errors: dict[Fidelity, float] = {}
 
     @classmethod
     def of(cls, problem: Problem, engine: Engine | None = None) -> ErrorReference:
@@ -141,11 +141,17 @@ class ErrorReference:
         """
         if than is not None:
             return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
-        return self._loss(replace(fidelity, tolerance=None))
+        key = replace(fidelity, tolerance=None)
+        if key not in self._losses:
+            self._losses[key] = relative(self.largest_change(self.evaluation(key), self.best), self.value)
+        return self._losses[key]
 
     def relative_sampling_error(self, fidelity: Fidelity) -> float:
         """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
-        return self._sampling_error(replace(fidelity, tolerance=None))
+        key = replace(fidelity, tolerance=None)
+        if key not in self._sampling_errors:
+            self._sampling_errors[key] = relative(self.sampling_error(self.evaluation(key)), self.value)
+        return self._sampling_errors[key]
 
     def error_of(self, evaluation: Evaluation) -> float:
         """Return an upper bound of the error of the objective of an evaluation of the same design (F6-F9).

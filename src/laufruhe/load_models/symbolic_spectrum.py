@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -22,7 +23,7 @@ class SymbolicSpectrum:
     real: Any
     imaginary: Any
 
-    @property
+    @cached_property
     def base(self) -> float:
         """Order of the common period of all orders."""
         return float(base_of(self.orders.tolist()))

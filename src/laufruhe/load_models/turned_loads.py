@@ -28,7 +28,7 @@ from laufruhe.load_models.isolated_cylinders import (
     split_by_bank,
 )
 from laufruhe.load_models.symbolic_spectrum import SymbolicSpectrum, sum_spectra
-from laufruhe.machine import Engine, Rotor
+from laufruhe.machine import Engine, OperatingPoint, Rotor
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.spectrum import Spectrum, stacked_coefficients
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -59,15 +59,16 @@ class OrderSelection:
 
 
 def turned_loads(
-    problem: Problem, point: int, signal: Callable[[PointLoads], Spectrum], selections: Sequence[OrderSelection],
-    keep_places: bool, angles: Sequence[tuple[Any, Any]], banks_are_open: bool, unbalance: Callable[[Rotor], Any],
+    problem: Problem, point: OperatingPoint, signal: Callable[[PointLoads], Spectrum],
+    selections: Sequence[OrderSelection], keep_places: bool, angles: Sequence[tuple[Any, Any]], banks_are_open: bool,
+    unbalance: Callable[[Rotor], Any],
 ) -> list[SymbolicSpectrum]:  # fmt: skip
     """Return a load at one operating point at every place, for throws and banks at any angles.
 
     Parameters
     ----------
     point
-        Index of the operating point.
+        Operating point.
     signal
         Function from the loads of an engine to the spectrum of interest, shape (n, places, d).
     selections
@@ -81,7 +82,7 @@ def turned_loads(
     unbalance
         Function from a rotor to the real and imaginary parts of its unbalance [kg m].
     """
-    engine, at_point = problem.engine, replace(problem, points=(problem.points[point],))
+    engine, at_point = problem.engine, replace(problem, points=(point,))
     base = engine.cycle.base_order
 
     def load(of: Problem, parts: Engine) -> Spectrum:

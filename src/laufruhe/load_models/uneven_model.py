@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import casadi as ca
@@ -152,20 +152,23 @@ class UnevenModel:
         keep_places: bool,
     ) -> list[SymbolicSpectrum]:  # fmt: skip
         return turned_loads(
-            self.problem, self.problem.points.index(point), signal, selections, keep_places, self._angles,
+            self.problem, point, signal, selections, keep_places, self._angles,
             self._symbols.bank is not None, self._unbalance,
         )  # fmt: skip
 
     def _counted(self, measure: Measure, point: OperatingPoint) -> SymbolicSpectrum:
-        gain = None
+        gain: Callable[[float], float] | None = None
         if measure.on_mounts and not isinstance(self._mounting, RigidMounting):
             # only the lowest orders of gas move a block on soft mounts
-            gain = lambda h: float(np.abs(self._map(measure, h, point.speed)[:, :, ROLL]).max())  # noqa: E731
+            gain = partial(self._roll_gain, measure, point.speed)
         wrench = self.wrench(point, gain)
         counted = np.flatnonzero(measure.counted(wrench.orders))
         if len(counted):
             return wrench.select(counted)
         return SymbolicSpectrum(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
+
+    def _roll_gain(self, measure: Measure, speed: float, order: float) -> float:
+        return float(np.abs(self._map(measure, order, speed)[:, :, ROLL]).max())
 
     def _maps(self, measure: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
         weights = np.diag(measure.direction_weights or (1.0, 1.0, 1.0))
@@ -190,8 +193,7 @@ class UnevenModel:
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
         unweighted = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
         roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
-        signal = lambda loads: loads.wrench.mapped(lambda wrench: wrench[:, None, :])  # noqa: E731
-        (wrench,) = self._turned(point, signal, [*unweighted, roll], False)
+        (wrench,) = self._turned(point, _as_place, [*unweighted, roll], False)
         if gain is None:
             self._wrenches[point] = wrench
         return wrench
@@ -218,6 +220,10 @@ class UnevenModel:
         turn = self._symbols.throws[pin] - self._start[pin]
         cosine, sine = ca.cos(turn), ca.sin(turn)
         return ca.vertcat(cosine * real - sine * imaginary, sine * real + cosine * imaginary)
+
+
+def _as_place(loads: PointLoads) -> Spectrum:
+    return loads.wrench.mapped(lambda wrench: wrench[:, None, :])
 
 
 def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:

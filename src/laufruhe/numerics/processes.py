@@ -199,7 +199,10 @@ class Processes(ThreadPoolExecutor):
         return super().submit(self._answer, pickle.dumps((fn, args, kwargs)))
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when all calls are done, or at once with `cancel_futures`."""
+        """End the processes when all calls are done, or at once with `cancel_futures`.
+
+        Without `wait` and `cancel_futures` they end with this object.
+        """
         try:
             super().shutdown(wait and not cancel_futures, cancel_futures=cancel_futures)
         finally:

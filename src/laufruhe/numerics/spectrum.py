@@ -215,8 +215,8 @@ class Spectrum:
         """Return the same signal with another base order, whose period must be a period of the signal."""
         if base is self.base or base == self.base:
             return self
-        fine = self.with_finer_base(_common(base, self.base))
-        step = int(base / fine.base)
+        ratio = base / self.base
+        fine, step = self if ratio.denominator == 1 else self.with_finer_base(_common(base, self.base)), ratio.numerator
         kinks = None if fine.kinks is None else fine.kinks.folded(fine.period / step, step)
         return Spectrum(base, fine.coefficients[::step], kinks)
 

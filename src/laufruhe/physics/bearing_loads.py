@@ -86,7 +86,8 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
 def _carried(parts: Sequence[SliderCrank]) -> Array | None:
     # ones where the rod of a column is hinged to the rod of a row; None without hinges
     crank_rods = [(part.shaft, part.x, part.bank) if part.master_bank is None else None for part in parts]
-    hinges = np.array([[(part.shaft, part.x, part.master_bank) == rod for part in parts] for rod in crank_rods], float)
+    master_rods = [(part.shaft, part.x, part.master_bank) for part in parts]
+    hinges = np.array([[master_rod == rod for master_rod in master_rods] for rod in crank_rods], float)
     return hinges if hinges.any() else None
 
 

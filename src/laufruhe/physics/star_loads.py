@@ -13,7 +13,7 @@ from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, cis, star_orders
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.mechanism import Direction, Effect
-from laufruhe.physics.rigid_body import plane_parts
+from laufruhe.physics.rigid_body import ROLL, plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
@@ -62,6 +62,6 @@ def order_index(cycle: Cycle, order: float) -> int:
 def _wrench_of(direction: Direction, part: SliderCrank) -> tuple[float, ...]:
     # wrench of a unit load of a cylinder
     if direction is Direction.ROLL:
-        return 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
+        return tuple(ROLL.tolist())
     axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
     return plane_parts(axis.imag, axis.real, part.x, part.shaft)

@@ -251,6 +251,6 @@ def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tu
     # signals over their common period, and the number of samples in it
     period_base = common_base([signal.repeat_order() for signal in signals])
     periods = period_base / base
-    if periods.denominator > 1 or samples % periods:
+    if periods.denominator > 1 or samples % periods.numerator:
         return with_common_base(base, signals), samples
-    return [signal.with_base(period_base) for signal in signals], samples // int(periods)
+    return [signal.with_base(period_base) for signal in signals], samples // periods.numerator

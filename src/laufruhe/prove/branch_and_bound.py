@@ -320,7 +320,7 @@ def bisect_box(
     witness
         Known design that checks the bounds, or None.
     """
-    return next(bisect_in_stages(bounder, lower, upper, value, gap_tolerance, max_boxes, (1.0,), witness))
+    return next(bisect_in_stages(bounder, lower, upper, value, gap_tolerance, max(max_boxes, 1), (1.0,), witness))
 
 
 def bisect_in_stages(

@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
-CHANNELS = (channels.SAG, channels.FREQUENCIES, channels.TOTAL_STIFFNESS)
+Form: TypeAlias = Callable[[Array], tuple[Array, float]]
 # coefficients of (1 - t) and t times 1, s and s^2, s = 2 t - 1, in the basis (1 - t)^3, 3 (1 - t)^2 t, 3 (1 - t) t^2,
 # t^3: shape (4, ends, powers)
 _TIMES = np.array(
@@ -80,7 +81,7 @@ class RestLimits:
         weight = weight_wrench(block)
         # weight of the block in coordinates with unit mass, and its size [N]
         self._pull, self._weight = mass_root(block) @ weight, -float(weight[2])
-        self._limits = [limit for limit in problem.mount_limits if limit.measure.channel in CHANNELS]
+        self._limits = [limit for limit in problem.mount_limits if limit.measure.channel in OVER]
         gains = [
             [d.gain for d in decision.mount_drives if d.number < STIFFNESS.stop] for decision in problem.mount_decisions
         ]
@@ -90,39 +91,43 @@ class RestLimits:
         """Return Bernstein coefficients of lower bounds of the relative violation of each limit, shape (4^n,) each."""
         if not self._limits:
             return []
-        count, bernstein = len(lower), coefficients(len(lower))
-        middle, form = open_stiffness(self._problem, lower, upper)
+        box = lower, upper, *open_stiffness(self._problem, lower, upper)
+        return [violation for limit in self._limits for violation in OVER[limit.measure.channel](self, limit, *box)]
 
-        def sag(limit: Limit) -> list[Array]:
-            maximum = limit.maximum * self._weight * (1.0 + SLACK)
-            if not 0.0 < maximum < math.inf:
-                return []
-            y = np.asarray(np.linalg.solve(middle, self._pull), dtype=np.float64)
-            powers, remainder = form(y)
-            return [(2.0 * float(self._pull @ y) - bernstein @ powers - remainder - maximum) / maximum]
+    def _sag(self, limit: Limit, lower: Array, _: Array, middle: Array, form: Form) -> list[Array]:
+        maximum = limit.maximum * self._weight * (1.0 + SLACK)
+        if not 0.0 < maximum < math.inf:
+            return []
+        y = np.asarray(np.linalg.solve(middle, self._pull), dtype=np.float64)
+        powers, remainder = form(y)
+        return [(2.0 * float(self._pull @ y) - coefficients(len(lower)) @ powers - remainder - maximum) / maximum]
 
-        def frequencies(limit: Limit) -> list[Array]:
-            # modes at the middle by rising frequency
-            modes: Array = np.linalg.eigh(0.5 * (middle + middle.T))[1]
-            violations = []
-            if limit.minimum > 0.0:
-                powers, remainder = form(modes[:, 0])
-                minimum = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2
-                violations.append((minimum - bernstein @ powers - remainder) / minimum)
-            if limit.maximum < math.inf:
-                powers, remainder = form(modes[:, -1])
-                maximum = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2
-                violations.append((bernstein @ powers - remainder - maximum) / maximum)
-            return violations
+    def _frequencies(self, limit: Limit, lower: Array, _: Array, middle: Array, form: Form) -> list[Array]:
+        # modes at the middle by rising frequency
+        modes: Array = np.linalg.eigh(0.5 * (middle + middle.T))[1]
+        violations = []
+        if limit.minimum > 0.0:
+            powers, remainder = form(modes[:, 0])
+            minimum = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2
+            violations.append((minimum - coefficients(len(lower)) @ powers - remainder) / minimum)
+        if limit.maximum < math.inf:
+            powers, remainder = form(modes[:, -1])
+            maximum = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2
+            violations.append((coefficients(len(lower)) @ powers - remainder - maximum) / maximum)
+        return violations
 
-        def total_stiffness(limit: Limit) -> list[Array]:
-            ends = [float(numbers[:, STIFFNESS].sum()) for numbers in number_ranges(self._problem, lower, upper)]
-            slopes = 0.5 * (upper - lower) * self._stiffness_slopes
-            total = bernstein @ np.concatenate([[0.5 * sum(ends)], slopes, np.zeros(count**2)])
-            edges = ((1.0, limit.maximum), (-1.0, limit.minimum))
-            return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
+    def _total_stiffness(self, limit: Limit, lower: Array, upper: Array, *_: object) -> list[Array]:
+        ends = [float(numbers[:, STIFFNESS].sum()) for numbers in number_ranges(self._problem, lower, upper)]
+        slopes = 0.5 * (upper - lower) * self._stiffness_slopes
+        powers = np.concatenate([[0.5 * sum(ends)], slopes, np.zeros(len(lower) ** 2)])
+        total = coefficients(len(lower)) @ powers
+        edges = ((1.0, limit.maximum), (-1.0, limit.minimum))
+        return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
 
-        violations_of: dict[Channel, Callable[[Limit], list[Array]]] = {
-            channels.SAG: sag, channels.FREQUENCIES: frequencies, channels.TOTAL_STIFFNESS: total_stiffness,
-        }  # fmt: skip
-        return [violation for limit in self._limits for violation in violations_of[limit.measure.channel](limit)]
+
+# Bernstein coefficients by channel
+OVER: Mapping[Channel, Callable[..., list[Array]]] = {
+    channels.SAG: RestLimits._sag,
+    channels.FREQUENCIES: RestLimits._frequencies,
+    channels.TOTAL_STIFFNESS: RestLimits._total_stiffness,
+}

@@ -47,8 +47,8 @@ class Radial(LayoutKind):
         count, none = inputs.cylinders, (0.0,) * inputs.cylinders
         _check(inputs)
         banks = tuple(math.tau * k / count for k in range(count))
-        on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, bank, 0.0) for k, bank in enumerate(banks)]
         try:
+            on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, bank, 0.0) for k, bank in enumerate(banks)]
             late = tuple(part.fires_at for part in _hinged(inputs, on_crank))
         except KeyedError:
             raise
