@@ -153,7 +153,7 @@ def _one_row(designs: Designs) -> Designs:
 
 
 def pruned() -> list[str]:
-    """Scenes whose symmetry leaves something out, beside themselves with nothing left out."""
+    """ProblemFiles whose symmetry leaves something out, beside themselves with nothing left out."""
     lines = [
         "## What pruning alone gives",
         "",

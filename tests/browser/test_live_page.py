@@ -28,7 +28,7 @@ def test_numbers_are_those_of_the_exact_model(page: Page, tmp_path, name):
         found = evaluated(problem, model, values)
         if problem.objective:
             assert shown["objective"] == pytest.approx(objective_value(problem, found), rel=1e-11)
-        told = {name for name, _ in model.unmoved}
+        told = {name for name, _ in model.without_slider}
         for limit in problem.limits:
             if limit.name not in told:
                 value = found.check_limit(limit).value

@@ -14,7 +14,7 @@ from laufruhe.errors import SolverError
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.studies import reader as study_files
 from laufruhe.studies import runner, scenes
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 INPUTS = Path(__file__).parent / "inputs"
@@ -67,7 +67,7 @@ def test_every_file_that_a_scene_names_counts(tables: dict[str, object], tmp_pat
     point, rows = Point(CaseTable(name="a", problem="a.toml"), base=tables), tmp_path / "rows.csv"
 
     def mark() -> str:
-        return Scenes(tmp_path).fingerprint(point, {})
+        return ProblemFiles(tmp_path).fingerprint(point, {})
 
     absent = mark()
     rows.write_text("1,2\n", encoding="utf-8")
@@ -82,15 +82,15 @@ def test_every_file_that_a_scene_names_counts(tables: dict[str, object], tmp_pat
 def test_which_of_two_files_it_is_counts(tmp_path: Path) -> None:
     point = Point(CaseTable(name="a", problem="a.toml"), base={"gas": {"files": ["a.csv", "b.csv"]}})
     (tmp_path / "a.csv").write_text("1,2\n", encoding="utf-8")
-    first = Scenes(tmp_path).fingerprint(point, {})
+    first = ProblemFiles(tmp_path).fingerprint(point, {})
     (tmp_path / "a.csv").rename(tmp_path / "b.csv")
-    assert Scenes(tmp_path).fingerprint(point, {}) != first
+    assert ProblemFiles(tmp_path).fingerprint(point, {}) != first
 
 
 @pytest.mark.parametrize("text", ["a\x00b", "x" * 5000, "", ".", "/dev/zero", "\ud800"])
 def test_texts_that_name_no_file_do_no_harm(text: str, tmp_path: Path) -> None:
     point = Point(CaseTable(name="a", problem="a.toml"), base={"title": text})
-    assert Scenes(tmp_path).fingerprint(point, {}) == Scenes(tmp_path).fingerprint(point, {})
+    assert ProblemFiles(tmp_path).fingerprint(point, {}) == ProblemFiles(tmp_path).fingerprint(point, {})
 
 
 @pytest.mark.slow

@@ -124,7 +124,7 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     assert phasing is not None
     assert ranked is not None
     (candidate,) = candidates_of(phasing, ranked.ranking[rank : rank + 1])
-    star = solve(replace(phasing.realise(candidate), phasing=None))
+    star = solve(replace(phasing.problem_of(candidate), phasing=None))
     assert star.objective is not None
     claim = Certificate(Proof.GLOBAL, star.objective.value, 0.0, 0.0, "a false bound")
     lie = with_star(result.problem, phasing, star, candidate, claim, replace(ranked, ranking=ranked.ranking[rank:]))
@@ -143,7 +143,7 @@ def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> Non
     phasing, throws = problem.phasing, tuple(math.tau * k / 7 for k in range(7))
     layout = phasing.layout_of(Candidate(throws))
     candidate = Candidate(throws, next(lap_orders(phasing.cycle, layout, throws)))
-    star = evaluate_only(replace(phasing.realise(candidate), phasing=None))
+    star = evaluate_only(replace(phasing.problem_of(candidate), phasing=None))
     assert star.objective is not None
     ranked = ranked_star(phasing, candidate, None, star.objective.value, 0.0, False)
     details = ranking_result(phasing, candidate, [ranked], 1, 1, "one star")

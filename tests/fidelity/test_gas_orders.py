@@ -89,7 +89,7 @@ def _roll_of_star(fidelity: Fidelity) -> dict[float, complex]:
     problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(fidelity)
     assert problem.phasing is not None
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
-    star = problem.phasing.realise(Candidate(throws, (1, 2, 4, 5, 3)))
+    star = problem.phasing.problem_of(Candidate(throws, (1, 2, 4, 5, 3)))
     symbols = UnevenSymbols([ca.DM(angle) for angle in throws], None, None, ca.DM(0, 1))
     lines = UnevenModel(star, problem.phasing.layout(None, None), {}, symbols).wrench(star.points[0])
     real, imaginary = (np.array(ca.DM(part))[3] for part in (lines.real, lines.imaginary))
@@ -101,7 +101,7 @@ def test_stars_keep_the_choice() -> None:
     problem = load(PROBLEMS / "inline-five-uneven-gas.toml").at(Fidelity(samples=720, gas_orders=4))
     assert problem.phasing is not None
     throws = tuple(math.tau * k / 5.0 for k in (0, 3, 2, 1, 4))
-    star = problem.phasing.realise(Candidate(throws, (1, 2, 4, 5, 3)))
+    star = problem.phasing.problem_of(Candidate(throws, (1, 2, 4, 5, 3)))
     assert star.fidelity.gas_orders == 4
     found, best = evaluate(star), reference(star)
     value, truth = objective_value(star, found), objective_value(star, best)

@@ -60,7 +60,7 @@ def test_every_measure_is_there_and_signals_are_shared(every):
         *(limit.name for limit in problem.limits),
     ]
     assert len({shown.signal for shown in model.measures if "mount force" in shown.name}) == 1
-    assert model.unmoved == ()
+    assert model.without_slider == ()
 
 
 def test_a_saved_file_is_evaluated_alike(every):
@@ -81,8 +81,8 @@ def test_a_saved_file_is_evaluated_alike(every):
 )
 def test_what_does_not_move_is_named_with_a_way_to_move_it(name, still):
     model = model_of(load(PROBLEMS / f"{name}.toml"))
-    assert still in {name for name, _ in model.unmoved}
-    assert all("laufruhe page" in why for _, why in model.unmoved)
+    assert still in {name for name, _ in model.without_slider}
+    assert all("laufruhe page" in why for _, why in model.without_slider)
     assert bool(model.sliders) != bool(model.why_not)
 
 
@@ -120,7 +120,7 @@ def test_a_problem_with_nothing_open_has_no_sliders():
         "{ between = [0, 360] }", "0"
     )
     model = model_of(load(closed))
-    assert model.sliders == model.unmoved == ()
+    assert model.sliders == model.without_slider == ()
 
 
 def test_headings_of_a_live_report_can_be_gone_to(every):
@@ -164,7 +164,7 @@ def test_a_norm_that_the_script_does_not_know_is_not_followed(every):
     assert len(unknown) == 2
     assert all(shown.signal is None and not shown.followed for shown in unknown)
     assert all(shown.signal is not None for shown in model.measures if shown not in unknown)
-    assert {name for name, why in model.unmoved if why.startswith("cannot be followed live")} == {
+    assert {name for name, why in model.without_slider if why.startswith("cannot be followed live")} == {
         shown.name for shown in unknown
     }
 

@@ -255,7 +255,7 @@ def test_no_star_near_an_uneven_one_is_better(uneven):
     for _ in range(400):
         size = 10.0 ** generator.uniform(-4, -1.5)
         throws = tuple(t + (size * generator.normal() if k else 0.0) for k, t in enumerate(candidate.throws))
-        own = replace(phasing.realise(replace(candidate, throws=throws)), phasing=None)
+        own = replace(phasing.problem_of(replace(candidate, throws=throws)), phasing=None)
         mounts = [
             float(np.clip(values[d.name] * (1 + size * generator.normal()), d.lower, d.upper))
             for d in own.mount_decisions
@@ -283,7 +283,7 @@ def test_the_program_of_moved_throws_says_what_the_exact_model_says(quantity, tm
     problem = problem_of(tmp_path, *parts(objective=objective), UNEVEN)
     phasing = problem.phasing
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
-    own = replace(phasing.realise(star), phasing=None)
+    own = replace(phasing.problem_of(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
     joint = SmoothProgram(own, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])
@@ -309,7 +309,7 @@ def test_the_program_of_moved_throws_has_the_gas_of_the_exact_model(quantity, tm
     engine = changed(engine, ("[[operating_points]]", 'bore = "85 mm"\n[[operating_points]]'))
     phasing = problem_of(tmp_path, engine, *rest, gas, UNEVEN).phasing
     star = Candidate((0.0, math.pi, math.pi, 0.0), (1, 3, 4, 2))
-    own = replace(phasing.realise(star), phasing=None)
+    own = replace(phasing.problem_of(star), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout(None, None), star, phasing.intervals)
     joint = SmoothProgram(own, 100.0, moves=moves)
     value = ca.Function("f", [joint.program.x, joint.program.parameters], [joint.program.objective])

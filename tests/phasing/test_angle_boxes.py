@@ -84,7 +84,7 @@ def _at(problem: Problem, angle: float, of_bank: bool, order: tuple[int, ...] = 
     geometry = (angle, phasing.split[0] if phasing.split else 0.0) if of_bank else (phasing.bank[0], angle)
     layout = phasing.layout(*geometry)
     throw = (layout.banks[0] - layout.pin_offsets[0]) % math.tau
-    return replace(phasing.realise(Candidate((throw,), order, *geometry)), phasing=None)
+    return replace(phasing.problem_of(Candidate((throw,), order, *geometry)), phasing=None)
 
 
 VEE = changed(TWIN, "cylinders = 2", "cylinders = 4")
@@ -141,7 +141,7 @@ def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, nam
         if angles is None:
             continue
         design, seen = _design(problem, window, angles), seen + 1
-        there = replace(phasing.realise(design), phasing=None)
+        there = replace(phasing.problem_of(design), phasing=None)
         matrix, constants = firing.rows(window)
         turns = firing_turns(phasing.layout_of(design), design.throws, design.firing_order)
         assert matrix @ angles + constants == pytest.approx(intervals_of(phasing.cycle, turns), abs=1e-9)
@@ -178,7 +178,7 @@ def test_no_design_in_a_box_of_throws_and_angles_goes_under_its_bound(text: str,
         reach = math.radians(width) * rng.uniform(0.0, 1.0, (2, len(angles)))
         box = programs.box(programs.program(window), angles - reach[0], angles + reach[1], 0.0, math.inf)
         design = _design(problem, window, angles)
-        value = StarDesign(design, solve_fixed(replace(phasing.realise(design), phasing=None))).value
+        value = StarDesign(design, solve_fixed(replace(phasing.problem_of(design), phasing=None))).value
         assert box is not None
         assert box.bound <= value * (1.0 + 1e-9)
         assert np.all((box.lower <= angles + 1e-9) & (angles <= box.upper + 1e-9))

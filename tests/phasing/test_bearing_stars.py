@@ -195,7 +195,7 @@ def test_rows_of_stresses_that_one_throw_brings_to_the_next_are_those_of_the_exa
     rows = model.at(model.samples)
     for star in family.stars:
         order = tuple(map(int, star))
-        own = phasing.realise(family.candidate(phasing, order))
+        own = phasing.problem_of(family.candidate(phasing, order))
         term = rows.at(order).terms[0][1]
         exact = evaluate(own).value(own.objective[0].measure)
         assert term.norm.value(term.grid, term.constant) == pytest.approx(exact, rel=1e-9)

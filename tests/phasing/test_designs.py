@@ -68,7 +68,7 @@ def test_rows_of_a_star_are_those_of_the_exact_model(tmp_path, name):
     rng = np.random.default_rng(3)
     for star in stars[rng.integers(0, len(stars), 4)]:
         x = np.concatenate([0.2 * d.scale * rng.uniform(0.0, 1.0, d.width) for d in model.domains])
-        given = model.phasing.realise(model.phasing.star(star, model.space.phases, model.geometry))
+        given = model.phasing.problem_of(model.phasing.star(star, model.space.phases, model.geometry))
         unbalances = [domain.complex_value(x) for domain in model.domains]
         # decisions at any angle are counted from upright in the model: with equal drives that is the same rotor
         turned = [u if not d.set.free_angle else u * _turn(d) for u, d in zip(unbalances, given.decisions, strict=True)]
@@ -94,7 +94,7 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
     candidate = replace(
         model.phasing.star(star, model.space.phases, model.geometry), left_out=model.phasing.without(built)
     )
-    alone = solve(replace(model.phasing.realise(candidate), phasing=None))
+    alone = solve(replace(model.phasing.problem_of(candidate), phasing=None))
     assert alone.certificate.kind is Proof.GLOBAL
     assert found.value == pytest.approx(alone.objective.value, rel=2e-4)
     assert coarse_value(model, star, built) == pytest.approx(found.value, rel=0.02)

@@ -70,7 +70,7 @@ def test_the_best_of_all_even_cranks(tmp_path, seed):
     values = []
     for geometry in phasing.geometries:
         for throws in even_cranks(phasing, geometry):
-            crank = phasing.realise(Candidate(throws, None, *geometry))
+            crank = phasing.problem_of(Candidate(throws, None, *geometry))
             values.append(objective_value(crank, evaluate(crank)))
     found = solve(problem)
     if not values:

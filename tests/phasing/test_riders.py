@@ -52,7 +52,7 @@ def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[flo
     )  # fmt: skip
     throws, phasing = (0.0, 4.3, 2.0), problem.phasing
     candidate = Candidate(throws, (1, 2, 3), *phasing.minimum_geometry)
-    given = replace(phasing.realise(candidate), phasing=None)
+    given = replace(phasing.problem_of(candidate), phasing=None)
     given = replace(given, decisions=tuple(
         replace(d, set=Interval(*own, d.set.angle)) if d.set.width == 1 and d.name.startswith("sized") else d
         for d in given.decisions

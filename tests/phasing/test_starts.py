@@ -39,7 +39,7 @@ def test_a_star_turned_back(tmp_path, layout):
     assert min(intervals) > SOONEST
     assert max(intervals) - min(intervals) > 0.1
     assert any(np.allclose(np.roll(intervals[::-1], k), turned, atol=1e-12) for k in range(6))
-    problems = [replace(phasing.realise(own), phasing=None) for own in (star, back)]
+    problems = [replace(phasing.problem_of(own), phasing=None) for own in (star, back)]
     values = [objective_value(problem, evaluate(problem)) for problem in problems]
     # the samples stand elsewhere in the cycle
     assert values[0] == pytest.approx(values[1], rel=1e-6)
@@ -125,4 +125,4 @@ def test_an_order_that_throws_cannot_fire_in_is_no_design_and_no_complaint(tmp_p
     engine = "throws = [0, 180, { between = [150, 200] }, 0]\nfiring_order = [1, 3, 4, 2]"
     phasing = engines.problem(tmp_path, 4, "two-stroke", engine.replace("0]", "90]"), "", engines.COUPLE).phasing
     with pytest.raises(ModelError, match="cannot fire in the order"):
-        phasing.realise(Candidate((0.0, 1.0, 2.0, 3.0), (1, 2, 3, 4)))
+        phasing.problem_of(Candidate((0.0, 1.0, 2.0, 3.0), (1, 2, 3, 4)))

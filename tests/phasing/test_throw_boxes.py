@@ -79,7 +79,7 @@ def programs_of(problem, phasing, window, samples=64):
     """Programs of boxes, as the search makes them."""
     throws = nearest_throws(window, 0.5 * sum(window.box))
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
-    realised = replace(phasing.realise(candidate), phasing=None)
+    realised = replace(phasing.problem_of(candidate), phasing=None)
     rides = rotor_throws_of(phasing, candidate)
     riders = Riders(realised, rides, candidate.throws)
     waves = ThrowWaves(riders.problem, phasing.layout(*phasing.minimum_geometry), rides)
@@ -99,7 +99,7 @@ def drawn(rng, window):
 def exact(phasing, window, throws):
     """The problem of one crank."""
     candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
-    return replace(phasing.realise(candidate), phasing=None)
+    return replace(phasing.problem_of(candidate), phasing=None)
 
 
 def best_of(phasing, window, throws):
@@ -251,7 +251,7 @@ def test_bound_and_design_enclose_the_best_of_a_grid(tmp_path, rest):
         throws = (0.0, math.radians(second), math.radians(third))
         order = next(lap_orders(phasing.cycle, phasing.layout(None, None), throws), None)
         try:
-            one = replace(phasing.realise(Candidate(throws, order)), phasing=None)
+            one = replace(phasing.problem_of(Candidate(throws, order)), phasing=None)
         except ModelError:
             continue
         values.append(objective_value(one, evaluate(one)))

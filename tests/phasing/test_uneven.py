@@ -96,7 +96,7 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     throws = tuple(math.tau * p / 6 for p in (0, *steps))
     order = tuple(int(k) + 1 for k in np.argsort([-angle % math.tau for angle in throws]))
     start = Candidate(throws, order)
-    problem = phasing.realise(start)
+    problem = phasing.problem_of(start)
     given = evaluate(problem).value(problem.objective[0].measure)
     found = local_optimum(phasing, start, phasing.intervals)
     assert found.value <= given
@@ -115,10 +115,10 @@ def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path
     even, bent = (
         Candidate(tuple(math.radians(a) for a in throws), (1, 3, 2)) for throws in ((0, 120, 240), (0, 100, 220))
     )
-    assert not phasing.intervals.holds(phasing.realise(bent).engine.firing_intervals)
+    assert not phasing.intervals.holds(phasing.problem_of(bent).engine.firing_intervals)
     found = local_optimum(phasing, bent, phasing.intervals, with_perturbations=False)
     assert phasing.intervals.holds(found.result.final.engine.firing_intervals, 1e-7)
-    assert found.value <= solve(replace(phasing.realise(even), phasing=None)).objective.value * (1.0 + 1e-6)
+    assert found.value <= solve(replace(phasing.problem_of(even), phasing=None)).objective.value * (1.0 + 1e-6)
 
 
 MODELS = {
@@ -147,7 +147,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     bank, split = (math.radians(81.0), math.radians(22.0)) if layout == "vee" else (None, None)
     count = 3 if layout == "vee" else 6
     start = Candidate(tuple(rng.uniform(0.0, math.tau, count)), None, bank, split)
-    problem = replace(phasing.realise(start), phasing=None)
+    problem = replace(phasing.problem_of(start), phasing=None)
     domains, layout_of_start = domains_of(problem.unbalances), phasing.layout(bank, split)
     moved = tuple(rng.uniform(0.0, math.tau, count))
     bank, split = (math.radians(70.0), math.radians(41.0)) if layout == "vee" else (None, None)
@@ -156,7 +156,7 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     model = UnevenModel(problem, layout_of_start, rotor_throws_of(phasing, start), at)
     quantity = problem.objective[0].measure
     smooth = float(smooth_value(model, quantity, 1e-9))
-    exact = phasing.realise(Candidate(moved, None, bank, split))
+    exact = phasing.problem_of(Candidate(moved, None, bank, split))
     design = exact.design([d.complex_value(columns) for d in domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
     rows, grid = model.rows(quantity)

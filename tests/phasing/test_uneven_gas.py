@@ -52,7 +52,7 @@ def scene(folder, name, rest=MOUNT_FORCE):
 
 
 def model_of(phasing, start, at):
-    problem = replace(phasing.realise(start), phasing=None)
+    problem = replace(phasing.problem_of(start), phasing=None)
     layout = phasing.layout(start.bank_angle, start.split_pin)
     return UnevenModel(problem, layout, rotor_throws_of(phasing, start), at)
 
@@ -60,7 +60,7 @@ def model_of(phasing, start, at):
 def moved(moves, x):
     """Symbols at deviations x, and the exact problem there."""
     return UnevenSymbols(*moves.angles(x), ca.DM(0, 1)), replace(
-        moves.phasing.realise(moves.candidate(x)), phasing=None
+        moves.phasing.problem_of(moves.candidate(x)), phasing=None
     )
 
 
@@ -131,8 +131,10 @@ def test_neither_the_origin_of_the_angle_nor_the_numbering_matters(tmp_path):
     values = [
         objective_value(problem, evaluate(problem))
         for problem in (
-            phasing.realise(replace(start, throws=throws)),
-            phasing.realise(replace(start, throws=throws[::-1], firing_order=tuple(6 - k for k in start.firing_order))),
+            phasing.problem_of(replace(start, throws=throws)),
+            phasing.problem_of(
+                replace(start, throws=throws[::-1], firing_order=tuple(6 - k for k in start.firing_order))
+            ),
         )
     ]
     assert values[0] == pytest.approx(values[1], rel=1e-9)
@@ -158,7 +160,7 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     for degrees in sorted({*range(low, high + 1, 10), *range(near - 10, near + 11, 2)}):
         middle = (math.radians(degrees),)
         tail = (math.radians(240.0),) if count == 3 else ()
-        exact = replace(phasing.realise(Candidate((0.0, *middle, *tail), order)), phasing=None)
+        exact = replace(phasing.problem_of(Candidate((0.0, *middle, *tail), order)), phasing=None)
         grid[degrees] = objective_value(exact, evaluate(exact))
     minimum = min(grid, key=grid.get)
     assert result.objective.value <= grid[minimum] * (1.0 + 2e-4)
@@ -174,9 +176,9 @@ def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
     """Gas alone: even firing cancels orders 1 and 2 of three cylinders, but adds up order 3."""
     rest = GAS + f'[objective]\nminimise = "rms roll moment"\n{orders}\n'
     phasing = engines.problem(tmp_path, 3, phasing=ALLOWED, rest=rest).phasing
-    light = replace(phasing, realise=lambda candidate: _light(phasing.realise(candidate)))
+    light = replace(phasing, problem_of=lambda candidate: _light(phasing.problem_of(candidate)))
     start = Candidate(tuple(math.tau * t / 3.0 for t in (0, 1, 2)), (1, 3, 2))
-    given = light.realise(start)
+    given = light.problem_of(start)
     even = objective_value(given, evaluate(given))
     found = local_optimum(light, start, phasing.intervals)
     if stays:
@@ -189,7 +191,7 @@ def test_even_firing_stays_where_it_is_best(tmp_path, orders, stays):
     rng = np.random.default_rng(7)
     for _ in range(20):
         throws = tuple(a + rng.uniform(-0.2, 0.2) * (k > 0) for k, a in enumerate(found.candidate.throws))
-        near = light.realise(replace(found.candidate, throws=throws))
+        near = light.problem_of(replace(found.candidate, throws=throws))
         if phasing.intervals.holds(near.engine.firing_intervals):
             assert objective_value(near, evaluate(near)) > found.value * (1.0 - 2e-4)
 

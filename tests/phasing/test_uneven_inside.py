@@ -93,13 +93,13 @@ def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytes
     problem = problem_of(engine, "rms main-bearing force", throws, **told)
     phasing = problem.phasing
     start = start_candidates(phasing, None, True)[0]
-    own = replace(phasing.realise(start), phasing=None)
+    own = replace(phasing.problem_of(start), phasing=None)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, phasing.intervals)
     turns, columns = ca.MX.sym("t", moves.size), ca.MX.sym("u", 1)
     model = OpenCrankLoads(own, moves, turns, columns)
     rng = np.random.default_rng(7)
     x = np.clip(rng.uniform(-0.1, 0.1, moves.size), moves.lower, moves.upper)
-    moved = replace(phasing.realise(moves.candidate(x)), phasing=None)
+    moved = replace(phasing.problem_of(moves.candidate(x)), phasing=None)
     weight = domains_of(moved.unbalances)[0].complex_value(np.array([0.03]))
     exact = evaluate(moved, moved.design([weight], moved.unbalances))
     for load in LOADS:
@@ -120,14 +120,14 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
     for problem in cases:
         phasing, windows = problem.phasing, windows_of(problem, problem.phasing)
         start = start_candidates(phasing, None, True)[0]
-        own = replace(phasing.realise(start), phasing=None)
+        own = replace(phasing.problem_of(start), phasing=None)
         waves = ThrowWaves(own, phasing.layout_of(start), rotor_throws_of(phasing, start))
         measure = own.objective[0].measure
         norm = waves.norm(measure, waves.samples(measure, 192))
         window = windows[rng.integers(len(windows))]
         throws = nearest_throws(window, rng.uniform(*window.box))
         told = tuple(float(angle) % math.tau for angle in throws)
-        moved = replace(phasing.realise(replace(start, throws=told, firing_order=window.order)), phasing=None)
+        moved = replace(phasing.problem_of(replace(start, throws=told, firing_order=window.order)), phasing=None)
         rows = norm.fixed.constant.copy()
         for part, wave in zip(waves.parts, norm.waves, strict=True):
             lap = 0 if part.cylinder is None else window.laps[part.cylinder]
@@ -167,7 +167,7 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     minimum = math.inf
     for throws in itertools.product(*bounds):
         candidate = replace(start_candidates(phasing, None, True)[0], throws=tuple(map(float, throws)))
-        own = replace(phasing.realise(candidate), phasing=None)
+        own = replace(phasing.problem_of(candidate), phasing=None)
         minimum = min(minimum, solve_fixed(own).objective.value if weights else objective_value(own, evaluate(own)))
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
     assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
@@ -186,7 +186,7 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
     values = []
     for bank in np.radians(np.linspace(60, 120, 13)):
         throw = 0.5 * (bank - start.bank_angle) + start.throws[0]
-        own = replace(phasing.realise(replace(start, bank_angle=float(bank), throws=(float(throw),))), phasing=None)
+        own = replace(phasing.problem_of(replace(start, bank_angle=float(bank), throws=(float(throw),))), phasing=None)
         values.append(objective_value(own, evaluate(own)))
     assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-5)
     assert result.objective.value <= min(values) * (1.0 + 1e-4)
@@ -212,7 +212,7 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
     for throws in itertools.product(
         *(np.linspace(*pair, 6 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
     ):
-        own = replace(phasing.realise(replace(start, throws=tuple(map(float, throws)))), phasing=None)
+        own = replace(phasing.problem_of(replace(start, throws=tuple(map(float, throws)))), phasing=None)
         found = evaluate(own)
         if found.value(degree) <= maximum:
             minimum = min(minimum, objective_value(own, found))
@@ -240,7 +240,7 @@ def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
     start, shares = start_candidates(phasing, None, True)[0], []
     for _ in range(12):
         throws = (0.0, *rng.uniform(1.0, 5.0, 2))
-        own = replace(phasing.realise(replace(start, throws=throws, firing_order=None)), phasing=None)
+        own = replace(phasing.problem_of(replace(start, throws=throws, firing_order=None)), phasing=None)
         speed = float(rng.uniform(60.0, 400.0))
         own = replace(own, points=tuple(replace(point, speed=speed) for point in own.points))
         found, point = evaluate(own), own.points[0]
@@ -299,7 +299,7 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     values = []
     start = start_candidates(problem.phasing, None, True)[0]
     for angle in np.radians(np.linspace(100, 140, 9)):
-        own = problem.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
+        own = problem.phasing.problem_of(replace(start, throws=(0.0, float(angle), start.throws[2])))
         decision = own.mount_decisions[0]
         for stiffness in np.linspace(decision.lower, decision.upper, 6):
             found = evaluate(own, own.design([float(stiffness)], [decision]))
@@ -311,7 +311,7 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     both = problem_of(crank, "", **told | {"objective": {"terms": even}})
     turned, values = searched(both), []
     for angle, stiffness in itertools.product(np.radians([100, 110, 120, 130, 140]), (0.0, 0.5, 1.0)):
-        own = both.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
+        own = both.phasing.problem_of(replace(start, throws=(0.0, float(angle), start.throws[2])))
         (decision,) = own.mount_decisions
         held = own.fixed_at([decision.lower + stiffness * (decision.upper - decision.lower)])
         values += [objective_value(held, evaluate(held))]

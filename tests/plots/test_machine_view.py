@@ -13,7 +13,7 @@ from PIL import Image
 from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.plots import motion
-from laufruhe.plots.machine_view import Scene, reaches
+from laufruhe.plots.machine_view import EngineView, reaches
 from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
@@ -50,12 +50,12 @@ def test_a_half_disc_has_the_unbalance_that_it_stands_for() -> None:
 
 def test_what_was_decided_is_marked() -> None:
     result = scenes.solved(scenes.TIGHT)
-    scene = Scene.from_result(result)
-    assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
-    assert not scene.cranks
+    view = EngineView.from_result(result)
+    assert view.rotors == {rotor.name for rotor in result.final.engine.rotors}
+    assert not view.cranks
     labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]
     assert "weight, optimised" in labels
-    front, side = reaches(scene)
+    front, side = reaches(view)
     assert front
     assert side
 
@@ -69,8 +69,8 @@ def test_what_was_decided_is_marked() -> None:
 )  # fmt: skip
 def test_leads_masses_and_sizes_that_are_open_are_marked(name: str, cranks: int, pistons: int, rods: bool) -> None:
     result = evaluate_only(load(PROBLEMS / f"{name}.toml"))
-    scene = Scene.from_result(result)
-    assert (len(scene.cranks), len(scene.pistons), scene.rods) == (cranks, pistons, rods)
+    view = EngineView.from_result(result)
+    assert (len(view.cranks), len(view.pistons), view.rods) == (cranks, pistons, rods)
     labels = {text.get_text() for text in engine.figure(result).legends[0].get_texts()}
     told = {"crank, open": cranks, "piston, open": pistons, "rod, open": rods}
     assert {label for label, count in told.items() if count} == labels & set(told)

@@ -255,7 +255,7 @@ def test_no_star_moves_what_is_constant() -> None:
         if problem is None or problem.phasing is None or problem.phasing.throws is not None:
             continue
         stars = [star for star, _ in even_stars(problem.phasing)][:2]
-        at = [evaluate(whole := problem.phasing.realise(star), whole.engine) for star in stars]
+        at = [evaluate(whole := problem.phasing.problem_of(star), whole.engine) for star in stars]
         for channel in CHANNELS.values():
             told = [_numbers(channel, evaluation) for evaluation in at]
             if len(told) > 1 and dependence(channel, Kind.STAR, problem) is Dependence.NONE:

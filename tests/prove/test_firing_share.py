@@ -40,7 +40,7 @@ def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, e
     random, found = np.random.default_rng(3), []
     stars = even_stars(own.phasing)
     for k in random.choice(len(stars), 4):
-        realised = replace(own.phasing.realise(stars[int(k)][0]), phasing=None)
+        realised = replace(own.phasing.problem_of(stars[int(k)][0]), phasing=None)
         for size in (0.0, 0.02, 0.3):
             values = [complex(*random.normal(0.0, 0.1 * size, 2)) for _ in realised.unbalances]
             design = evaluate(realised, realised.design(values, realised.unbalances))
@@ -62,5 +62,5 @@ def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
     """Four cylinders fire twice a turn, as the shafts of the second order turn."""
     own = problem("inline", cylinders=4)
     (candidate, _), *_ = even_stars(own.phasing)
-    realised = replace(own.phasing.realise(candidate), phasing=None)
+    realised = replace(own.phasing.problem_of(candidate), phasing=None)
     assert firing_bound(own, evaluate(realised)) == 0.0

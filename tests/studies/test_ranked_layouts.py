@@ -18,7 +18,7 @@ from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 from laufruhe.studies.kinds.layout_comparison import LayoutComparison, _places
-from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.scenes import ProblemFiles
 from one_cylinder import irregularity
 from problem_files import PROBLEMS
 
@@ -57,9 +57,9 @@ def data() -> xr.Dataset:
     told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
     wanted = ("in line 6", "boxer 2", "radial 3")
     told["cases"] = [case for case in told["cases"] if case["name"] in wanted]
-    part, scenes = LayoutComparison.model_validate(told), Scenes(PROBLEMS)
-    points = part.points(scenes)
-    return part.dataset(points, [part.answer(point, scenes) for point in points])
+    part, problem_files = LayoutComparison.model_validate(told), ProblemFiles(PROBLEMS)
+    points = part.points(problem_files)
+    return part.dataset(points, [part.answer(point, problem_files) for point in points])
 
 
 def test_what_looks_equal_on_the_page_has_one_place() -> None:
@@ -101,12 +101,12 @@ def test_the_page_has_a_row_and_the_picture_a_panel_for_each(data: xr.Dataset) -
 
 def test_the_ready_study_has_every_layout_from_one_to_twelve_cylinders() -> None:
     told = tomllib.loads((PROBLEMS / "layouts-equal-power.toml").read_text(encoding="utf-8"))["study"]["parts"][0]
-    part, scenes = LayoutComparison.model_validate(told), Scenes(PROBLEMS)
-    engines = [scenes.problem(point).engine for point in part.points(scenes)]
+    part, problem_files = LayoutComparison.model_validate(told), ProblemFiles(PROBLEMS)
+    engines = [problem_files.problem(point).engine for point in part.points(problem_files)]
     assert len(engines) == 33
     assert {case.equal_power_to for case in part.cases} == {4}
     assert part.further == FURTHER
     assert all(len(engine.bearings) > 1 for engine in engines)
     power = [sum(p.piston_area * p.crank_radius for p in e.slider_cranks) for e in engines]
-    speeds = [scenes.problem(point).points[0].speed for point in part.points(scenes)]
+    speeds = [problem_files.problem(point).points[0].speed for point in part.points(problem_files)]
     assert np.array(power) * np.array(speeds) == pytest.approx(power[3] * speeds[3])

@@ -35,7 +35,7 @@ from laufruhe.studies.kinds.layout_comparison import LayoutComparison
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.stores import FINISHED_POINTS
 from laufruhe.studies.swept import solve_scene
 from problem_files import PROBLEMS
@@ -111,7 +111,9 @@ def test_fraction_at_its_optimum_beats_every_fraction_swept(tmp_path: Path, smal
 def test_fraction_over_speed_is_what_solve_finds(tmp_path: Path, small: Path) -> None:
     data = computed(study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(3))), small)
     for k, speed in enumerate((6.0, 9.0, 12.0)):
-        alone = solve(Scenes(small).problem(Point(CaseTable(name="a", problem="single.toml"), {SPEED: f"{speed} m/s"})))
+        alone = solve(
+            ProblemFiles(small).problem(Point(CaseTable(name="a", problem="single.toml"), {SPEED: f"{speed} m/s"}))
+        )
         assert alone.objective is not None
         assert alone.certificate is not None
         assert data["objective"].values[k] == pytest.approx(alone.objective.value, rel=1e-8)
@@ -279,7 +281,7 @@ def test_points_hang_on_all_that_they_use(tmp_path: Path, monkeypatch: pytest.Mo
     case = CaseTable(name="a", problem="single.toml")
 
     def mark(point: Point | None = None, settings: dict[str, object] | None = None) -> str:
-        return Scenes(tmp_path).fingerprint(point or Point(case), settings or {"kind": "x"})
+        return ProblemFiles(tmp_path).fingerprint(point or Point(case), settings or {"kind": "x"})
 
     first = mark()
     assert mark() == first

@@ -16,7 +16,7 @@ from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import dataset, solve_scene
 from problem_files import PROBLEMS
 
@@ -173,7 +173,7 @@ def test_what_a_case_names_anew_is_swept_by_its_new_name(tmp_path: Path) -> None
         study(sweep=swept("counterweights.inner.balance_factor", "values = [0, 1]")) + named
     )
     (part,) = load_study(tmp_path / "s.toml").study.parts
-    assert len(part.points(Scenes(tmp_path))) == 3
+    assert len(part.points(ProblemFiles(tmp_path))) == 3
 
 
 def test_problem_given_to_study_and_study_to_solve(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -199,11 +199,11 @@ def test_equal_power_needs_one_cylinder(tmp_path: Path) -> None:
     )
     (tmp_path / "banks.toml").write_text(text, encoding="utf-8")
     banks = CaseTable(name="banks", problem="banks.toml", equal_power_to=4)
-    assert Scenes(tmp_path).problem(Point(banks.model_copy(update={"equal_power_to": None})))
+    assert ProblemFiles(tmp_path).problem(Point(banks.model_copy(update={"equal_power_to": None})))
     with pytest.raises(
         InputError, match=r"equal_power_to = \"banks\": cylinders differ in bore or stroke.*; make them equal"
     ):
-        Scenes(tmp_path).problem(Point(banks))
+        ProblemFiles(tmp_path).problem(Point(banks))
 
 
 @pytest.mark.parametrize(

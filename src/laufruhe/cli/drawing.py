@@ -67,7 +67,7 @@ def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Cal
     # functions that read and solve have no pickle
     problem = replace(result.problem, origin=None)
     if problem.phasing is not None:
-        problem = replace(problem, phasing=replace(problem.phasing, layout=_no_design, realise=_no_design))
+        problem = replace(problem, phasing=replace(problem.phasing, layout=_no_design, problem_of=_no_design))
     drawn = replace(result, problem=problem, error=float)
     return ask("laufruhe.plots:draw_in_shares", drawn, folder, kinds, min(MAX_VIEWS, processors() - 1))
 

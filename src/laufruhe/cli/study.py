@@ -16,7 +16,7 @@ from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
-from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.scenes import ProblemFiles
 from laufruhe.studies.stores import FINISHED_POINTS
 
 
@@ -47,8 +47,8 @@ def run_study(
 
 def check_study(path: Path) -> tuple[str, Callable[[], str]]:
     """Return the number of points of a study as text, and a function that makes JSON of it."""
-    study, scenes = load_study(path), Scenes(path.parent)
-    points = {part.name: len(part.points(scenes)) for part in study.study.parts}
+    study, problem_files = load_study(path), ProblemFiles(path.parent)
+    points = {part.name: len(part.points(problem_files)) for part in study.study.parts}
     text = f"ok: {printed(study.title)}, {sum(points.values())} points\n"
     return text, lambda: strict({"title": study.title, "points": points})
 

@@ -95,7 +95,7 @@ def open_phasing(
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
     throws = fixed.throws if fixed else engine.listed_throws
 
-    def realise(candidate: Candidate) -> Problem:
+    def problem_of(candidate: Candidate) -> Problem:
         closed_engine = engine
         if engine.kind.openable:
             order = None if candidate.firing_order is None else list(candidate.firing_order)
@@ -118,7 +118,7 @@ def open_phasing(
         bank=_bounds(engine.value_of("bank_angle")),
         split=_bounds(engine.value_of("split_pin_angle")),
         intervals=_intervals(table.intervals, engine, cycle, count, fixed.spread if fixed else 0.0),
-        realise=realise,
+        problem_of=problem_of,
         steps=table.phases,
         shafts=_shaft_choice(shafts, table),
         best=table.best,
@@ -128,7 +128,7 @@ def open_phasing(
     )
     _check(phasing, engine)
     try:
-        problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
+        problem = replace(phasing.problem_of(_first(phasing)), phasing=phasing)
     except ModelError as error:
         raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
     # the smooth program of uneven throws needs an even speed (S19)

@@ -103,7 +103,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             if any(parts.values()):
                 phasing, problem = problem.phasing, finished(problem, None)
                 if phasing is not None:
-                    stars = replace(phasing, realise=lambda star: finished(phasing.realise(star), star))
+                    stars = replace(phasing, problem_of=lambda star: finished(phasing.problem_of(star), star))
                     problem = replace(problem, phasing=stars)
             _check_decisions(problem)
             return replace(problem, origin=Origin(tables, path, _apply_edit))
@@ -154,7 +154,7 @@ def _rebuilt(
     try:
         rebuilt = _of_file(file_model().model_validate(with_followers(tables)), path)
         if candidate is not None and rebuilt.phasing is not None:
-            rebuilt = rebuilt.phasing.realise(candidate)
+            rebuilt = rebuilt.phasing.problem_of(candidate)
     except (ValidationError, Refused, ModelError) as error:
         values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
         faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)

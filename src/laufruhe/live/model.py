@@ -56,14 +56,14 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
     how = SERVED if is_served else HOW.format(file=file)
     fixed = [decision for decision in result.problem.decisions if not decision.is_affine]
     reduced = result.problem.fixed_at([values[decision.name] for decision in fixed], fixed)
-    moving = replace(reduced, phasing=None, extras=())
-    unmoved = tuple(_unmoved(result.problem, how))
-    model = replace(model, unmoved=unmoved, why_not="" if moving.decisions else NO_SLIDERS)
+    slider_problem = replace(reduced, phasing=None, extras=())
+    without_slider = tuple(_without_slider(result.problem, how))
+    model = replace(model, without_slider=without_slider, why_not="" if slider_problem.decisions else NO_SLIDERS)
     try:
-        filled = _filled(model, problem, moving, result, values, is_served)
+        filled = _filled(model, problem, slider_problem, result, values, is_served)
     except ModelError as error:
         return replace(model, why_not=f"The loads cannot be shown while decisions move: {error}.")
-    return replace(filled, save=saved_file(problem, result, moving, values))
+    return replace(filled, save=saved_file(problem, result, slider_problem, values))
 
 
 def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
@@ -81,10 +81,15 @@ def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
 
 
 def _filled(
-    bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value], is_served: bool
+    bare: LiveModel,
+    problem: Problem,
+    slider_problem: Problem,
+    result: Result,
+    values: Mapping[str, Value],
+    is_served: bool,
 ) -> LiveModel:
-    affine = AffineModel(moving)
-    kinds = {decision.kind for decision in moving.decisions}
+    affine = AffineModel(slider_problem)
+    kinds = {decision.kind for decision in slider_problem.decisions}
     # the reason names the source of values that the page cannot compute
     source_text = "it is computed when sliders rest" if is_served else f"its value is that of the final design; {HOW}"
     aside = f"cannot be followed live; {source_text.format(file=bare.file)}"
@@ -95,7 +100,7 @@ def _filled(
     measures = collected.measures()
     designs = [("given", decision_vector(affine.domains))]
     if result.decisions:
-        designs.append(("optimum", decision_vector(affine.domains, [values[d.name] for d in moving.decisions])))
+        designs.append(("optimum", decision_vector(affine.domains, [values[d.name] for d in slider_problem.decisions])))
     designs.append(("between", _between(affine.domains)))
     return replace(
         bare,
@@ -103,9 +108,9 @@ def _filled(
         signals=tuple(collected.signals.values()),
         curves=curves,
         measures=measures,
-        designs=tuple(_design(name, x, moving, affine.domains, collected.queries) for name, x in designs),
+        designs=tuple(_design(name, x, slider_problem, affine.domains, collected.queries) for name, x in designs),
         reference=None if is_served else _reference(result),
-        unmoved=(*bare.unmoved, *collected.unmoved),
+        without_slider=(*bare.without_slider, *collected.without_slider),
     )
 
 
@@ -116,7 +121,7 @@ class _Collected:
         self.model, self.kinds, self.aside = model, kinds, aside
         self.decided = {limit.name: limit for limit in result.limits}
         self.signals: dict[Measure, Signal] = {}
-        self.unmoved: list[tuple[str, str]] = []
+        self.without_slider: list[tuple[str, str]] = []
         self.queries: list[Measure | None] = []
 
     def signal(self, measure: Measure) -> int:
@@ -156,7 +161,7 @@ class _Collected:
             return replace(base, sides=((limit_state.side, limit_state.edge),), value=limit_state.value)
         if follows:
             return replace(base, signal=self.signal(measure))
-        self.unmoved.append((name, self.aside))
+        self.without_slider.append((name, self.aside))
         base = replace(base, followed=False, value=math.nan)
         if (limit_value := self.decided.get(name)) is None:
             return base
@@ -198,9 +203,9 @@ def _between(domains: Sequence[Domain]) -> Array:
 
 
 def _design(
-    name: str, x: Array, moving: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
+    name: str, x: Array, slider_problem: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
 ) -> LiveDesign:
-    evaluation = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
+    evaluation = evaluate(slider_problem, slider_problem.design([domain.complex_value(x) for domain in domains]))
     values = (None if measure is None else float(evaluation.value(measure)) for measure in measures)
     return LiveDesign(name, tuple(map(float, x)), tuple(values))
 
@@ -218,7 +223,7 @@ def _reference(result: Result) -> Reference | None:
     return Reference.from_proof(objective.value, certificate.kind, certificate.gap)
 
 
-def _unmoved(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
+def _without_slider(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     names = problem.phasing.open_names if problem.phasing is not None else ()
     yield from ((name, f"the crank star has no slider here; {how}") for name in names)
     for decision in problem.decisions:

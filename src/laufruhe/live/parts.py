@@ -124,7 +124,7 @@ class LiveModel:
         Given design, decided design if different, and one between the bounds for the page's self-check.
     reference
         Design for comparison; None if a server provides it.
-    unmoved
+    without_slider
         Names of open numbers and measures that do not follow the sliders, with reasons.
     why_not
         Reason why the page has no sliders; empty if it has sliders.
@@ -143,15 +143,15 @@ class LiveModel:
     objective: str = ""
     unit: str = ""
     reference: Reference | None = None
-    unmoved: tuple[tuple[str, str], ...] = ()
+    without_slider: tuple[tuple[str, str], ...] = ()
     save: Saved = NOT_SAVED
     why_not: str = ""
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences about numbers that do not follow sliders."""
-        reasons = dict.fromkeys(why for _, why in self.unmoved)
-        names = {why: ", ".join(name for name, reason in self.unmoved if reason == why) for why in reasons}
+        reasons = dict.fromkeys(why for _, why in self.without_slider)
+        names = {why: ", ".join(name for name, reason in self.without_slider if reason == why) for why in reasons}
         return tuple(f"{names[why]}: {why}." for why in reasons)
 
     @property
@@ -182,7 +182,7 @@ class LiveModel:
                 entry.name: {"x": entry.x, "measured": [*map(_or_none, entry.measured)]} for entry in self.designs
             },
             "objective": {"name": self.objective, **with_unit(self.unit)},
-            "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
+            "unmoved": [{"name": name, "why": why} for name, why in self.without_slider],
             "whyNot": self.why_not,
             "data": data,
         }

@@ -48,8 +48,8 @@ class Saved:
 NOT_SAVED = Saved()
 
 
-def saved_file(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
-    """Return the problem file of a design; placeholders stand for the decisions of `moving`, which have sliders.
+def saved_file(problem: Problem, result: Result, slider_problem: Problem, values: Mapping[str, Value]) -> Saved:
+    """Return the problem file of a design; placeholders stand for the decisions of `slider_problem`.
 
     The file is empty if the reader would not accept it.
     """
@@ -57,7 +57,7 @@ def saved_file(problem: Problem, result: Result, moving: Problem, values: Mappin
         return NOT_SAVED
     tables: Mapping[str, Any] = problem.origin.tables
     numbers, starts = list[tuple[str, str, str]](), list[float]()
-    for decision in moving.decisions:
+    for decision in slider_problem.decisions:
         entries = ((decision.name, decision.unit), (angle_name(decision), "rad"))[: decision.set.width]
         numbers += [(f"@{name}@", name, unit) for name, unit in entries]
         starts += decision.set.split(decision.start)[: decision.set.width]
@@ -78,9 +78,9 @@ def saved_file(problem: Problem, result: Result, moving: Problem, values: Mappin
         read = load_tables(tables_and_path(filled)[0], problem.origin.path)
     except (Refused, InputError) as error:
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
-    engine, moving_engine = _numbers(read.engine), _numbers(moving.engine)
-    is_same = engine.shape == moving_engine.shape and np.allclose(moving_engine, engine, SAME, SAME)
-    if not is_same or read.fidelity != moving.fidelity:
+    engine, slider_engine = _numbers(read.engine), _numbers(slider_problem.engine)
+    is_same = engine.shape == slider_engine.shape and np.allclose(slider_engine, engine, SAME, SAME)
+    if not is_same or read.fidelity != slider_problem.fidelity:
         return Saved(note="This design cannot be written as a problem file that gives the same engine.")
     files = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
     note = f"Save it in the folder of {' and '.join(files)}." if files else ""

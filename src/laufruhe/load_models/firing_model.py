@@ -55,19 +55,19 @@ class FiringModel(StarModel):
         cranks = StarSpace(steps, even_patterns(phasing.cycle, layout), layout.throw_positions)
 
         def without_inside(candidate: Candidate) -> Problem:
-            problem = phasing.realise(candidate)
+            problem = phasing.problem_of(candidate)
             objective = tuple(term for term in problem.objective if _is_of_star(term.measure))
             limits = tuple(limit for limit in problem.limits if _is_of_star(limit.measure))
             return replace(problem, objective=objective, limits=limits)
 
-        star_phasing = replace(phasing, realise=without_inside, firing_order=slot_order(slots))
+        star_phasing = replace(phasing, problem_of=without_inside, firing_order=slot_order(slots))
         super().__init__(star_phasing, cranks, geometry, slot_steps(phasing.cycle, slots))
         # loads that depend on the firing order have the period of the cycle
         self.base = phasing.cycle.base_order
         for model in self.models:
             model.base = self.base
         self.phasing, self.space = phasing, space
-        self.problem = with_upright_angles(phasing.realise(phasing.fired(slots, geometry)))
+        self.problem = with_upright_angles(phasing.problem_of(phasing.fired(slots, geometry)))
         self._slots, self._origin_evaluation = slots, evaluate(self.problem)
 
     def _rows(self, samples: int, averaged: bool) -> StarProblem:
@@ -120,10 +120,10 @@ class FiringModel(StarModel):
         for loads, point in zip(
             self._origin_evaluation.loads, only_gas_of(self.problem, part.name).points, strict=True
         ):
-            signal = load.signal(replace(loads, point=point, moving=isolated))
+            signal = load.signal(replace(loads, point=point, moving_parts=isolated))
             if load.depends_on_unbalances:
                 fidelity = replace(loads.fidelity, gas=False, gas_orders=None)
-                motored = load.signal(replace(loads, point=point, moving=isolated, fidelity=fidelity))
+                motored = load.signal(replace(loads, point=point, moving_parts=isolated, fidelity=fidelity))
                 signal = signal + motored.mapped(np.negative)
             signals.append(signal.with_base(self.base))
         return signals

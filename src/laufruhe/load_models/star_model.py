@@ -123,7 +123,7 @@ class StarModel:
         self.phasing, self.space, self.geometry = phasing, space, geometry
         self.layout: Layout = phasing.layout(*geometry)
         self._origin = space.first if origin is None else origin
-        self.problem = with_upright_angles(phasing.realise(phasing.star(self._origin, space.phases, geometry)))
+        self.problem = with_upright_angles(phasing.problem_of(phasing.star(self._origin, space.phases, geometry)))
         self._full_model = AffineModel(self.problem, keep_all=True)
         self._origin_motored = self._motored(self._origin)
         self._one_moved = {
@@ -151,7 +151,7 @@ class StarModel:
     def _motored(self, star: Sequence[int]) -> AffineModel:
         throws = star_throws(self.layout, star, self.space.phases)
         candidate = Candidate(throws, None, *self.geometry, without_gas=True)
-        return AffineModel(with_upright_angles(self.phasing.realise(candidate)), keep_all=True)
+        return AffineModel(with_upright_angles(self.phasing.problem_of(candidate)), keep_all=True)
 
     def at(self, samples: int, averaged: bool = False) -> StarProblem:
         """Return the problem of all crank stars at a number of samples over the period of the loads.

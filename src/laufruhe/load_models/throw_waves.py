@@ -177,9 +177,12 @@ class ThrowWaves:
         # each cylinder at its dead centre at crank angle zero; loads inside the crankcase keep the idle cylinders
         engine, layout = self.problem.engine, self.layout
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
-            problem, late = only_gas_of(self.problem, part.name), layout.late[k] if layout.late else 0.0
+            problem, delay = (
+                only_gas_of(self.problem, part.name),
+                layout.firing_delays[k] if layout.firing_delays else 0.0,
+            )
             banks = BANK_SAMPLES if self._is_geometry_open.bank else (layout.banks[k],)
-            copies = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
+            copies = (replace(part, bank=bank, throw=bank, firing_angle=delay) for bank in banks)
             evaluations = tuple(evaluate(problem, isolate_cylinder(engine, k, inside, copy)) for copy in copies)
             # fixed angles shift the cylinder in time
             ahead = 0.0 if self._is_geometry_open.bank else -layout.banks[k]

@@ -87,7 +87,7 @@ def turned_loads(
 
     def load(of: Problem, parts: Engine) -> Spectrum:
         wrench = shaking_loads(parts, of.points[0], of.fidelity)
-        return signal(PointLoads(of.points[0], wrench, None, moving=parts, fidelity=of.fidelity)).series
+        return signal(PointLoads(of.points[0], wrench, None, moving_parts=parts, fidelity=of.fidelity)).series
 
     def load_of_cylinder(k: int, bank: float) -> Spectrum:
         part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)

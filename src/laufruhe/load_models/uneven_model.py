@@ -236,10 +236,10 @@ def rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
 @lru_cache(maxsize=16)
 def _rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
     rotor_throws = {}
-    before = rotor_states(phasing.realise(candidate))
+    before = rotor_states(phasing.problem_of(candidate))
     for k in range(len(candidate.throws)):
         throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))
-        after = rotor_states(phasing.realise(replace(candidate, throws=throws)))
+        after = rotor_states(phasing.problem_of(replace(candidate, throws=throws)))
         rotor_throws.update({name: k for name, state in after.items() if state != before[name]})
     return rotor_throws
 

@@ -126,10 +126,10 @@ class Engine:
                 )
         for part in self.slider_cranks:
             crank_angle = part.shaft.ratio * part.firing_angle + part.throw - part.bank - part.fires_at
-            late = math.remainder(crank_angle, math.tau)
-            if abs(late) > 1e-9:
+            deviation = math.remainder(crank_angle, math.tau)
+            if abs(deviation) > 1e-9:
                 fires = f"{part.name} fires at {math.degrees(part.firing_angle):g} deg"
-                raise ModelError(f"{fires}, {math.degrees(late):g} deg from its dead centre")
+                raise ModelError(f"{fires}, {math.degrees(deviation):g} deg from its dead centre")
 
     def extra(self, kind: type[E]) -> E | None:
         """Return the part of an extension by its class, or None."""

@@ -41,7 +41,7 @@ class Facing:
             # pistons in step have half of the chamber each
             return Swept(part)
         chamber = _chamber(part)
-        return Swept(part, charge=chamber, late=chamber.fires_at * part.shaft.ratio)
+        return Swept(part, charge=chamber, firing_delay=chamber.fires_at * part.shaft.ratio)
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,11 @@ from laufruhe.machine.engine import Cycle
 
 Shape: TypeAlias = tuple[tuple[int, float, float], ...]
 """Further cylinders of a throw: slots after the first one, whole turns [rad], share of bank plus split pin angle."""
-Cover: TypeAlias = tuple[tuple[int, Shape], ...]
+SlotAssignment: TypeAlias = tuple[tuple[int, Shape], ...]
 """Assignment of all firings to throws: slot of the first cylinder and shape of every throw."""
 
-# largest number of covers: within the bounds, and with widened bounds; and of steps of the search for them
-_MAX_COVERS = 500
+# largest number of slot assignments: within the bounds, and with widened bounds; and of steps of the search for them
+_MAX_ASSIGNMENTS = 500
 _MAX_BROKEN = 40
 _MAX_LOOKED_AT = 20_000
 # shares of the unevenness allowed, tried one after the other
@@ -66,7 +66,7 @@ class FiringSlots:
     Attributes
     ----------
     sides
-        Share of bank angle plus split pin by which the dead centre of each cylinder of a throw is late.
+        Share of bank angle plus split pin by which the dead centre of each cylinder comes after the angle of its throw.
     angle
         Smallest and largest bank angle plus split pin angle [rad].
     minimum, maximum
@@ -96,9 +96,9 @@ class FiringSlots:
             return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
 
         while True:
-            covers, all_of = self._first_covers(slack, throw_slots)
+            assignments, all_of = self._first_assignments(slack, throw_slots)
             complete = complete and (slack > 0.0 or all_of)
-            patterns = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
+            patterns = [pattern for assignment in assignments if (pattern := self._timed(assignment)) is not None]
             patterns.sort(key=lambda pattern: (round(pattern.broken, 9), unevenness(pattern)))
             minimum = patterns[0].broken if patterns else math.inf
             if minimum <= max(slack, 1e-7) or slack > self.cycle.angle:
@@ -106,20 +106,22 @@ class FiringSlots:
                 return least_broken, complete
             slack = max(0.05 * even, 1.3 * slack)
 
-    def _first_covers(self, slack: float, throw_slots: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
-        """Return covers in order of unevenness, up to a largest number, and True if these are all."""
-        even, covers = self.cycle.angle / self.count, dict[Cover, None]()
-        maximum = min(_MAX_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
+    def _first_assignments(
+        self, slack: float, throw_slots: Sequence[Sequence[int]] | None
+    ) -> tuple[list[SlotAssignment], bool]:
+        """Return assignments in order of unevenness, up to a largest number, and True if these are all."""
+        even, assignments = self.cycle.angle / self.count, dict[SlotAssignment, None]()
+        maximum = min(_MAX_ASSIGNMENTS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
         complete = False
         for share in _SHARES:
             low, high = self.minimum - slack, self.maximum + slack
             narrowed = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
             nodes = itertools.count(1)
-            covers |= dict.fromkeys(itertools.islice(narrowed._covers(throw_slots, nodes), maximum + 1))
-            if len(covers) > maximum or next(nodes) > _MAX_LOOKED_AT:
-                return list(covers)[:maximum], False
+            assignments |= dict.fromkeys(itertools.islice(narrowed._assignments(throw_slots, nodes), maximum + 1))
+            if len(assignments) > maximum or next(nodes) > _MAX_LOOKED_AT:
+                return list(assignments)[:maximum], False
             complete = share == 1.0
-        return list(covers), complete
+        return list(assignments), complete
 
     def _shapes(self) -> list[Shape]:
         """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
@@ -143,7 +145,9 @@ class FiringSlots:
             choices.append(shapes)
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
 
-    def _covers(self, throw_slots: Sequence[Sequence[int]] | None, nodes: Iterator[int]) -> Iterator[Cover]:
+    def _assignments(
+        self, throw_slots: Sequence[Sequence[int]] | None, nodes: Iterator[int]
+    ) -> Iterator[SlotAssignment]:
         """Yield assignments of all firings to throws; `nodes` counts the steps of the search."""
         count, shapes = self.count, self._shapes()
         if throw_slots is not None:
@@ -180,8 +184,8 @@ class FiringSlots:
                 seen.add(turned)
                 yield tuple((first, shapes[number]) for first, number in turned)
 
-    def _timed(self, cover: Cover) -> FiringPattern | None:
-        """Return the firing angles of a cover that violate bounds least, and then are most even; None without any."""
+    def _timed(self, assignment: SlotAssignment) -> FiringPattern | None:
+        """Return the firing angles that violate bounds least and then are most even; None if there are none."""
         from scipy.optimize import linprog
 
         count, cycle_angle = self.count, self.cycle.angle
@@ -200,7 +204,7 @@ class FiringSlots:
         rows = np.concatenate([steps - uneven, -steps - uneven, steps - broken, -steps - broken])
         maximum = np.concatenate([even - turn, turn - even, self.maximum - turn, turn - self.minimum])
         fixed, values, members = [], [], []
-        for first, shape in cover:
+        for first, shape in assignment:
             members.append((first, *((first + d) % count for d, _, _ in shape)))
             for slot, (_, turns, offset) in zip(members[-1][1:], shape, strict=True):
                 row = np.zeros(size)

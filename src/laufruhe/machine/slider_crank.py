@@ -34,7 +34,7 @@ class Swept:
         True if a chamber makes four strokes whatever the cycle of the engine.
     charge
         Mechanism that sweeps the chamber, if that is not the piston alone.
-    late
+    firing_delay
         Crank angle from the firing of the piston to that of its chamber [rad].
     """
 
@@ -43,7 +43,7 @@ class Swept:
     lags: tuple[float, ...] = (0.0,)
     four_strokes: bool = False
     charge: SliderCrank | None = None
-    late: float = 0.0
+    firing_delay: float = 0.0
 
     @property
     def chamber(self) -> SliderCrank:

@@ -33,7 +33,11 @@ def swept_volume(part: SliderCrank, angles: Array) -> Array:
 def chamber_volume(part: SliderCrank, since: Array) -> Array:
     """Return the volume of a chamber above its least [m3], at crank angles after its firing [rad] (Y3)."""
     chamber = part.swept.chamber
-    return chamber.piston_area * chamber.stroke * swept_volume(chamber, part.swept.pace * (since - part.swept.late))
+    return (
+        chamber.piston_area
+        * chamber.stroke
+        * swept_volume(chamber, part.swept.pace * (since - part.swept.firing_delay))
+    )
 
 
 def dead_centres(part: SliderCrank) -> tuple[float, float]:

@@ -34,7 +34,7 @@ def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: Array)
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
     gas, piston, cycle, pace = _worked(gas, part, cycle)
-    angles = angles - part.swept.late
+    angles = angles - part.swept.firing_delay
     if isinstance(gas, PressureTrace):
         return trace_pressure(gas, cycle, angles, pace)
     if isinstance(gas, Seiliger):
@@ -92,4 +92,4 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> Array:
         )
         top, bottom = dead_centres(piston)
         breaks = np.array([bottom - math.tau, top, bottom, top + math.tau, *heat]) / pace
-    return np.ravel(breaks[:, None] + part.swept.late - np.array(part.swept.lags))
+    return np.ravel(breaks[:, None] + part.swept.firing_delay - np.array(part.swept.lags))

@@ -101,8 +101,10 @@ ROOM = 1.1
 
 
 @dataclass(frozen=True)
-class Scene:
-    """An engine with the names of its open rotors, mounts, pistons and cranks (shafts with open throws, lead or sizes).
+class EngineView:
+    """An engine to draw, with the names of its open rotors, mounts, pistons and cranks.
+
+    A crank is open if its throws, its lead angle or sizes of its running gear are open.
 
     `rods` is true if sizes of the rods were open. The state is "optimised", or "open" in an initial design.
     """
@@ -116,8 +118,8 @@ class Scene:
     state: str
 
     @classmethod
-    def from_result(cls, result: Result) -> Scene:
-        """Return the scene of a result's final design."""
+    def from_result(cls, result: Result) -> EngineView:
+        """Return the final design of a result, with the names of the parts that were open, for drawing."""
         engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
 
@@ -167,9 +169,9 @@ class Scene:
         return DECIDED if pose.part.name in self.pistons else PISTON
 
 
-def views(scene: Scene) -> Page:
+def views(view: EngineView) -> Page:
     """Return empty panels for both views, to one scale that fills a page."""
-    front, side = (np.array(points) for points in reaches(scene))
+    front, side = (np.array(points) for points in reaches(view))
     sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (front, side)])
     scale = min((WIDE - NARROW) / sizes[1, 0], WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
     height = float(scale * sizes[:, 1].max())
@@ -182,68 +184,66 @@ def views(scene: Scene) -> Page:
         # limits [mm] about the middle of the area over all angles
         (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * width / scale, 0.5 * height / scale)
         across, up = (x - half[0], x + half[0]), (y - half[1], y + half[1])
-        down = is_side and scene.is_flat
+        down = is_side and view.is_flat
         axes.set(xlim=across[::-1] if is_side else across, ylim=up[::-1] if down else up)
         for axis, steps in ((axes.xaxis, width / 0.8), (axes.yaxis, height / 0.5)):
             round_ticks(axis, min(max(int(steps), 2), 7))
     return drawn
 
 
-def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
+def draw_views(drawn: Page, view: EngineView, phi: float = 0.0) -> None:
     """Draw both views at a crank angle [rad]."""
     front, side = drawn.panels
-    _front(front, scene, phi)
-    _side(side, scene, phi)
+    _front(front, view, phi)
+    _side(side, view, phi)
     front.set_title("from the front, turning clockwise", loc="left", size=SMALL)
-    side.set_title(scene.side_view, loc="left", size=SMALL)
+    side.set_title(view.side_view, loc="left", size=SMALL)
 
 
-def _front(axes: Axes, scene: Scene, phi: float) -> None:
+def _front(axes: Axes, view: EngineView, phi: float) -> None:
     """Draw the view from the front: y to the right, z up, turning clockwise (C3)."""
     # draw from back to front
-    poses = [Pose.at_angle(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
-    bore, places = bore_of(scene.engine), dict[str, complex]()
+    poses = [Pose.at_angle(part, phi) for part in sorted(view.engine.slider_cranks, key=lambda part: part.x)]
+    bore, places = bore_of(view.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
         for body in pose.bodies:
             axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
         if not pose.bodies:
             places[_number_of(pose)] = cylinder(axes, pose, bore)
-            piston_at(axes, pose, bore, behind, **scene.piston_look(pose))
-            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **scene.rod_look)
+            piston_at(axes, pose, bore, behind, **view.piston_look(pose))
+            bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **view.rod_look)
             slot(axes, pose, bore, behind)
-        bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene, pose))
+        bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(view, pose))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
-    for number, place in places.items() if scene.is_star else ():
+    for number, place in places.items() if view.is_star else ():
         axes.text(*at(place), number, ha="center", va="center", size=SMALL, zorder=6.0)
-    for rotor in scene.weights:
+    for rotor in view.weights:
         centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
         middle = 90.0 - math.degrees(along)
         radius = MM * half_disc(abs(rotor.unbalance))
-        axes.add_patch(
-            Wedge(at(centre), radius, middle - 90.0, middle + 90.0, zorder=3.0, **_weight_look(scene, rotor))
-        )
-    for shaft in scene.engine.shafts:
+        axes.add_patch(Wedge(at(centre), radius, middle - 90.0, middle + 90.0, zorder=3.0, **_weight_look(view, rotor)))
+    for shaft in view.engine.shafts:
         axes.add_patch(Circle(at(complex(shaft.z, shaft.y)), MM * 0.08 * bore, facecolor=INK, zorder=8.0))
-    for mount in scene.engine.mounts:
+    for mount in view.engine.mounts:
         _, y, z = mount.position
-        axes.plot(MM * y, MM * z, **_mount_look(mount.name in scene.mounts))
+        axes.plot(MM * y, MM * z, **_mount_look(mount.name in view.mounts))
     axes.set(xlabel="y [mm]", ylabel="z [mm]")
 
 
-def _side(axes: Axes, scene: Scene, phi: float) -> None:
+def _side(axes: Axes, view: EngineView, phi: float) -> None:
     """Draw the view from the left (z up) or from above (y down), the front of the engine at the left."""
-    bore = bore_of(scene.engine)
-    poses = [Pose.at_angle(part, phi) for part in scene.engine.slider_cranks]
-    quarter, pistons = 0.5 * math.pi if scene.is_flat else 0.0, list[tuple[Pose, float]]()
+    bore = bore_of(view.engine)
+    poses = [Pose.at_angle(part, phi) for part in view.engine.slider_cranks]
+    quarter, pistons = 0.5 * math.pi if view.is_flat else 0.0, list[tuple[Pose, float]]()
 
     def level(place: complex) -> float:
-        return MM * (place.imag if scene.is_flat else place.real)
+        return MM * (place.imag if view.is_flat else place.real)
 
-    for shaft in scene.engine.shafts:
+    for shaft in view.engine.shafts:
         places = [pose.part.x for pose in poses if pose.part.shaft is shaft]
         thick = 0.22 if places else 0.1
-        places += [rotor.x for rotor in scene.engine.rotors if rotor.shaft == shaft]
+        places += [rotor.x for rotor in view.engine.rotors if rotor.shaft == shaft]
         ends, middle = (max(places) + 0.6 * bore, min(places) - 0.6 * bore), level(complex(shaft.z, shaft.y))
         box(axes, ends, (middle - MM * 0.5 * thick * bore, middle + MM * 0.5 * thick * bore), 3.0, facecolor=METAL)
     for pose in poses:
@@ -251,34 +251,34 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
         reach, sign = MM * 0.15 * bore, math.copysign(1.0, pin - crank)
         for web in (x - 0.24 * bore, x + 0.24 * bore):
             ends = (web - 0.06 * bore, web + 0.06 * bore)
-            box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(scene, pose))
+            box(axes, ends, (crank - sign * 1.3 * reach, pin + sign * reach), 4.5, **_crank_look(view, pose))
         journal = (pin - 0.7 * reach, pin + 0.7 * reach)
-        box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(scene, pose))
+        box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(view, pose))
         for body in pose.bodies:
             levels = [level(place) for place in body.points]
             corner = (MM * (x - 0.5 * body.width), min(levels))
             axes.add_patch(Rectangle(corner, MM * body.width, max(levels) - min(levels), **look_of(body)))
             piston = 0.5 * (min(levels) + crank)
         if not pose.bodies:
-            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **scene.rod_look)
+            box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **view.rod_look)
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
             walls, ends = (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high)
-            box(axes, walls, ends, 5.0, **scene.piston_look(pose))
+            box(axes, walls, ends, 5.0, **view.piston_look(pose))
         pistons.append((pose, piston))
-    if not scene.is_star:
+    if not view.is_star:
         _numbers(axes, pistons, quarter, bore)
-    for rotor in scene.weights:
+    for rotor in view.weights:
         radius, along = half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter
         # lowest and highest point of the half disc about its centre
         up, across = math.cos(along), radius * abs(math.sin(along))
         low, high = -radius if up < 0.0 else -across, radius if up > 0.0 else across
         middle = level(complex(rotor.shaft.z, rotor.shaft.y))
         ends = (rotor.x - 0.5 * THICKNESS, rotor.x + 0.5 * THICKNESS)
-        box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(scene, rotor))
-    for mount in scene.engine.mounts:
+        box(axes, ends, (middle + MM * low, middle + MM * high), 5.5, **_weight_look(view, rotor))
+    for mount in view.engine.mounts:
         x, y, z = mount.position
-        axes.plot(MM * x, level(complex(z, y)), **_mount_look(mount.name in scene.mounts))
-    axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if scene.is_flat else "z [mm]")
+        axes.plot(MM * x, level(complex(z, y)), **_mount_look(mount.name in view.mounts))
+    axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if view.is_flat else "z [mm]")
 
 
 def _number_of(pose: Pose) -> str:
@@ -306,51 +306,51 @@ def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, 
         axes.text(place, up, ", ".join(names), ha="center", va="center_baseline", size=SMALL, zorder=6.0, bbox=behind)
 
 
-def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
+def reaches(view: EngineView) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
     """Return corners of the drawn area in both views, over a whole turn [mm]."""
     front, side = [], []
-    for x, centre, radius in _spots(scene):
+    for x, centre, radius in _spots(view):
         for y, z in ((centre.imag - radius, centre.real - radius), (centre.imag + radius, centre.real + radius)):
             front.append((MM * y, MM * z))
-            side.append((MM * x, MM * (y if scene.is_flat else z)))
-    bore = MM * bore_of(scene.engine)
+            side.append((MM * x, MM * (y if view.is_flat else z)))
+    bore = MM * bore_of(view.engine)
     side += [(corner + sign * 0.7 * bore, z) for corner, z in side[:] for sign in (-1.0, 1.0)]
     return front, side
 
 
-def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
-    bore = bore_of(scene.engine)
-    for part in scene.engine.slider_cranks:
+def _spots(view: EngineView) -> Iterator[tuple[float, complex, float]]:
+    bore = bore_of(view.engine)
+    for part in view.engine.slider_cranks:
         for pose in (Pose.at_angle(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
             spots = [*(place for body in pose.bodies for place in body.points)] or [pose.piston]
             yield from ((part.x, place, 0.0 if pose.bodies else 0.6 * bore) for place in spots)
             yield part.x, pose.pin, 0.15 * bore
-    for rotor in scene.weights:
+    for rotor in view.weights:
         yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), half_disc(abs(rotor.unbalance))
-    for rotor in scene.engine.rotors:
+    for rotor in view.engine.rotors:
         yield rotor.x, complex(rotor.shaft.z, rotor.shaft.y), 0.1 * bore
-    for mount in scene.engine.mounts:
+    for mount in view.engine.mounts:
         yield mount.position[0], complex(mount.position[2], mount.position[1]), 0.1 * bore
 
 
-def legend_of(scene: Scene) -> list[Line2D | Patch]:
+def legend_of(view: EngineView) -> list[Line2D | Patch]:
     """Return the entries of the legend."""
     entries: list[Line2D | Patch] = []
-    for name, decided in (("crank", scene.cranks), ("piston", scene.pistons), ("rod", scene.rods)):
+    for name, decided in (("crank", view.cranks), ("piston", view.pistons), ("rod", view.rods)):
         if decided:
-            entries.append(Patch(label=f"{name}, {scene.state}", **DECIDED))
-    if not scene.cranks >= {part.shaft.name for part in scene.engine.slider_cranks}:
+            entries.append(Patch(label=f"{name}, {view.state}", **DECIDED))
+    if not view.cranks >= {part.shaft.name for part in view.engine.slider_cranks}:
         entries.append(Patch(label="crank", **_PLAIN))
     # one entry per kind
-    kinds = {rotor.name in scene.rotors: rotor for rotor in scene.weights}
+    kinds = {rotor.name in view.rotors: rotor for rotor in view.weights}
     entries += [
-        Patch(label=f"weight, {scene.state}" if decided else "weight", **_weight_look(scene, rotor))
+        Patch(label=f"weight, {view.state}" if decided else "weight", **_weight_look(view, rotor))
         for decided, rotor in sorted(kinds.items())
     ]
-    if len(scene.mounts) < len(scene.engine.mounts):
+    if len(view.mounts) < len(view.engine.mounts):
         entries.append(entry_of_dots("mount", marker="^", color=ORANGE))
-    if scene.mounts:
-        entries.append(entry_of_dots(f"mount, {scene.state}", marker="^", color=AFTER))
+    if view.mounts:
+        entries.append(entry_of_dots(f"mount, {view.state}", marker="^", color=AFTER))
     return entries
 
 
@@ -362,10 +362,10 @@ DECIDED: dict[str, Any] = {"facecolor": PALE, "edgecolor": AFTER}
 _PLAIN: dict[str, Any] = {"facecolor": IRON, "edgecolor": INK}
 
 
-def _crank_look(scene: Scene, pose: Pose) -> dict[str, Any]:
-    return DECIDED if pose.part.shaft.name in scene.cranks else _PLAIN
+def _crank_look(view: EngineView, pose: Pose) -> dict[str, Any]:
+    return DECIDED if pose.part.shaft.name in view.cranks else _PLAIN
 
 
-def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:
+def _weight_look(view: EngineView, rotor: Rotor) -> dict[str, Any]:
     # edges separate overlapping weights
-    return {"facecolor": (AFTER if rotor.name in scene.rotors else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}
+    return {"facecolor": (AFTER if rotor.name in view.rotors else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.plots.machine_view import MM, Scene, at, draw_views, legend_of, views
+from laufruhe.plots.machine_view import MM, EngineView, at, draw_views, legend_of, views
 from laufruhe.plots.style import VERMILION, Page, entry_of_dots, finish_page, point_name, series_of, styled
 from laufruhe.plots.words import in_thousands
 from laufruhe.present.measures import hardest_point, has_loads
@@ -35,7 +35,7 @@ def animate(result: Result, path: Path) -> None:
     """Write one working cycle as GIF: arrows are the shaking force and the mount forces, dots are firings."""
     from PIL import Image
 
-    scene = Scene.from_result(result)
+    view = EngineView.from_result(result)
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
     loads = []
     for item in series if has_loads(result) else ():
@@ -46,16 +46,16 @@ def animate(result: Result, path: Path) -> None:
     largest = max((float(np.abs(item[:, :, 1:]).max()) for item in loads), default=0.0)
     frames, (factor, unit) = [], in_thousands(largest, "N")
     for step in range(FRAMES):
-        drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
-        draw_views(drawn, scene, phi)
-        _firings(drawn, scene, phi)
+        drawn, phi = views(view), result.final.engine.cycle.angle * step / FRAMES
+        draw_views(drawn, view, phi)
+        _firings(drawn, view, phi)
         for item, cycle in zip(series, loads, strict=False):
-            _arrows(drawn.panels[0], scene, cycle[step], largest, item.colour)
+            _arrows(drawn.panels[0], view, cycle[step], largest, item.colour)
         angle = f"{math.degrees(phi):.1f}° of crank angle"
         scale = f"; longest arrow {number(factor * largest, 3)} {unit}" if largest else ""
         where = f", at {point_name(result, k)}" if loads else ""
         fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
-        legend = [*legend_of(scene), fires, *(item.entry(": forces") for item in series[: len(loads)])]
+        legend = [*legend_of(view), fires, *(item.entry(": forces") for item in series[: len(loads)])]
         finish_page(drawn, result, f"The engine turning{where}", f"{angle}{scale}.", legend)
         drawn.figure.set_dpi(DPI)
         drawn.figure.canvas.draw()
@@ -68,24 +68,24 @@ def animate(result: Result, path: Path) -> None:
     reduced[0].save(path, save_all=True, append_images=reduced[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
 
 
-def _firings(drawn: Page, scene: Scene, phi: float) -> None:
-    bore, cycle = bore_of(scene.engine), scene.engine.cycle.angle
-    for part in scene.engine.cylinders:
+def _firings(drawn: Page, view: EngineView, phi: float) -> None:
+    bore, cycle = bore_of(view.engine), view.engine.cycle.angle
+    for part in view.engine.cylinders:
         pose = Pose.at_angle(part, phi)
         if (phi - part.firing_angle + 1e-9) % cycle > LIT or pose.bodies:
             continue
         place = pose.piston + 0.4 * bore * cmath.exp(1j * part.bank)
-        side = (MM * part.x, MM * (place.imag if scene.is_flat else place.real))
+        side = (MM * part.x, MM * (place.imag if view.is_flat else place.real))
         for axes, (x, y) in zip(drawn.panels, (at(place), side), strict=True):
             axes.plot(x, y, "o", color=VERMILION, markersize=7.0, zorder=9.5)
 
 
-def _arrows(axes: Axes, scene: Scene, forces: Array, largest: float, colour: str) -> None:
+def _arrows(axes: Axes, view: EngineView, forces: Array, largest: float, colour: str) -> None:
     if not largest:
         return
     low, high = axes.get_ylim()
     scale = REACH * (high - low) / largest
-    places = [(0.0, 0.0), *((1e3 * mount.position[1], 1e3 * mount.position[2]) for mount in scene.engine.mounts)]
+    places = [(0.0, 0.0), *((1e3 * mount.position[1], 1e3 * mount.position[2]) for mount in view.engine.mounts)]
     for (y, z), (_, across, up) in zip(places, forces, strict=False):
         look: Any = {"color": colour, "units": "inches", "width": 0.03, "scale": 1.0, "zorder": 10.0}
         axes.quiver(y, z, scale * across, scale * up, angles="xy", scale_units="xy", **look)

@@ -50,9 +50,9 @@ def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]
     """
 
     def inside_load(loads: PointLoads) -> Spectrum:
-        if loads.moving is None:
+        if loads.moving_parts is None:
             raise ValueError(f"{name} needs the moving parts, and only the wrench is known")
-        return signal(loads.moving, loads)
+        return signal(loads.moving_parts, loads)
 
     return inside_load
 
@@ -321,8 +321,11 @@ def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor
         Size factors by which the load is multiplied; None for none.
     """
 
-    def signal(moving: Engine, loads: PointLoads) -> Spectrum:
-        spectrum, factors = load(moving, loads.point, loads.fidelity), channel.factors_of(moving, loads.point)
+    def signal(moving_parts: Engine, loads: PointLoads) -> Spectrum:
+        spectrum, factors = (
+            load(moving_parts, loads.point, loads.fidelity),
+            channel.factors_of(moving_parts, loads.point),
+        )
         return spectrum if factors is None else spectrum.mapped(lambda values: values * factors)
 
     keys, needs, places = where
@@ -498,8 +501,8 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
 _ON_CRANK: PlaceSpec = (ON_BLOCK, Needs.UNCONDITIONAL, lambda _: ("crankshaft",))
 
 
-def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    return crank_torque(moving, point, fidelity).mapped(lambda values: values[:, None, None])
+def _crank_torque(moving_parts: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return crank_torque(moving_parts, point, fidelity).mapped(lambda values: values[:, None, None])
 
 
 def _of_places(

@@ -23,7 +23,7 @@ class PointLoads:
         Forces of the engine on its mounts, shape (n, mounts, 3); None without mounts.
     mount_travel
         Displacement of the engine at its mounts, shape (n, mounts, 3) [m]; None for rigid mounts.
-    moving
+    moving_parts
         Engine whose slider-cranks and rotors make these loads, for loads inside the crankcase; None if the wrench alone
         is known.
     """
@@ -32,7 +32,7 @@ class PointLoads:
     wrench: Spectrum
     mount_forces: Spectrum | None
     mount_travel: Spectrum | None = None
-    moving: Engine | None = None
+    moving_parts: Engine | None = None
     fidelity: Fidelity = EXACT
 
 

@@ -167,7 +167,7 @@ class PhasingOf(Generic[P]):
         Time limit of the search [s].
     thorough
         True if throws are also searched by boxes, and with less unevenness than allowed to show its worth.
-    realise
+    problem_of
         Function that returns the problem of a candidate.
     """
 
@@ -180,7 +180,7 @@ class PhasingOf(Generic[P]):
     bank: tuple[float, float] | None
     split: tuple[float, float] | None
     intervals: Intervals
-    realise: Callable[[Candidate], P]
+    problem_of: Callable[[Candidate], P]
     steps: int | None = None
     shafts: ShaftChoice = ShaftChoice()
     best: int = 10

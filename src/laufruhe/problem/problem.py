@@ -353,8 +353,8 @@ class Problem:
         """Return the problem with other attributes, also in the problems of its candidates if crank stars are open."""
         changes = {"origin": None, **changes}
         if self.phasing is not None:
-            realise = self.phasing.realise
-            phasing = replace(self.phasing, realise=lambda candidate: realise(candidate).changed(**changes))
+            problem_of = self.phasing.problem_of
+            phasing = replace(self.phasing, problem_of=lambda candidate: problem_of(candidate).changed(**changes))
             return replace(self, phasing=phasing, **changes)
         return replace(self, **changes)
 
@@ -430,4 +430,4 @@ def _check_name(name: object) -> None:
 
 
 Phasing: TypeAlias = PhasingOf[Problem]
-"""Phasing of a problem; `realise` returns problems."""
+"""Phasing of a problem; `problem_of` returns problems."""

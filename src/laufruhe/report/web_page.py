@@ -24,7 +24,7 @@ HEADING = "Move the decisions"
 def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
     """Return a report as HTML with its pictures, SVG by name, and sliders where there is a live model."""
     inline, sliders = {name: data_address(svg) for name, svg in pictures.items()}, None
-    if live is not None and (live.sliders or live.unmoved):
+    if live is not None and (live.sliders or live.without_slider):
         if why := live.why_not or live.too_large:
             content: dict[str, Any] = {"sentences": (why, *live.notes)}
         else:

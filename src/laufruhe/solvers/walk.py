@@ -316,7 +316,7 @@ def _change(phasing: Phasing, change: Change, point: Point, step: float) -> Poin
         if not phasing.intervals.holds(intervals) or min(intervals) <= SOONEST:
             return None
     try:
-        problem = phasing.realise(candidate)
+        problem = phasing.problem_of(candidate)
     except LaufruheError:
         return None
     values_by_name = dict(zip((d.name for d in point.problem.decisions), point.values, strict=True))

@@ -107,7 +107,7 @@ def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
         return None
     stars: dict[Engine, Candidate] = {}
     for candidate in candidates_of(phasing, neighbour.phasing.ranking)[:STARS]:
-        star = replace(phasing.realise(candidate), phasing=None)
+        star = replace(phasing.problem_of(candidate), phasing=None)
         engine = _engine_from(star, neighbour) if star.decisions else star.engine
         if engine is not None:
             stars[engine] = candidate
@@ -118,7 +118,7 @@ def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
 
 
 def _moved_throws(phasing: Phasing, star: Candidate, neighbour: Result) -> Engine | None:
-    problem = replace(phasing.realise(star), phasing=None)
+    problem = replace(phasing.problem_of(star), phasing=None)
     if problem.mount_decisions:
         from laufruhe.solvers.mounts.nonlinear import solve_moved
 

@@ -55,10 +55,10 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 
     if phasing is not None:
         # engines of crank stars are built in the new size
-        realise, layout = phasing.realise, phasing.layout
+        problem_of, layout = phasing.problem_of, phasing.layout
         phasing = replace(
             phasing,
-            realise=lambda candidate: at_equal_power(realise(candidate), reference_cylinders),
+            problem_of=lambda candidate: at_equal_power(problem_of(candidate), reference_cylinders),
             layout=lambda bank, split: scaled_layout(layout(bank, split)),
         )
     engine = replace(

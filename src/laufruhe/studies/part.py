@@ -14,7 +14,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable, Value
 from laufruhe.present.picture import Picture
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text
 
 Record: TypeAlias = dict[str, Any]
@@ -82,18 +82,18 @@ class Part(Table):
         """Return a lower bound of the number of points, without making the points."""
         return len(self.cases)
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return the pieces of work; refuse a wrong part before any work begins."""
         raise NotImplementedError
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of one piece of work as JSON values; it depends on the settings and the point only.
 
         A `ModelError` is the fault of the point, and is recorded as such.
         """
         raise NotImplementedError
 
-    def template(self, scenes: Scenes) -> Template | None:  # noqa: ARG002
+    def template(self, problem_files: ProblemFiles) -> Template | None:  # noqa: ARG002
         """Return the layout of records of points with a span; None if each record has a shape of its own."""
         return None
 

@@ -1,4 +1,4 @@
-"""Study files and how they are read: scenes, sweeps and comparisons (docs/reference/study-files.md)."""
+"""Reader of study files: cases, sweeps and comparisons (docs/reference/study-files.md)."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from laufruhe.numerics.workers import (
 )
 from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.scenes import ProblemFiles
 from laufruhe.studies.stores import Records, Task, stores_of
 
 # a worker imports everything anew, which takes two seconds
@@ -45,7 +45,7 @@ def run(
 ) -> tuple[dict[str, xr.Dataset], dict[str, float]]:
     """Return all parts of a study as datasets, and the seconds that their points took on one core.
 
-    Raise `InputError` for a faulty scene. The results do not depend on the number of processes `jobs`.
+    Raise `InputError` for a faulty problem file. The results do not depend on the number of processes `jobs`.
 
     Parameters
     ----------
@@ -56,21 +56,21 @@ def run(
     say
         Function called with the number of finished points and of all points.
     """
-    scenes = Scenes(folder)
-    work = [(part, point) for part in study.study.parts for point in part.points(scenes)]
-    marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
-    # equal scenes of several parts are solved once
+    problem_files = ProblemFiles(folder)
+    work = [(part, point) for part in study.study.parts for point in part.points(problem_files)]
+    marks = [problem_files.fingerprint(point, part.settings()) for part, point in work]
+    # equal problems of several parts are solved once
     tasks = dict(zip(marks, work, strict=True))
     with ExitStack() as stores:
         store = {
             mark: points_of
-            for points_of, marked in stores_of(study, scenes, finished, tasks, stores)
+            for points_of, marked in stores_of(study, problem_files, finished, tasks, stores)
             for mark in marked
         }
         todo = {mark: task for mark, task in tasks.items() if mark not in store[mark].seconds}
         names, total = list(todo), len(tasks)
         say(total - len(todo), total)
-        with closing(answers(list(todo.values()), scenes, jobs)) as results:
+        with closing(answers(list(todo.values()), problem_files, jobs)) as results:
             for count, answer in enumerate(results, 1):
                 mark = names[answer.task]
                 if answer.mark != mark:
@@ -107,15 +107,15 @@ class PointResult:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Several tasks for one worker, with the scenes and the folder to which their paths are relative."""
+    """Several tasks for one worker, with the problem files and the folder to which their paths are relative."""
 
     numbers: Sequence[int]
     tasks: Sequence[Task]
-    scenes: Scenes
+    problem_files: ProblemFiles
     folder: Path
 
 
-def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[PointResult, None, None]:
+def answers(tasks: Sequence[Task], problem_files: ProblemFiles, jobs: int) -> Generator[PointResult, None, None]:
     """Yield the answer of every task in any order; raise the error of the first task that fails.
 
     An executor that is set does all of the work. Without one, worker processes start as soon as they would finish the
@@ -127,30 +127,30 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Point
             ahead = (time.perf_counter() - started) / k * (len(tasks) - k) if k else 0.0
             if jobs > 1 and ahead * (1.0 - 1.0 / jobs) > POOL_PAYS:
                 break
-            answer = _answer(k, task, scenes)
+            answer = _answer(k, task, problem_files)
             if is_time_over():
                 # a time limit may have cut the answer short
                 raise _time_limit_error()
             yield answer
             first = k + 1
     if first < len(tasks):
-        yield from _distributed(tasks, first, scenes, jobs)
+        yield from _distributed(tasks, first, problem_files, jobs)
 
 
 def _time_limit_error() -> SolverError:
     return TimeIsOver("the time limit is over; finished points are kept, the same command goes on")
 
 
-def _answer(k: int, task: Task, scenes: Scenes) -> PointResult:
+def _answer(k: int, task: Task, problem_files: ProblemFiles) -> PointResult:
     started = time.perf_counter()
     part, point = task
-    with scenes.blamed(point):
-        record = part.answer(point, scenes)
+    with problem_files.blamed(point):
+        record = part.answer(point, problem_files)
     seconds = time.perf_counter() - started
-    return PointResult(k, scenes.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
+    return PointResult(k, problem_files.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
 
 
-def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[PointResult]:
+def _distributed(tasks: Sequence[Task], first: int, problem_files: ProblemFiles, jobs: int) -> Iterator[PointResult]:
     """Yield answers of the tasks from `first` on; pieces grow with the measured speed."""
     done, spent = 0, 0.0
     worth = NEAR if current_executor() is None else FAR
@@ -162,7 +162,7 @@ def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -
             fair = (len(tasks) - start) // (SHARES * worker_count(executor))
             size = max(min(int(worth * done / spent) if spent > 0.0 else 1, fair), 1)
             numbers = range(start, min(start + size, len(tasks)))
-            yield _Piece(numbers, [tasks[k] for k in numbers], scenes, folder)
+            yield _Piece(numbers, [tasks[k] for k in numbers], problem_files, folder)
             start = numbers.stop
 
     with executor_for(jobs) as executor:
@@ -181,5 +181,5 @@ def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -
 
 def _work(piece: _Piece) -> list[PointResult]:
     if Path.cwd() != piece.folder:
-        piece.scenes.folder = piece.folder / piece.scenes.folder
-    return [_answer(k, task, piece.scenes) for k, task in zip(piece.numbers, piece.tasks, strict=True)]
+        piece.problem_files.folder = piece.folder / piece.problem_files.folder
+    return [_answer(k, task, piece.problem_files) for k, task in zip(piece.numbers, piece.tasks, strict=True)]

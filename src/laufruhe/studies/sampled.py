@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.present import picture as p
 from laufruhe.studies.part import Column, Part, Template
 from laufruhe.studies.regions import COLUMNS, VALUES
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.units import readable
 
 MAX_DRAWS = 1_000_000_000
@@ -47,15 +47,15 @@ class Sampled(Part):
         """Return the number of pieces of all cases."""
         return len(self.cases) * -(-self.draws // self.piece)
 
-    def check_objective(self, scenes: Scenes) -> None:
+    def check_objective(self, problem_files: ProblemFiles) -> None:
         """Raise `InputError` unless all cases have the same objective."""
-        names = [(case, scenes.problem(Point(case)).objective_name) for case in self.cases]
+        names = [(case, problem_files.problem(Point(case)).objective_name) for case in self.cases]
         for case, name in names:
             if not name:
-                raise scenes.refused(case, "objective", "is missing, so there is nothing to compare", "give one")
+                raise problem_files.refused(case, "objective", "is missing, so there is nothing to compare", "give one")
             if name != names[0][1]:
                 rule = f"is {name} in '{case.name}' and {names[0][1]} in '{names[0][0].name}'"
-                raise scenes.refused(case, "objective", rule, "give each its own part")
+                raise problem_files.refused(case, "objective", rule, "give each its own part")
 
     def spans(self) -> list[tuple[int, int]]:
         """Return (first draw, end) of every piece."""
@@ -82,13 +82,13 @@ class Sampled(Part):
         }
         return xr.Dataset(variables, {"case": cases}, self.about(seed=self.seed))
 
-    def columns(self, scenes: Scenes) -> dict[str, Column]:
+    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
         """Return the columns of numbers that each draw has, by name."""
         raise NotImplementedError
 
-    def template(self, scenes: Scenes) -> Template | None:
+    def template(self, problem_files: ProblemFiles) -> Template | None:
         """Return the layout of draws."""
-        return Template(tuple(case.name for case in self.cases), self.draws, self.piece, self.columns(scenes))
+        return Template(tuple(case.name for case in self.cases), self.draws, self.piece, self.columns(problem_files))
 
     @property
     def ends(self) -> tuple[Literal["nc", "csv", "png"], ...]:

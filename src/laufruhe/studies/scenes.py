@@ -1,4 +1,4 @@
-"""Scenes (problems) of a study: read once, changed for each point, and identified by a fingerprint of all inputs."""
+"""Problem files of a study: read once, changed for each point, and identified by a hash of all inputs."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DISPLAY = {"report", "plots", "live", "cli"}
 
 @dataclass(frozen=True)
 class Point:
-    """Piece of work: a scene (problem), changed values by their paths, a metric in place of its objective.
+    """One computation of a study: a problem file, changed values by their paths, a metric in place of its objective.
 
     `shafts` names the balancer shafts that remain, all if None. `base` replaces the tables of the
     case's problem file. `span` is the range of draws, first number and end.
@@ -48,7 +48,7 @@ class Point:
         return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
 
 
-class Scenes:
+class ProblemFiles:
     """Problem files of a study, paths relative to its folder, each read once."""
 
     def __init__(self, folder: Path) -> None:
@@ -84,7 +84,7 @@ class Scenes:
         return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
-        """Return the error about the scene of a case."""
+        """Return the error about the key `where` in the problem file of a case."""
         return refused(where, "", rule, remedy, self.folder / case.problem)
 
     def problem(self, point: Point) -> Problem:
@@ -105,12 +105,12 @@ class Scenes:
             raise self.refused(case, "phasing", rule, remedy)
 
     def named(self, case: CaseTable) -> AbstractContextManager[None]:
-        """Prefix errors about a case's scene with the name of its problem file."""
+        """Prefix errors about the problem of a case with the name of its problem file."""
         return errors_in_file(self.folder / case.problem)
 
     @contextmanager
     def blamed(self, point: Point, where: str = "point") -> Iterator[None]:
-        """Report a `ModelError` as an `InputError` about this point."""
+        """Report a `ModelError` in the block as an `InputError` about this point of the study."""
         try:
             yield
         except ModelError as error:
@@ -118,9 +118,9 @@ class Scenes:
             raise InputError(str(path), (Complaint.from_error(error, where, f'"{point}"'),)) from None
 
     def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
-        """Return a hash of everything that a point depends on: scene, files that the scene names, settings, program.
+        """Return a hash of everything that a point depends on: problem, files that it names, settings, program.
 
-        Every text of the scene that names a file counts, so that no key has to be known here.
+        Every text of the problem file that names a file counts, so that no key has to be known here.
         """
         tables = self.tables(point)
         case = point.case.model_dump(exclude={"name", "sweep"})
@@ -161,3 +161,7 @@ def with_shafts(problem: Problem, names: Sequence[str]) -> Problem:
     if unknown:
         raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
     return without_shafts(problem, set(shafts_of(problem)) - set(names))
+
+
+Scenes = ProblemFiles
+"""Earlier name of `ProblemFiles`, for extensions of other packages."""

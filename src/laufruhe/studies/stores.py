@@ -19,7 +19,7 @@ from typing import Any, Protocol, TypeAlias
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.regions import Region, Regions, locked_store
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 
 Task: TypeAlias = tuple[Part, Point]
 FINISHED_POINTS = ".unfinished-points.jsonl"
@@ -91,7 +91,7 @@ def _checksum(line: bytes) -> bytes:
 
 
 def stores_of(
-    study: StudyFile, scenes: Scenes, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
+    study: StudyFile, problem_files: ProblemFiles, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
     """Yield each store of results with the fingerprints of the points that it stores, finished or not.
 
@@ -99,7 +99,9 @@ def stores_of(
     file `finished` (`FinishedPoints`).
     """
     marks, root = set(tasks), regions_in(finished.parent)
-    templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
+    templates = [
+        (part, template) for part in study.study.parts if (template := part.template(problem_files)) is not None
+    ]
     if templates:
         stores.enter_context(locked_store(root))
     for part, template in templates:

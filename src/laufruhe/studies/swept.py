@@ -1,4 +1,4 @@
-"""Study parts whose scenes are each solved: every case at every combination of swept values."""
+"""Study parts that solve a problem at each point: every case at every combination of swept values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.result import Result
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept_report import NOTHING_OPEN, by_point
 from laufruhe.studies.text import Text
 
@@ -131,7 +131,7 @@ def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[floa
 def dataset(
     points: Sequence[Point], records: Sequence[Mapping[str, Any]], extra: Mapping[str, Any], about: Mapping[str, Any]
 ) -> xr.Dataset:
-    """Return solved scenes as one labelled dataset, with `extra` coordinates along the points.
+    """Return the results of all points as one labelled dataset, with `extra` coordinates along the points.
 
     Engines of one part may have different mounts, decisions and limits; values that an engine lacks are NaN.
     """
@@ -206,17 +206,17 @@ class SweptPart(Part):
         grids = [[(a.quantity, value) for value in a.values] for a in self.axes() if a.quantity != without]
         return [dict(grid) for grid in itertools.product(*grids)]
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return every case at every combination."""
-        self.checked(scenes)
+        self.checked(problem_files)
         return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return the record of one scene: its proven optimum, or the initial design if nothing is open."""
-        return solve_scene(scenes.problem(point))
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
+        """Return the record of one point: its proven optimum, or the initial design if no number is open."""
+        return solve_scene(problem_files.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return the records of all scenes along their points."""
+        """Return the records of all points as one labelled dataset."""
         return dataset(points, records, coordinates(self.axes(), points), self.about())
 
     @staticmethod
@@ -224,7 +224,7 @@ class SweptPart(Part):
         """Return a row per point."""
         return by_point(data)
 
-    def checked(self, scenes: Scenes) -> list[Problem]:
+    def checked(self, problem_files: ProblemFiles) -> list[Problem]:
         """Return the problem of every case at the first values of all sweeps.
 
         The last value of every sweep is built too, so that errors are found before the run. Raise `InputError` if a
@@ -234,43 +234,43 @@ class SweptPart(Part):
         first = {axis.quantity: axis.values[0] for axis in axes}
         problems = []
         for case in self.cases:
-            self._check_distinct(case, scenes)
-            problems.append(scenes.problem(Point(case, first, self.metric)))
+            self._check_distinct(case, problem_files)
+            problems.append(problem_files.problem(Point(case, first, self.metric)))
             for axis in axes:
-                scenes.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, self.metric))
+                problem_files.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, self.metric))
             if problems[-1].objective_unit is None:
                 rule = "is missing, so a study has nothing to compare"
-                raise scenes.refused(case, "objective", rule, "give a metric")
+                raise problem_files.refused(case, "objective", rule, "give a metric")
         units = {problem.objective_unit: case for problem, case in zip(problems, self.cases, strict=True)}
         if len(units) > 1:
             (one, first_case), (two, second_case) = list(units.items())[:2]
             unit_names = [unit or "several units together" for unit in (one, two)]
             rule = f"minimises in {unit_names[0]} in '{first_case.name}' and in {unit_names[1]} in '{second_case.name}'"
-            raise scenes.refused(self.cases[0], "objective", rule, "give the part one metric")
+            raise problem_files.refused(self.cases[0], "objective", rule, "give the part one metric")
         return problems
 
-    def _check_distinct(self, case: CaseTable, scenes: Scenes) -> None:
+    def _check_distinct(self, case: CaseTable, problem_files: ProblemFiles) -> None:
         """Refuse a number that is swept and set, or swept twice, however its path is written."""
-        tables, reasons = scenes.tables(Point(case.model_copy(update={"set": {}}))), {}
+        tables, reasons = problem_files.tables(Point(case.model_copy(update={"set": {}}))), {}
         for path, value in case.set.items():
-            with scenes.named(case):
+            with problem_files.named(case):
                 reasons[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
                 tables = changed(tables, path, value)
         for sweep in self.sweep:
-            with scenes.named(case):
+            with problem_files.named(case):
                 keys = keys_of(tables, sweep.quantity)
             for earlier, rule in reasons.items():
                 if keys[: len(earlier)] == earlier[: len(keys)]:
-                    raise scenes.refused(case, sweep.quantity, rule, "leave out one of the two")
+                    raise problem_files.refused(case, sweep.quantity, rule, "leave out one of the two")
             reasons[keys] = "is swept twice"
 
-    def check_moved_by_loads(self, problems: Sequence[Problem], scenes: Scenes, what: str) -> None:
+    def check_moved_by_loads(self, problems: Sequence[Problem], problem_files: ProblemFiles, what: str) -> None:
         """Raise `InputError` if the metric, such as a sag, does not depend on loads."""
         for case, problem in zip(self.cases, problems, strict=True):
             measures = problem.measures
             if all(measure.is_mounting and measure.channel is not channels.TRANSMISSIBILITY for measure in measures):
                 rule = f"is {problem.objective_name}, which no {what} changes"
-                raise scenes.refused(case, "objective", rule, "minimise a mount force or transmissibility")
+                raise problem_files.refused(case, "objective", rule, "minimise a mount force or transmissibility")
 
 
 def coordinates(axes: Sequence[SweepAxis], points: Sequence[Point]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Tables and pictures of solved scenes: a row for each point, bars, and lines over the swept values."""
+"""Tables and pictures of swept problems: a row for each point, bars, and lines over the swept values."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NEGLIGIBLE = 1e-9
 # width of a tick's letter [inch], and letters per line
 LETTER, LETTERS = 0.078, 18
 NOTHING_OPEN = "nothing open"
-"""Proof of a scene without decisions."""
+"""Proof of a problem without decisions."""
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
 

@@ -21,7 +21,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
-from laufruhe.studies.scenes import Point, Scenes, with_shafts
+from laufruhe.studies.scenes import Point, ProblemFiles, with_shafts
 from problem_files import PROBLEMS
 
 FOUR = PROBLEMS / "tractor-four-lanchester-and-moment.toml"
@@ -118,9 +118,9 @@ def _four(mass: str, alternating: bool = False) -> xr.Dataset:
         "cases": [{"name": "four", "problem": FOUR.name, "set": heavy}], "more_cylinders": [five],
         "builds": [{**build, "claim": claim} for build, claim in zip(builds, claims, strict=True)],
     })  # fmt: skip
-    scenes = Scenes(PROBLEMS)
-    points = part.points(scenes)
-    return part.dataset(points, [part.answer(point, scenes) for point in points])
+    problem_files = ProblemFiles(PROBLEMS)
+    points = part.points(problem_files)
+    return part.dataset(points, [part.answer(point, problem_files) for point in points])
 
 
 def test_fronts_label_builds_and_units(four: xr.Dataset) -> None:
@@ -209,7 +209,7 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
 def test_shaft_of_three_cylinders_by_mass(mass: float, fall: float) -> None:
     """Barely over W2 with the printed mass, clearly with the other."""
     told = {"engine.reciprocating_mass": f"{mass} kg", "gas.imep": "9 kp/cm^2"}
-    problem = Scenes(PROBLEMS).problem(Point(CaseTable(name="three", problem="tractor-three.toml", set=told)))
+    problem = ProblemFiles(PROBLEMS).problem(Point(CaseTable(name="three", problem="tractor-three.toml", set=told)))
     found = 1.0 - best(problem).force / best(with_shafts(problem, ())).force
     assert found == pytest.approx(fall, abs=0.002)
 

@@ -46,7 +46,7 @@ def asked(folder: Path, cylinders: int, cycle: str, name: str, gas: bool, phasin
 
 
 def of_star(problem: Problem, family: Family, star) -> Problem:
-    return problem.phasing.realise(family.candidate(problem.phasing, tuple(map(int, star))))
+    return problem.phasing.problem_of(family.candidate(problem.phasing, tuple(map(int, star))))
 
 
 def norms_of(problem: Problem, family: Family) -> CoupleNorms | None:

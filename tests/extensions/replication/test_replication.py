@@ -20,7 +20,7 @@ from laufruhe.extensions.replication.models import Hue, StatementTable
 from laufruhe.extensions.replication.part import Replication
 from laufruhe.plots.picture import colour_of, draw
 from laufruhe.present.tables import Table
-from laufruhe.studies.scenes import Scenes
+from laufruhe.studies.scenes import ProblemFiles
 from problem_files import PROBLEMS
 
 READY = {
@@ -164,8 +164,8 @@ def _part(**more: Any) -> Replication:
 
 
 def _data(part: Replication) -> xr.Dataset:
-    points = part.points(Scenes(PROBLEMS))
-    return part.dataset(points, [part.answer(point, Scenes(PROBLEMS)) for point in points])
+    points = part.points(ProblemFiles(PROBLEMS))
+    return part.dataset(points, [part.answer(point, ProblemFiles(PROBLEMS)) for point in points])
 
 
 def test_cases_sweep_and_keep_their_own_dimensions() -> None:
@@ -318,4 +318,4 @@ def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
 def test_a_problem_like_itself_is_refused_before_anything_is_computed(like: Any) -> None:
     part = _part(problems={"a": {"like": "b"}, "b": {"like": like}}, cases=[{"name": "c", "problem": "a"}])
     with pytest.raises(ModelError, match="refers to itself by `like`, or `like` is no name; correct `like`"):
-        part.points(Scenes(PROBLEMS))
+        part.points(ProblemFiles(PROBLEMS))

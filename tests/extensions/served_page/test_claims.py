@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from lanes import first_fast
-from laufruhe.extensions.served_page import answers, scenes
+from laufruhe.extensions.served_page import answers, page_problem
 from laufruhe.extensions.served_page.answers import Source
 from laufruhe.extensions.served_page.claims import Simplification, breaks_words, conflict_claim
 from laufruhe.extensions.served_page.page_state import Edit, PageState
@@ -221,7 +221,7 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed(shar
 def test_the_exact_model_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The value, all limits and the drawing of a design come from one evaluation."""
     state = []
-    monkeypatch.setattr(scenes, "evaluate", lambda *given: state.append(given) or evaluate(*given))
+    monkeypatch.setattr(page_problem, "evaluate", lambda *given: state.append(given) or evaluate(*given))
     path = INPUTS / "few-angles-below-any-design.toml"
     json.loads(answers.follow(Source(tables_of(path), path), PageState()))
     assert len(state) == 1

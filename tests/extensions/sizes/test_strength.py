@@ -282,6 +282,6 @@ def test_sizes_that_are_none_are_one_line_each(old: str, new: str, rule: str, tm
 def test_what_is_missing_is_named(change: object, rule: str, engine: Engine) -> None:
     one = change(engine)  # type: ignore[operator]
     channel, _ = MEASURES["maximum web stress"]
-    loads = PointLoads(POINT, crank_torque(engine, POINT), None, moving=one)
+    loads = PointLoads(POINT, crank_torque(engine, POINT), None, moving_parts=one)
     with pytest.raises(ModelError, match=rule):
         channel.signal(loads)  # type: ignore[attr-defined]

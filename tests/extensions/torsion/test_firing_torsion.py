@@ -183,13 +183,13 @@ def test_the_engine_seen_from_behind() -> None:
     other = dict(zip(names, names[::-1], strict=True))
     discs = tuple(replace(d, cylinders=tuple(other[c] for c in d.cylinders)) for d in chain.discs[::-1])
     behind = replace(chain, discs=discs, sections=chain.sections[::-1], output="flywheel")
-    realise = problem.phasing.realise
+    star_problem_of = problem.phasing.problem_of
 
     def turned(candidate: Any) -> Problem:
-        found = realise(candidate)
+        found = star_problem_of(candidate)
         return replace(found, engine=found.engine.with_extra(behind))
 
-    phasing = replace(problem.phasing, realise=turned)
+    phasing = replace(problem.phasing, problem_of=turned)
     again = laufruhe.solve(replace(turned_problem(problem, behind), phasing=phasing))
     first = laufruhe.solve(problem)
     assert again.objective.value == pytest.approx(first.objective.value, rel=1e-9)

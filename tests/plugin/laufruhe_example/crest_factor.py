@@ -12,7 +12,7 @@ from laufruhe.numerics.norms import lengths
 from laufruhe.present import picture as p
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text, marked_table, number
 
 
@@ -21,16 +21,16 @@ class CrestFactorPart(Part):
 
     kind: Literal["crest factor"]
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return a point for each case, whose objective has to be a load."""
         for case in self.cases:
-            if not any(term.measure.is_load for term in scenes.problem(Point(case)).objective):
-                raise scenes.refused(case, "objective", "is no load over the cycle", "minimise one")
+            if not any(term.measure.is_load for term in problem_files.problem(Point(case)).objective):
+                raise problem_files.refused(case, "objective", "is no load over the cycle", "minimise one")
         return [Point(case) for case in self.cases]
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the crest factor."""
-        problem = scenes.problem(point)
+        problem = problem_files.problem(point)
         measure = next(term.measure for term in problem.objective if term.measure.is_load)
         rows = evaluate(problem).rows(measure)
         size = lengths(rows.vectors)

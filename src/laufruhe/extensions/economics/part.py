@@ -30,7 +30,7 @@ from laufruhe.present.numbers import fixed, percent
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_loads
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes, shafts_of
+from laufruhe.studies.scenes import Point, ProblemFiles, shafts_of
 from laufruhe.studies.text import DASH, Text, marked_table, number, statement_table
 
 SAME = 1e-4
@@ -136,28 +136,28 @@ class Economics(Part):
         """Return the mass limits and the kind of load; names and claims change no front."""
         return {"kind": self.kind, "mass_limits": self.mass_limits, "alternating": self.alternating}
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return the plain engine, every build, and every engine with more cylinders at equal power."""
         base = self.cases[0]
-        reference = scenes.problem(Point(base))
+        reference = problem_files.problem(Point(base))
         if not shafts_of(reference):
-            raise scenes.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
+            raise problem_files.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
         points = [Point(base, shafts=())]
         for build in self.builds:
             case = next((case for case in self.cases if case.name == build.case), base)
-            names = shafts_of(scenes.problem(Point(case)))
+            names = shafts_of(problem_files.problem(Point(case)))
             for shaft in build.shafts:
                 if shaft not in names:
                     rule = f"has no shaft '{shaft}', which '{build.name}' builds"
-                    raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, names))
+                    raise problem_files.refused(case, "balancer_shafts", rule, nearest(shaft, names))
             points.append(Point(case, shafts=tuple(build.shafts)))
-        points += [_rebuilt(case, reference, scenes) for case in self.more_cylinders]
-        _check_objectives(points, scenes)
+        points += [_rebuilt(case, reference, problem_files) for case in self.more_cylinders]
+        _check_objectives(points, problem_files)
         return points
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the front of one engine."""
-        problem = scenes.problem(point)
+        problem = problem_files.problem(point)
         problem = with_loads(problem, alternating=True) if self.alternating else problem
         try:
             points = front(problem, self.mass_limits)
@@ -242,17 +242,17 @@ class Economics(Part):
         return p.Picture(data.attrs["title"], words, [fronts], credit, (7.2, 4.6), legend=legend)
 
 
-def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
+def _rebuilt(case: CaseTable, reference: Problem, problem_files: ProblemFiles) -> Point:
     """Return the point of an engine with more cylinders, at the power of the reference engine."""
-    problem = scenes.problem(Point(case))
+    problem = problem_files.problem(Point(case))
     cylinders = len(reference.engine.slider_cranks)
     if shafts_of(problem):
         rule = f"are present, but '{case.name}' is compared without balancer shafts"
-        raise scenes.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
+        raise problem_files.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
     if len(problem.engine.slider_cranks) <= cylinders:
         rule = f"has no more cylinders in '{case.name}' than the {cylinders} of the engine compared"
-        raise scenes.refused(case, "engine", rule, "name an engine with more")
-    with scenes.blamed(Point(case), "more_cylinders"):
+        raise problem_files.refused(case, "engine", rule, "name an engine with more")
+    with problem_files.blamed(Point(case), "more_cylinders"):
         check_comparable(problem, reference)
     return Point(case.model_copy(update={"equal_power_to": cylinders}), shafts=())
 
@@ -274,21 +274,21 @@ def check_comparable(problem: Problem, reference: Problem) -> None:
         )
 
 
-def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
+def _check_objectives(points: Sequence[Point], problem_files: ProblemFiles) -> None:
     objectives: dict[str, Point] = {}
     for point in points:
-        problem = scenes.problem(point)
-        scenes.refuse_open_phasing(problem, point.case)
+        problem = problem_files.problem(point)
+        problem_files.refuse_open_phasing(problem, point.case)
         objective = problem.load_terms
         if not objective or any(term.measure.is_mass for term in objective):
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
-            raise scenes.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
+            raise problem_files.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
         objectives.setdefault(str(objective), point)
     if len(objectives) > 1:
         first, second = list(objectives.values())[:2]
         rule = f"differs between '{first.case.name}' and '{second.case.name}'"
-        raise scenes.refused(second.case, "objective", rule, "give all engines the same")
+        raise problem_files.refused(second.case, "objective", rule, "give all engines the same")
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:

@@ -71,14 +71,14 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
     )
     if phasing.throw_bounds is None or is_unsupported:
         return None
-    realised = with_default_sampling(replace(phasing.realise(candidate), phasing=None))
+    star_problem = with_default_sampling(replace(phasing.problem_of(candidate), phasing=None))
     weights_on_throws = rotor_throws_of(phasing, candidate)
-    if any(drive.rotor in weights_on_throws for decision in realised.decisions for drive in decision.rotor_drives):
+    if any(drive.rotor in weights_on_throws for decision in star_problem.decisions for drive in decision.rotor_drives):
         return None
     lower, upper = np.transpose(phasing.throw_bounds)
     angles = np.array(candidate.throws)
     angles = np.clip(angles + math.tau * np.round((0.5 * (lower + upper) - angles) / math.tau), lower, upper)
-    return OpenThrows(ThrowWaves(realised, phasing.layout_of(candidate), weights_on_throws), angles, lower, upper)
+    return OpenThrows(ThrowWaves(star_problem, phasing.layout_of(candidate), weights_on_throws), angles, lower, upper)
 
 
 def along_arcs(halves: Array) -> tuple[Array, Array, Array]:

@@ -85,7 +85,7 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
     if answer.complete:
         return merge_results([answer], phasing.best)
     check_stars = [
-        phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)
+        phasing.problem_of(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)
     ]
     objective = couple_norms(problem, family.space, check_stars)
     if objective is None:
@@ -105,9 +105,9 @@ def _evaluate_stars(
     """Return crank stars with their values; complete if the best one meets the bound over all even stars (S40)."""
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
-        realised = phasing.realise(family.candidate(phasing, steps))
-        design = evaluate(realised)
-        value, fine = objective_value(realised, design), with_fine_sampling(design)
+        star_problem = phasing.problem_of(family.candidate(phasing, steps))
+        design = evaluate(star_problem)
+        value, fine = objective_value(star_problem, design), with_fine_sampling(design)
         # at more angles the bound of a mean is closer to the mean over the cycle (P7)
         shared = firing_bound(problem, fine)
         gap = gap_of(objective_value(problem, fine), max(bound, shared), numerical_zero(problem, design.engine))
@@ -122,7 +122,7 @@ def _evaluate_stars(
 
 def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
     couple = (Term(Measure(ROCKING_COUPLE, RMS)),)
-    of_couples = replace(phasing, realise=lambda candidate: phasing.realise(candidate).changed(objective=couple))
+    of_couples = replace(phasing, problem_of=lambda candidate: phasing.problem_of(candidate).changed(objective=couple))
     objective = _amplitudes(of_couples, family)
     if objective is None:
         return np.zeros((0, family.space.throws), dtype=np.uint8)
@@ -138,7 +138,7 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         space = replace(family.space, mirror=is_simple, reflect=is_simple)
         model = family.model(phasing, space)
         starts = [tuple(map(int, star)) for star in _with_least_couples(phasing, family)]
-        engines = {star: phasing.realise(family.candidate(phasing, star)) for star in starts}
+        engines = {star: phasing.problem_of(family.candidate(phasing, star)) for star in starts}
         values = {star: objective_value(star_problem, evaluate(star_problem)) for star, star_problem in engines.items()}
         first = min(starts, key=values.__getitem__, default=family.first)
         built = min(phasing.shafts.allowed, key=lambda shafts: coarse_value(model, first, shafts))

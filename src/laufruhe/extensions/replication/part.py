@@ -34,7 +34,7 @@ from laufruhe.files.study_tables import joined
 from laufruhe.present.picture import Picture
 from laufruhe.solvers import Status, solve
 from laufruhe.studies.part import Part, Record
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class Replication(Part):
         return [self]
 
     def settings(self) -> dict[str, Any]:
-        """Return the settings shared by all cases; numbers and problems belong to the scenes."""
+        """Return the settings shared by all cases; numbers and problem files belong to the points."""
         return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}}
 
     def size(self) -> int:
@@ -103,13 +103,13 @@ class Replication(Part):
         """Endings of the files; no CSV, because quantities have dimensions of their own."""
         return ("nc", "png") if self.picture_ else ("nc",)
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return every case at every combination of swept numbers, reading by reading."""
         points = []
         for reading, case in itertools.product(self._all_readings().values(), self.cases):
             grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
             with self._blamed(case.name):
-                tables = self._tables(case.problem, scenes)
+                tables = self._tables(case.problem, problem_files)
                 fill = filler(tables)
                 for values in itertools.product(*grids.values()):
                     swept = dict(zip(grids, values, strict=True))
@@ -121,18 +121,18 @@ class Replication(Part):
     def _all_readings(self) -> Mapping[str, Mapping[str, Any]]:
         return self.readings or {"": {}}
 
-    def _tables(self, name: Any, scenes: Scenes, *parents: Any) -> dict[str, Any]:
+    def _tables(self, name: Any, problem_files: ProblemFiles, *parents: Any) -> dict[str, Any]:
         if name in parents or not isinstance(name, str):
             raise ExpressionError(f"problem '{name}' refers to itself by `like`, or `like` is no name; correct `like`")
         if name not in self.problems:
-            return scenes.file(name)
+            return problem_files.file(name)
         tables = {key: value for key, value in self.problems[name].items() if key != "like"}
         like = self.problems[name].get("like")
-        return tables if like is None else joined(self._tables(like, scenes, name, *parents), tables)
+        return tables if like is None else joined(self._tables(like, problem_files, name, *parents), tables)
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return every quantity of one point of the study, at its optimum if numbers are open."""
-        problem, case = scenes.problem(point), _case(point)
+        problem, case = problem_files.problem(point), _case(point)
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
             raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")

@@ -33,7 +33,7 @@ from laufruhe.problem.evaluation import evaluate, with_common_base
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Drawing, Problem
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, statement_table
 
 # samples of a turn, and random engines that are computed at once
@@ -213,17 +213,17 @@ class ToleranceStudy(Part):
         """Return the settings that random engines depend on; marks are for pictures alone."""
         return self.model_dump(include={"kind", "tolerances", "engines", "seed"})
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return one point for each engine, at its single operating point."""
         for case in self.cases:
-            if len(scenes.problem(Point(case)).points) != 1:
+            if len(problem_files.problem(Point(case)).points) != 1:
                 rule = f"has several in '{case.name}', and tolerances are studied at one"
-                raise scenes.refused(case, "operating_points", rule, "name an engine with one")
+                raise problem_files.refused(case, "operating_points", rule, "name an engine with one")
         return [Point(case) for case in self.cases]
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of the free forces of one engine, with the keys of `spread`."""
-        return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
+        return spread(problem_files.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return a data set of all engines with the claims of the source."""

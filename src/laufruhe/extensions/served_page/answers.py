@@ -22,9 +22,9 @@ from laufruhe.extensions.served_page.claims import (
     settled_claim,
 )
 from laufruhe.extensions.served_page.controls import as_typed, controls_of, offered_by
+from laufruhe.extensions.served_page.page_problem import page_problem_of
 from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit, PageState
 from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
-from laufruhe.extensions.served_page.scenes import scene_of
 from laufruhe.files import edits
 from laufruhe.files.complaints import errors_in_file
 from laufruhe.files.reader import load_tables
@@ -127,25 +127,27 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
     """Return the optimum of the affine decisions, all others fixed, within milliseconds."""
     began, spent = time.perf_counter(), time.process_time()
     tables, problem = _requested(source, state, with_fixed=True)
-    scene = scene_of(problem, tables, source.content)
-    followed = scene.follower.at(problem.limits) if scene.follower else None
-    design, simpler = scene.evaluated(followed), scene.simpler(_held_kinds(source, state))
-    limits = scene.standing(problem.limits, design, followed)
-    value = objective_value(scene.problem, design) if scene.problem.objective else None
+    page_problem = page_problem_of(problem, tables, source.content)
+    followed = page_problem.follower.at(problem.limits) if page_problem.follower else None
+    design, simpler = page_problem.evaluated(followed), page_problem.simpler(_held_kinds(source, state))
+    limits = page_problem.standing(problem.limits, design, followed)
+    value = objective_value(page_problem.problem, design) if page_problem.problem.objective else None
     if followed is None:
-        claim = initial_claim(state.position, scene.problem, value, limits)
+        claim = initial_claim(state.position, page_problem.problem, value, limits)
     elif followed.conflict:
         claim = conflict_claim(state.position, followed.conflict, simpler)
     else:
         assert value is not None
-        claim = preview_claim(state.position, scene.problem, value, simpler, limits)
+        claim = preview_claim(state.position, page_problem.problem, value, simpler, limits)
     answer: dict[str, Any] = {
         **serialise.answer(claim, limits, problem, followed.conflict if followed else ()),
-        "key": scene.key,
-        "design": serialise.design(scene.problem, followed.values) if followed and not followed.conflict else None,
+        "key": page_problem.key,
+        "design": serialise.design(page_problem.problem, followed.values)
+        if followed and not followed.conflict
+        else None,
     }
-    if state.has not in (scene.key, LATER):
-        answer |= scene.drawn(problem.limits, design, followed)
+    if state.has not in (page_problem.key, LATER):
+        answer |= page_problem.drawn(problem.limits, design, followed)
     took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
     return {**answer, "seconds": took}
 
@@ -154,7 +156,7 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
 def measure(source: Source, state: PageState) -> dict[str, Any]:
     """Evaluate the displayed design by the exact model."""
     tables, whole_problem = _requested(source, state, with_fixed=True)
-    problem = replace(scene_of(whole_problem, tables, source.content).problem, limits=whole_problem.limits)
+    problem = replace(page_problem_of(whole_problem, tables, source.content).problem, limits=whole_problem.limits)
     values = decided(problem, state.design)
     evaluation = evaluate(problem.fixed_at([values[decision.name] for decision in problem.decisions]))
     limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
@@ -199,17 +201,17 @@ def picture(source: Source, state: PageState, k: int) -> dict[str, Any]:
 
 def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simplification]:
     tables, whole_problem = _requested(source, state, with_fixed=True)
-    scene = scene_of(whole_problem, tables, source.content)
-    problem = replace(scene.problem, limits=whole_problem.limits)
+    page_problem = page_problem_of(whole_problem, tables, source.content)
+    problem = replace(page_problem.problem, limits=whole_problem.limits)
     edges = [(limit.name, limit.minimum, limit.maximum, limit.outside) for limit in problem.limits]
-    key = f"{scene.key} {across} {edges}"
+    key = f"{page_problem.key} {across} {edges}"
     if key not in _fronts:
         measures = partners(problem)
         if across not in measures:
             raise refused("front", across, "is no measure of this problem", "", source.path.name)
         _fronts.clear()
         _fronts[key] = ParetoFront(problem, measures[across])
-    return _fronts[key], scene.simpler(_held_kinds(source, state))
+    return _fronts[key], page_problem.simpler(_held_kinds(source, state))
 
 
 @_answered

@@ -126,11 +126,11 @@ class SizeModel:
         self.names = [size for d in self.sizes for size in d.keys(Kind.SIZE)]
         self.lower = np.array([d.lower for d in self.sizes])
         self.upper = np.array([d.upper for d in self.sizes])
-        moving = self._moving = moving_gear(problem.engine)
-        self._sizes_given = moving.sizes
+        gear = self._moving = moving_gear(problem.engine)
+        self._sizes_given = gear.sizes
         self._engines, self._masses = dict[bytes, Engine](), dict[bytes, Array]()
         # one slider-crank without rotors has all sizes
-        self._one_cylinder = replace(moving, parts=moving.parts[:1], rotors=())
+        self._one_cylinder = replace(gear, parts=gear.parts[:1], rotors=())
         self._pieces: dict[float, dict[tuple[Measure, bool], tuple[Piece, ...]]] = {}
         self._evaluations: dict[float, list[Evaluation]] = {}
 

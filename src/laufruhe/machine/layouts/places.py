@@ -25,7 +25,7 @@ class Layout:
     sides
         Share of the angle between the banks at which every cylinder leans; its pin is offset by as much of the
         split pins' angle the other way. Empty without such banks.
-    late
+    firing_delays
         Crank angle from alpha = 0 to the dead centre that every cylinder fires at [rad]; empty if all are zero.
     throws
         Angle of every throw [rad] where the layout leaves no choice.
@@ -38,7 +38,7 @@ class Layout:
     pin_offsets: tuple[float, ...]
     throw_positions: tuple[float, ...]
     sides: tuple[float, ...] = ()
-    late: tuple[float, ...] = ()
+    firing_delays: tuple[float, ...] = ()
     throws: tuple[float, ...] | None = None
 
     def dead_centre_turn(self, k: int) -> Turn:
@@ -47,13 +47,13 @@ class Layout:
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
         """Return the crank angle of cylinder k's dead centre, in turns (C5)."""
-        late = as_turn(self.late[k]) if self.late else 0
-        return self.dead_centre_turn(k) - as_turn(throws[self.pins[k]]) + late
+        delay = as_turn(self.firing_delays[k]) if self.firing_delays else 0
+        return self.dead_centre_turn(k) - as_turn(throws[self.pins[k]]) + delay
 
     @property
     def spread(self) -> float:
-        """Largest deviation from even firing because dead centres are late [rad]."""
-        return max(self.late) - min(self.late) if self.late else 0.0
+        """Largest deviation from even firing, because the dead centres of some cylinders come later [rad]."""
+        return max(self.firing_delays) - min(self.firing_delays) if self.firing_delays else 0.0
 
     def side(self, k: int) -> float:
         """Return the share of the bank angle at which cylinder k leans: 1/2 left, -1/2 right."""

@@ -49,13 +49,15 @@ class Radial(LayoutKind):
         banks = tuple(math.tau * k / count for k in range(count))
         try:
             on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, bank, 0.0) for k, bank in enumerate(banks)]
-            late = tuple(part.fires_at for part in _hinged(inputs, on_crank))
+            delays = tuple(part.fires_at for part in _hinged(inputs, on_crank))
         except KeyedError:
             raise
         except ModelError as error:
             key = "articulated_rod_length" if inputs.options["articulated_rod_length"] else "knuckle_radius"
             raise KeyedError(key, str(error)) from None
-        return Layout("radial", none, banks, (0,) * count, none, (0.0,), late=late, throws=(banks[0] + late[0],))
+        return Layout(
+            "radial", none, banks, (0,) * count, none, (0.0,), firing_delays=delays, throws=(banks[0] + delays[0],)
+        )
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]

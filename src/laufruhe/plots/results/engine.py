@@ -6,7 +6,7 @@ import math
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
+from laufruhe.plots.machine_view import EngineView, draw_views, legend_of, views
 from laufruhe.plots.style import finish_page, styled
 from laufruhe.present.measures import has_firing
 from laufruhe.present.poses import THICKNESS
@@ -21,13 +21,13 @@ def applies(result: Result) -> bool:
 @styled()
 def figure(result: Result) -> Figure:
     """Draw end and side view at a crank angle of zero."""
-    scene = Scene.from_result(result)
-    drawn = views(scene)
-    draw_views(drawn, scene)
+    view = EngineView.from_result(result)
+    drawn = views(view)
+    draw_views(drawn, view)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
-    cycle = scene.engine.cycle.angle
-    fires = [part.name for part in scene.engine.cylinders if abs(math.remainder(part.firing_angle, cycle)) < 1e-9]
+    cycle = view.engine.cycle.angle
+    fires = [part.name for part in view.engine.cylinders if abs(math.remainder(part.firing_angle, cycle)) < 1e-9]
     firing = "firing " if has_firing(result) else ""
     centre = f", the {firing}dead centre of {' and '.join(fires)}" if fires else ""
-    lines = f"To scale, at a crank angle of 0°{centre}.{weights if scene.weights else ''}"
-    return finish_page(drawn, result, "The engine", lines, legend_of(scene))
+    lines = f"To scale, at a crank angle of 0°{centre}.{weights if view.weights else ''}"
+    return finish_page(drawn, result, "The engine", lines, legend_of(view))

@@ -120,10 +120,10 @@ def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
     lattice = firing_lattice(phasing.cycle, count)
     lower, upper = np.full(lattice.steps, math.inf), np.full(lattice.steps, -math.inf)
     for s, step in enumerate(lattice.slots):
-        early = max(s * intervals.minimum, cycle - (count - s) * intervals.maximum) - s * even
-        late = min(s * intervals.maximum, cycle - (count - s) * intervals.minimum) - s * even
+        earliest = max(s * intervals.minimum, cycle - (count - s) * intervals.maximum) - s * even
+        latest = min(s * intervals.maximum, cycle - (count - s) * intervals.minimum) - s * even
         p = -step % lattice.steps
-        lower[p], upper[p] = min(lower[p], -late), max(upper[p], -early)
+        lower[p], upper[p] = min(lower[p], -latest), max(upper[p], -earliest)
     # the first throw stays
     if phasing.cycle.turns == 1 or count % 2:
         lower[0] = upper[0] = 0.0

@@ -104,7 +104,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
         raise ModelError(
             f"more than {MAX_LISTED} crank stars cannot be open together with mounts; fix the firing order"
         )
-    on_initial = replace(phasing, realise=lambda candidate: _on_initial_mounts(phasing.realise(candidate)))
+    on_initial = replace(phasing, problem_of=lambda candidate: _on_initial_mounts(phasing.problem_of(candidate)))
     lists_all = phasing.method is Method.ENUMERATION
     scored: list[tuple[float, Star]] = []
     designs = 0
@@ -136,9 +136,9 @@ def _on_initial_mounts(problem: Problem) -> Problem:
 
 
 def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts: int) -> Problem:
-    realised = phasing.realise(candidate)
+    star_problem = phasing.problem_of(candidate)
     search = replace(problem.search, starts=starts)
-    return replace(realised, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
+    return replace(star_problem, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
 
 
 def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
@@ -250,13 +250,13 @@ def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], desig
 def _divide_boxes(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxResult:
     if phasing.throw_bounds is None or not best.is_feasible or not problem.search.proves or is_time_over():
         return BoxResult(0.0, 0)
-    realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
-    design = evaluate_design(realised, values_of(realised, best.result))
+    star_problem = with_default_sampling(replace(phasing.problem_of(best.candidate), phasing=None))
+    design = evaluate_design(star_problem, values_of(star_problem, best.result))
     witness = witness_of(design, mount_numbers(design))
-    value = design.value - sampling_overestimate(realised, design.evaluation)
+    value = design.value - sampling_overestimate(star_problem, design.evaluation)
     gap_tolerance = gap_tolerance_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return run_provers(
-        Question(realised, value, gap_tolerance, design.values, witness, open_throws=(phasing, best.candidate))
+        Question(star_problem, value, gap_tolerance, design.values, witness, open_throws=(phasing, best.candidate))
     )
 
 

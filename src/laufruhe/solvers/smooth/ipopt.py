@@ -61,12 +61,12 @@ _ENDINGS = {
 class Task:
     """Nonlinear program that can be pickled, in scaled variables.
 
-    `oracle` is its serialized CasADi function, from variables and parameters to objective and constraints (N1).
-    `stages` has the parameters of every stage (N4). Values of an external model are the input r of the oracle.
+    `program_text` is its serialized CasADi function, from variables and parameters to objective and constraints (N1).
+    `stages` has the parameters of every stage (N4). Values of an external model are the input r of that function.
     `external_model` has the serialized function from the variables to the arguments of the model, and the model.
     """
 
-    oracle: str
+    program_text: str
     lower: Array
     upper: Array
     constraint_lower: Array
@@ -177,14 +177,18 @@ class _Program:
 
 @lru_cache(maxsize=_BUILT)
 def _compiled_program(
-    oracle: str, expand: bool, max_iterations: int, external_model: tuple[str, Peaks] | None, stay_near: bool = False
+    program_text: str,
+    expand: bool,
+    max_iterations: int,
+    external_model: tuple[str, Peaks] | None,
+    stay_near: bool = False,
 ) -> _Program:
     """Return the compiled IPOPT solver of a serialised CasADi program; compiling takes as long as several starts.
 
-    See `Task` for `oracle` and `external_model`. If `expand` is True, arrays become scalars where that is faster.
+    See `Task` for `program_text` and `external_model`. If `expand` is True, arrays become scalars where that is faster.
     `stay_near` starts with a small barrier.
     """
-    function, external = ca.Function.deserialize(oracle), None
+    function, external = ca.Function.deserialize(program_text), None
     if expand:
         scalars = function.expand()
         if scalars.n_instructions() <= LONG * function.n_instructions():
@@ -196,7 +200,9 @@ def _compiled_program(
         external = _ExternalFunction("told", (arguments.size1_out(0),), shape, model.values, model.slopes)
         x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
         outputs = function(x=x, p=p, r=external(arguments(x)))
-        function = ca.Function("oracle", {"x": x, "p": p, "f": outputs["f"], "g": outputs["g"]}, ["x", "p"], ["f", "g"])
+        function = ca.Function(
+            "program_text", {"x": x, "p": p, "f": outputs["f"], "g": outputs["g"]}, ["x", "p"], ["f", "g"]
+        )
         # an external model has first derivatives only
         solver |= {"hessian_approximation": "limited-memory", "tol": LOOSER}
     n, m = function.size1_in("x"), function.size1_out("g")
@@ -258,7 +264,7 @@ class _End:
 
 
 def _compile_task(task: Task, stay_near: bool = False) -> _Program:
-    return _compiled_program(task.oracle, task.expand, task.max_iterations, task.external_model, stay_near)
+    return _compiled_program(task.program_text, task.expand, task.max_iterations, task.external_model, stay_near)
 
 
 def _run_stage(task: Task, program: _Program, y: Array, stage: Sequence[float]) -> _End:

@@ -321,7 +321,7 @@ class SmoothProgram:
         if self.moves is None:
             return self.problem
         problem = self.problem
-        moved = self.moves.phasing.realise(self.moves.candidate(self.throw_deviations(x)))
+        moved = self.moves.phasing.problem_of(self.moves.candidate(self.throw_deviations(x)))
         return replace(
             moved, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=problem.search
         )

@@ -54,7 +54,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
         load_limits = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)
         return star_problem.changed(objective=load_terms, limits=load_limits)
 
-    inner = replace(phasing, realise=lambda candidate: without_wheel(phasing.realise(candidate)))
+    inner = replace(phasing, problem_of=lambda candidate: without_wheel(phasing.problem_of(candidate)))
     result = solve(replace(without_wheel(problem), phasing=inner))
     result = with_constant_limits(
         replace(result, problem=result.problem.changed(objective=problem.objective)), problem.limits
@@ -93,7 +93,7 @@ def _any_star(problem: Problem, phasing: Phasing) -> Result:
         return no_star(problem, f"no crank star exists: {reason}")
     family = families[0]
     candidate = family.candidate(phasing, family.first)
-    result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
+    result = solve_fixed(replace(phasing.problem_of(candidate), phasing=None))
     value = objective_value(result.problem, result.final)
     proof = make_certificate(
         value, value, numerical_zero(problem), problem.tolerance, ProofStrength.EXACT, 0.0, _EQUAL_STARS

@@ -155,7 +155,7 @@ def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
     """Return the objective of a family as a sum of norms of single load orders; None if it has another form (S3)."""
     if family.fixed or family.is_of_orders:
         return None
-    first = phasing.realise(family.candidate(phasing, family.first))
+    first = phasing.problem_of(family.candidate(phasing, family.first))
     return amplitude_objective(first, phasing, family.layout)
 
 

@@ -137,7 +137,7 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
     for best, first in remaining:
         left_out = phasing.without(_needed_shafts(problem, phasing, best))
         candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
-        result = solve_fixed(replace(_with_half_tolerance(phasing.realise(candidate)), phasing=None))
+        result = solve_fixed(replace(_with_half_tolerance(phasing.problem_of(candidate)), phasing=None))
         # a peak between samples of the search may violate a limit
         if StarDesign(candidate, result).is_feasible:
             break
@@ -223,7 +223,7 @@ def solve_every_order(
         report_progress("firing orders and sets of shafts", k, len(designs), minimum)
         if results and (is_time_over() or time.perf_counter() - started > phasing.time_limit):
             break
-        results.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), minimum)))
+        results.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.problem_of(candidate)), minimum)))
     complete = len(results) == total
     solved = [design for design in results if design.is_feasible]
     if not solved:

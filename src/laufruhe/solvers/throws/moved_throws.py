@@ -50,11 +50,11 @@ class _MovedCrank:
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
             raise ModelError(f"these throws violate the firing intervals allowed, {self.phasing.intervals.text}")
-        realised = self.phasing.realise(candidate)
+        star_problem = self.phasing.problem_of(candidate)
         other_changes = {path: value for path, value in changes.items() if path[0] != CRANK}
         if other_changes:
-            return realised.rebuild(other_changes)
-        return Drawing(realised.engine, realised.points, realised.decisions, realised.mount_numbers)
+            return star_problem.rebuild(other_changes)
+        return Drawing(star_problem.engine, star_problem.points, star_problem.decisions, star_problem.mount_numbers)
 
 
 def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Problem], Result]) -> Result:
@@ -68,11 +68,11 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
     designs: list[tuple[float, Candidate, Result, Certificate]] = []
     count = 0
     for start in until_time_limit(with_progress("start cranks", starts)):
-        crank, realised = _MovedCrank(phasing, start), phasing.realise(start)
+        crank, star_problem = _MovedCrank(phasing, start), phasing.problem_of(start)
         angles = tuple(_angle_decisions(phasing, start))
-        options = replace(realised.search, starts=min(realised.search.starts, MAX_SEARCHES))
-        decisions = (*realised.decisions, *angles)
-        open_problem = replace(realised, phasing=None, rebuild=crank, decisions=decisions, search=options)
+        options = replace(star_problem.search, starts=min(star_problem.search.starts, MAX_SEARCHES))
+        decisions = (*star_problem.decisions, *angles)
+        open_problem = replace(star_problem, phasing=None, rebuild=crank, decisions=decisions, search=options)
         with search_scope("a crank that throws leave"):
             result = search(open_problem)
         values = {entry.name: entry.value for entry in result.decisions}
@@ -82,7 +82,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
         result = replace(
             result,
             decisions=tuple(entry for entry in result.decisions if entry.name not in names),
-            problem=replace(result.problem, decisions=remaining, rebuild=realised.rebuild),
+            problem=replace(result.problem, decisions=remaining, rebuild=star_problem.rebuild),
         )
         count += 1
         if result.status.has_design and result.objective and result.certificate:

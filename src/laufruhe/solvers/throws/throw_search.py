@@ -290,9 +290,9 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     ) -> tuple[Callable[[int], ThrowPrograms], Callable[[int], float]]:
         """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
         phasing = self._phasing
-        candidate, realised = self._first_crank(windows, left_out)
+        candidate, star_problem = self._first_crank(windows, left_out)
         throw_of_rotor, layout = rotor_throws_of(phasing, candidate), phasing.layout_of(candidate)
-        riders = Riders(realised, throw_of_rotor, candidate.throws)
+        riders = Riders(star_problem, throw_of_rotor, candidate.throws)
         if any(phasing.is_geometry_open):
             if not has_same_unbalances(phasing, candidate):
                 raise ModelError("unbalances on offset pins depend on the open bank or split pin angle")
@@ -304,7 +304,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
             waves = ThrowWaves(riders.problem, layout, throw_of_rotor)
 
         def truncation(samples: int) -> float:
-            return sum(term.weight * waves.left_out(term.measure, samples) for term in realised.objective)
+            return sum(term.weight * waves.left_out(term.measure, samples) for term in star_problem.objective)
 
         return partial(ThrowPrograms, waves, riders, firing_bounds(phasing)), truncation
 
@@ -314,7 +314,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         for k, window in enumerate(first_windows):
             candidate = replace(self.candidate(window, nearest_throws(window)), left_out=left_out)
             try:
-                return candidate, replace(self._phasing.realise(candidate), phasing=None)
+                return candidate, replace(self._phasing.problem_of(candidate), phasing=None)
             except ModelError:
                 if k + 1 == len(first_windows):
                     raise

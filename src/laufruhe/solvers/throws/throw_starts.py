@@ -143,7 +143,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
         bank = min(max(pattern.angle - split, low), high)
     layout, count = phasing.layout(bank, split), len(pattern.members)
     zero_crank = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
-    objective = amplitude_objective(replace(phasing.realise(zero_crank), limits=()), phasing, layout)
+    objective = amplitude_objective(replace(phasing.problem_of(zero_crank), limits=()), phasing, layout)
     maximum = max((_MAX_CRANKS if objective else _MAX_EVALUATED) // number**2, _FEWEST)
     if phasing.firing_order is not None:
         orders = np.arange(count)[None]
@@ -173,7 +173,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
             value = float(values[k])
         else:
             try:
-                problem = phasing.realise(crank)
+                problem = phasing.problem_of(crank)
                 value = objective_value(problem, evaluate(problem))
             except ModelError:
                 continue

@@ -116,7 +116,7 @@ def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
     ends = [(pair, 0.5 * (pair[0] + pair[1])) if pair else ((None,), None) for pair in (phasing.bank, phasing.split)]
     states = [
         rotor_states(
-            phasing.realise(replace(candidate, firing_order=None, bank_angle=b, split_pin=s, without_gas=True))
+            phasing.problem_of(replace(candidate, firing_order=None, bank_angle=b, split_pin=s, without_gas=True))
         )
         for b, s in product((*ends[0][0], ends[0][1]), (*ends[1][0], ends[1][1]))
     ]
@@ -128,7 +128,7 @@ def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[st
 
     `throw_of_rotor` has the index of the throw of every rotor that turns with one.
     """
-    problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
+    problem = phasing.problem_of(replace(candidate, firing_order=None, without_gas=True))
     free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in throw_of_rotor}
     if any(rotor.unbalance for rotor in problem.engine.rotors if rotor.name in free):
         return False

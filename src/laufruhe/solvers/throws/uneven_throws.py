@@ -97,7 +97,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
     box_bound = None
     if not designs or phasing.thorough:
         with_work = work_for_bounds(problem, designs[0].value if designs else math.inf)
-        phasing_of_work = replace(phasing, realise=lambda candidate: with_work(phasing.realise(candidate)))
+        phasing_of_work = replace(phasing, problem_of=lambda candidate: with_work(phasing.problem_of(candidate)))
         box_bound = search_throws(with_work(problem), phasing_of_work, designs[0] if designs else None, floor, improve)
     if box_bound is not None:
         floor, source = max(floor, box_bound.bound), f"{box_bound.boxes} {box_bound.what}"
@@ -150,7 +150,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
     families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
     if len(families) == 1 and families[0].fixed is None:
         # without limits, the bound is still valid
-        first = replace(phasing.realise(families[0].candidate(phasing, families[0].first)), limits=())
+        first = replace(phasing.problem_of(families[0].candidate(phasing, families[0].first)), limits=())
         objective = amplitude_objective(first, phasing, families[0].layout)
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
@@ -192,7 +192,7 @@ def local_optimum(
     best = _if_feasible(phasing, intervals, _evaluate(phasing, start, 0.0, has_moved_throws=False))
     if intervals.forbid_unevenness and phasing.throw_bounds is None:
         return best
-    problem = with_work_for_search(replace(phasing.realise(start), phasing=None))
+    problem = with_work_for_search(replace(phasing.problem_of(start), phasing=None))
     # the exact model checks limits on numbers of the crank, which are not in the program
     problem = replace(problem, limits=problem.load_limits)
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
@@ -256,7 +256,7 @@ def _start_points(smooth: SmoothProgram, best: StarDesign | None) -> list[Array]
 
 def _evaluate(phasing: Phasing, candidate: Candidate, residual: float, has_moved_throws: bool) -> StarDesign | None:
     try:
-        result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
+        result = solve_fixed(replace(phasing.problem_of(candidate), phasing=None))
     except ModelError:
         return None
     is_finite = result.objective is None or math.isfinite(result.objective.value)

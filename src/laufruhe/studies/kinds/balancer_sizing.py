@@ -15,7 +15,7 @@ from laufruhe.present.picture import Picture
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
-from laufruhe.studies.scenes import Point, Scenes, shafts_of
+from laufruhe.studies.scenes import Point, ProblemFiles, shafts_of
 from laufruhe.studies.swept import SweptPart, solve_scene
 from laufruhe.studies.swept_report import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
@@ -41,31 +41,33 @@ class BalancerSizing(SweptPart):
 
     kind: Literal["balancer sizing"]
 
-    def points(self, scenes: Scenes) -> list[Point]:
-        """Return, for every scene, all sets of its groups of shafts, the plain engine first."""
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
+        """Return the points of every case: one for each set of its groups of shafts, without shafts first."""
         points = []
-        problems = self.checked(scenes)
-        self.check_moved_by_loads(problems, scenes, "shaft")
+        problems = self.checked(problem_files)
+        self.check_moved_by_loads(problems, problem_files, "shaft")
         for case, problem in zip(self.cases, problems, strict=True):
             groups = shaft_groups(problem)
             if not groups:
-                raise scenes.refused(case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft")
-            scenes.refuse_open_phasing(problem, case)
+                raise problem_files.refused(
+                    case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft"
+                )
+            problem_files.refuse_open_phasing(problem, case)
             if len(groups) > MAX_GROUPS:
                 rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
-                raise scenes.refused(case, "balancer_shafts", rule, f"study {MAX_GROUPS} or fewer")
+                raise problem_files.refused(case, "balancer_shafts", rule, f"study {MAX_GROUPS} or fewer")
             count = 2 ** len(groups) * self.size()
             if count > MAX_POINTS:
                 rule = f"makes {count} points; a study takes {MAX_POINTS}"
-                raise scenes.refused(case, "balancer_shafts", rule, "ask for fewer")
+                raise problem_files.refused(case, "balancer_shafts", rule, "ask for fewer")
             sets = [chosen for k in range(len(groups) + 1) for chosen in itertools.combinations(groups, k)]
             for changes in self.combinations():
                 points += [Point(case, changes, self.metric, tuple(itertools.chain(*chosen))) for chosen in sets]
         return points
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of one set of shafts at its proven optimum."""
-        return solve_scene(_counting(scenes.problem(point)))
+        return solve_scene(_counting(problem_files.problem(point)))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the dataset of a sweep with the shafts of every point."""

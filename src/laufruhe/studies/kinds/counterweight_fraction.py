@@ -12,7 +12,7 @@ import xarray as xr
 from laufruhe.files.rotors import FACTORS
 from laufruhe.files.study_tables import SweepAxis, at
 from laufruhe.present import picture as p
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import SweptPart, coordinates, dataset
 from laufruhe.studies.swept_report import (
     bars,
@@ -32,20 +32,22 @@ class CounterweightFraction(SweptPart):
 
     kind: Literal["counterweight fraction"]
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return every swept fraction and then, for each speed, the open fraction."""
-        problems = self.checked(scenes)
-        self.check_moved_by_loads(problems, scenes, "counterweight")
+        problems = self.checked(problem_files)
+        self.check_moved_by_loads(problems, problem_files, "counterweight")
         fraction = self._swept_fraction()
         if fraction is None:
             for case, problem in zip(self.cases, problems, strict=True):
                 if not any(decision.name.endswith(FACTORS) for decision in problem.decisions):
                     rule = "has no open balance factor, and the part sweeps none"
-                    raise scenes.refused(case, "counterweights", rule, "sweep counterweights.NAME.balance_factor")
+                    raise problem_files.refused(
+                        case, "counterweights", rule, "sweep counterweights.NAME.balance_factor"
+                    )
             return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
         points = []
         for case in self.cases:
-            entry, numbers = at(scenes.tables(Point(case)), fraction.quantity), fraction.numbers or ()
+            entry, numbers = at(problem_files.tables(Point(case)), fraction.quantity), fraction.numbers or ()
             left_open = entry if isinstance(entry, dict) else {"between": [min(numbers), max(numbers)]}
             for speed in self.combinations(without=fraction.quantity):
                 tried = ({**speed, fraction.quantity: value} for value in (*fraction.values, left_open))

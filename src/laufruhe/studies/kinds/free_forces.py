@@ -28,7 +28,7 @@ from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import fixed
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text, marked_table
 
 ORDERS, WHAT = (1, 2), ("force", "couple")
@@ -110,16 +110,16 @@ class FreeForces(Part):
         """Return the unit of length only; printed values change nothing."""
         return {"kind": self.kind, "spacing": self.spacing}
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return one point per layout."""
         points = [Point(case) for case in self.cases]
         for point in points:
-            scenes.problem(point)
+            problem_files.problem(point)
         return points
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return free loads of one layout, and its shortest and longest firing interval [rad]."""
-        engine = scenes.problem(point).engine
+        engine = problem_files.problem(point).engine
         loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
         intervals = engine.firing_intervals
         return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}

@@ -22,7 +22,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import Further, SweptPart, solve_scene
 from laufruhe.studies.swept_report import MAX_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
 from laufruhe.studies.text import DASH, Text, marked_table, number
@@ -48,18 +48,19 @@ class LayoutComparison(SweptPart):
         "Degree of irregularity; the smallest inertia beside pistons and rods that keeps it is ranked too."
     )
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return every case at every combination, after checking that sizes are equal."""
-        points = super().points(scenes)
+        points = super().points(problem_files)
         power = self.cases[0].equal_power_to
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
         if odd is not None:
             rule = f"differs between cases '{self.cases[0].name}' and '{odd.name}'"
-            raise scenes.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
-        self._check_cylinders(scenes)
+            raise problem_files.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
+        self._check_cylinders(problem_files)
         at = self.combinations()[0]
         measures_by_case = [
-            self._measures(scenes.problem(Point(case, at, self.metric)), case, scenes) for case in self.cases
+            self._measures(problem_files.problem(Point(case, at, self.metric)), case, problem_files)
+            for case in self.cases
         ]
         for name in self.further:
             first, *others = (measures[name] for measures in measures_by_case)
@@ -67,25 +68,27 @@ class LayoutComparison(SweptPart):
                 raise first
         return points
 
-    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure | InputError]:
+    def _measures(
+        self, problem: Problem, case: CaseTable, problem_files: ProblemFiles
+    ) -> dict[str, Measure | InputError]:
         """Return further quantities by name, or the error of an engine that lacks one."""
         context, measures = MeasureContext(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
             # an engine without weights has a mass of zero
             is_mass = name in MEASURES and MEASURES[name][0].is_mass
             try:
-                with scenes.named(case):
+                with problem_files.named(case):
                     plain, table = Measure(*MEASURES[name]) if is_mass else None, QuantityTable()
                     measures[name] = plain or context.measure(name, table, "study.further")
             except InputError as error:
                 measures[name] = error
         return measures
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of the proven optimum, with every further quantity of that design."""
-        problem = scenes.problem(point)
+        problem = problem_files.problem(point)
         further: dict[str, Further] = {
-            n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()
+            n: partial(_value, m) for n, m in self._measures(problem, point.case, problem_files).items()
         }
         if self.flywheel_for is not None:
             degree = self.flywheel_for
@@ -94,21 +97,23 @@ class LayoutComparison(SweptPart):
             )
         return solve_scene(problem, further)
 
-    def _check_cylinders(self, scenes: Scenes) -> None:
+    def _check_cylinders(self, problem_files: ProblemFiles) -> None:
         """Refuse layouts of different cylinders, where a difference in size would pass for one of layout."""
         sizes = []
         for case in self.cases:
             as_drawn = Point(case.model_copy(update={"equal_power_to": None}), self.combinations()[0], self.metric)
-            sizes.append({(c.bore or 0.0, c.crank_radius) for c in scenes.problem(as_drawn).engine.slider_cranks})
+            sizes.append(
+                {(c.bore or 0.0, c.crank_radius) for c in problem_files.problem(as_drawn).engine.slider_cranks}
+            )
         for case, size in zip(self.cases, sizes, strict=True):
             if len(size) > 1:
                 rule = "has cylinders of different bore or stroke"
-                raise scenes.refused(case, "engine", rule, "give all cylinders one size")
+                raise problem_files.refused(case, "engine", rule, "give all cylinders one size")
         bore_1, radius_1 = next(iter(sizes[0]))
         for case, ((bore, radius),) in zip(self.cases, sizes, strict=True):
             if abs(radius - radius_1) > _SAME * radius_1 or abs(bore - bore_1) > _SAME:
                 rule = f"has another bore or stroke in '{case.name}' than in '{self.cases[0].name}'"
-                raise scenes.refused(case, "engine", rule, "compare layouts of one cylinder")
+                raise problem_files.refused(case, "engine", rule, "compare layouts of one cylinder")
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the dataset of a sweep with the size of comparison and the further quantities."""

@@ -17,7 +17,7 @@ from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Column, Record, variable
 from laufruhe.studies.regions import VALUES
 from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
 
@@ -31,37 +31,39 @@ class RandomDesigns(Sampled):
     kind: Literal["random designs"]
     own_chunk: ClassVar[int] = 10_000
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return, for every case, the proven optimum and the pieces of its draws."""
         for case in self.cases:
-            with scenes.blamed(Point(case), "decisions"):
-                problem = scenes.problem(Point(case))
+            with problem_files.blamed(Point(case), "decisions"):
+                problem = problem_files.problem(Point(case))
                 prepare(problem)
             if not problem.decisions:
-                raise scenes.refused(case, "decisions", "are missing, so there is nothing to draw", "open an unbalance")
+                raise problem_files.refused(
+                    case, "decisions", "are missing, so there is nothing to draw", "open an unbalance"
+                )
             unweighed = [limit.name for limit in problem.limits if limit not in problem.load_limits]
             if unweighed:
                 rule = f"has '{unweighed[0]}', which is no limit on loads or masses"
-                raise scenes.refused(case, "constraints", rule, "leave it out")
-        self.check_objective(scenes)
+                raise problem_files.refused(case, "constraints", rule, "leave it out")
+        self.check_objective(problem_files)
         return [Point(case, span=span) for case in self.cases for span in (None, *self.spans())]
 
-    def columns(self, scenes: Scenes) -> dict[str, Column]:
+    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
         """Return columns for objective, limits and every open number."""
         columns: dict[str, Column] = {}
         for case in self.cases:
-            problem = scenes.problem(Point(case))
+            problem = problem_files.problem(Point(case))
             columns["objective"] = Column(problem.objective_unit or "", problem.objective_name)
             columns[WITHIN] = Column("1", "1 where a design keeps all limits")
             entries = [entry for d in problem.unbalances for entry in decision_values(d, d.start)]
             columns |= {entry.name: Column(entry.unit, entry.name) for entry in entries}
         return columns
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return the record of the proven optimum, or the values of a piece."""
         if point.span is None:
-            return solve_scene(scenes.problem(point))
-        problem, designs, names = self._prepared(point, scenes)
+            return solve_scene(problem_files.problem(point))
+        problem, designs, names = self._prepared(point, problem_files)
         u = self.random(point.span, 2 * len(problem.unbalances))
         sizes, angles = u[:, ::2].copy(), u[:, 1::2].copy()
         for k, decision in enumerate(problem.unbalances):
@@ -89,12 +91,12 @@ class RandomDesigns(Sampled):
             data[words.replace(" ", "_")] = column
         return data.assign_coords(proof=("case", [record["proof"] for record in best]))
 
-    def _prepared(self, point: Point, scenes: Scenes) -> tuple[Problem, Designs, list[str]]:
-        mark = scenes.fingerprint(Point(point.case), self.settings())
+    def _prepared(self, point: Point, problem_files: ProblemFiles) -> tuple[Problem, Designs, list[str]]:
+        mark = problem_files.fingerprint(Point(point.case), self.settings())
         if mark not in _PREPARED:
             _PREPARED.clear()
-            problem = scenes.problem(Point(point.case))
-            _PREPARED[mark] = problem, prepare(problem), list(self.columns(scenes))
+            problem = problem_files.problem(Point(point.case))
+            _PREPARED[mark] = problem, prepare(problem), list(self.columns(problem_files))
         return _PREPARED[mark]
 
     @staticmethod

@@ -19,7 +19,7 @@ from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Column, Record
 from laufruhe.studies.regions import VALUES
 from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import Text, marked_table, number
@@ -33,7 +33,7 @@ _WORDS = {"objective_given": "initial design", "objective": "final design", "low
 
 
 class RandomScenes(Sampled):
-    """Numbers of the problem file drawn at random; every scene decided as `solve` does."""
+    """Numbers of the problem file drawn at random; every random problem is decided as by `laufruhe solve`."""
 
     kind: Literal["random scenes"]
     vary: list[DrawnTable] = Field(
@@ -49,21 +49,21 @@ class RandomScenes(Sampled):
         """Return the drawn quantities with their ranges."""
         return [span_of(table) for table in self.vary]
 
-    def points(self, scenes: Scenes) -> list[Point]:
-        """Return the pieces of every case, after building its scene at both ends of every range."""
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
+        """Return the batches of draws of every case; check that its problem builds at the ends of all ranges."""
         for case in self.cases:
             for span in self.drawn():
                 for end in (span.low, span.high):
-                    scenes.problem(Point(case, {span.quantity: span.value(end)}))
-        self.check_objective(scenes)
+                    problem_files.problem(Point(case, {span.quantity: span.value(end)}))
+        self.check_objective(problem_files)
         return [Point(case, span=span) for case in self.cases for span in self.spans()]
 
-    def columns(self, scenes: Scenes) -> dict[str, Column]:
+    def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
         """Return columns for drawn numbers, outcomes and decisions."""
         spans = self.drawn()
         columns = {span.quantity: Column(span.unit, span.quantity) for span in spans}
         for case in self.cases:
-            problem = scenes.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
+            problem = problem_files.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
             name, unit = problem.objective_name, problem.objective_unit or ""
             columns |= {key: Column(unit, f"{name}, {words}") for key, words in _WORDS.items()}
             columns |= {key: Column("1", key) for key in _CODES}
@@ -71,17 +71,17 @@ class RandomScenes(Sampled):
             columns |= {entry.name: Column(entry.unit, f"final: {entry.name}") for entry in entries}
         return columns
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return a row per draw: its scene read and decided."""
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
+        """Return the record of a batch of draws: each random problem is read and optimised; one row per draw."""
         assert point.span is not None
-        spans, names = self.drawn(), list(self.columns(scenes))
+        spans, names = self.drawn(), list(self.columns(problem_files))
         shares = self.random(point.span, len(spans))
         drawn = np.stack([span.numbers(shares[:, k]) for k, span in enumerate(spans)], axis=1)
         rows = []
         for numbers in drawn:
             changes = {span.quantity: span.value(x) for span, x in zip(spans, numbers, strict=True)}
             try:
-                record = solve_scene(scenes.problem(replace(point, changes=changes, span=None)))
+                record = solve_scene(problem_files.problem(replace(point, changes=changes, span=None)))
             except (InputError, ModelError):
                 # an engine that cannot be built is counted
                 record = IMPOSSIBLE
@@ -124,7 +124,7 @@ class RandomScenes(Sampled):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw the share of scenes below each value, of initial and final designs."""
+        """Draw the percentage of random problems with an objective below each value, for initial and final designs."""
         marks: list[p.Mark] = []
         for k, name in enumerate(data["case"].values):
             part, colour = data.sel(case=name), p.colour(k, data.sizes["case"])

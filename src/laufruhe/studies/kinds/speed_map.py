@@ -26,7 +26,7 @@ from laufruhe.problem.measure import Measure, narrow_signal
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import FINAL, INITIAL, present_name
 from laufruhe.studies.part import Part, Record, variable
-from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import FAILED, decide_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import DASH, Text, marked_table, number
@@ -84,32 +84,32 @@ class SpeedMapStudy(Part):
     designs: list[DesignName] = Field(default=["initial", "final"], min_length=1)
     by_order: bool = f.optional("Show the amplitude of every order of the first measure too.", False)
 
-    def points(self, scenes: Scenes) -> list[Point]:
+    def points(self, problem_files: ProblemFiles) -> list[Point]:
         """Return one point per case, because decisions do not depend on the speeds of the map."""
         for case in self.cases:
-            problem = scenes.problem(Point(case))
-            self._load(problem, case, scenes)
-            measures = list(self._measures(problem, case, scenes))
+            problem = problem_files.problem(Point(case))
+            self._load(problem, case, problem_files)
+            measures = list(self._measures(problem, case, problem_files))
             if not measures:
                 rule = "has no measure that depends on speed"
-                raise scenes.refused(case, "objective", rule, "name measures in the part")
+                raise problem_files.refused(case, "objective", rule, "name measures in the part")
             if self.by_order and not measures[0].is_load:
                 rule = f"has no orders of its first measure, {measures[0].name}"
-                raise scenes.refused(case, "objective", rule, "name a force, couple, moment or travel first")
-            with scenes.blamed(Point(case)):
+                raise problem_files.refused(case, "objective", rule, "name a force, couple, moment or travel first")
+            with problem_files.blamed(Point(case)):
                 evaluate(problem)
         return [Point(case) for case in self.cases]
 
-    def _load(self, problem: Problem, case: CaseTable, scenes: Scenes) -> OperatingPoint:
+    def _load(self, problem: Problem, case: CaseTable, problem_files: ProblemFiles) -> OperatingPoint:
         names, name = [point.name for point in problem.points], self.operating_point
         if name is not None and name not in names:
-            raise scenes.refused(case, "operating_points", f"has no '{name}'", nearest(name, names))
+            raise problem_files.refused(case, "operating_points", f"has no '{name}'", nearest(name, names))
         return problem.points[0 if name is None else names.index(name)]
 
-    def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
+    def _measures(self, problem: Problem, case: CaseTable, problem_files: ProblemFiles) -> dict[Measure, float]:
         # mapped measures, at any speed, with the limits of this part
         context, limits = MeasureContext(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
-        with scenes.named(case):
+        with problem_files.named(case):
             if self.measures:
                 limits = {}
             for k, table in enumerate(self.measures, 1):
@@ -119,10 +119,13 @@ class SpeedMapStudy(Part):
         narrowed = {"operating_points", "orders"}
         return {replace(m, points=None): limit for m, limit in limits.items() if narrowed <= set(m.channel.keys)}
 
-    def answer(self, point: Point, scenes: Scenes) -> Record:
+    def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
         """Return values, limits and orders of every design at every speed, for one point of the study."""
-        problem = scenes.problem(point)
-        load, limits = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
+        problem = problem_files.problem(point)
+        load, limits = (
+            self._load(problem, point.case, problem_files),
+            self._measures(problem, point.case, problem_files),
+        )
         measures = list(limits)
         speeds = self.speeds.with_point(load)
         designs = {

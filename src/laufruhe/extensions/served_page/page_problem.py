@@ -38,11 +38,11 @@ STILL: Mapping[Kind, str] = {
     Kind.LEAD: "these phases of geared shafts",
 }
 """Words for numbers that are fixed while sliders move."""
-_MAX_SCENES = 6
+_MAX_PAGE_PROBLEMS = 6
 
 
-class PageScene:
-    """Problem without the values of its limits, with its drawing and its follower.
+class PageProblem:
+    """Problem that a live page shows, with the drawing data and the fast optimiser (`follower`) of its sliders.
 
     Open numbers that loads are not affine in keep their initial values.
     """
@@ -119,19 +119,20 @@ class PageScene:
         return Simplification(tuple(phrases), tuple(left_out))
 
 
-_scenes: dict[str, PageScene] = {}
+_page_problems: dict[str, PageProblem] = {}
 
 
-def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageScene:
-    """Return the page scene of a problem, from a small cache.
+def page_problem_of(problem: Problem, tables: Mapping[str, Any], content: str) -> PageProblem:
+    """Return what a page shows of a problem, from a small cache.
 
-    Values of limits do not distinguish scenes; `content` is the hash of all files that the problem names.
+    Problems that differ only in the values of limits share an entry. `content` is the hash of all files that the
+    problem names.
     """
     limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
     text = json.dumps([content, {**tables, "constraints": limits}], sort_keys=True, default=str)
     key = hashlib.sha256(text.encode()).hexdigest()[:16]
-    if key not in _scenes:
-        while len(_scenes) >= _MAX_SCENES:
-            _scenes.pop(next(iter(_scenes)))
-        _scenes[key] = PageScene(problem, key)
-    return _scenes[key]
+    if key not in _page_problems:
+        while len(_page_problems) >= _MAX_PAGE_PROBLEMS:
+            _page_problems.pop(next(iter(_page_problems)))
+        _page_problems[key] = PageProblem(problem, key)
+    return _page_problems[key]
