@@ -116,7 +116,7 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED["mean"])
     search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
     centre = np.array([d.start for d in problem.mount_decisions])
-    value, lines = objective_value(problem, evaluate(problem)), search.model.lines(measure)
+    value, lines = objective_value(problem, evaluate(problem)), search.model.loaded_orders(measure)
     lacking = []
     for share in (1e-2, 1e-3):
         low, high = centre * (1.0 - share), centre * (1.0 + share)

@@ -141,7 +141,7 @@ class BranchAndBound(Generic[P]):
         return self.resume(max_nodes)
 
     def resume(self, max_nodes: int) -> float:
-        """Continue the search up to `max_nodes` parts in total, and return the lower bound [SI]."""
+        """Continue the branch and bound search up to `max_nodes` parts in total, and return its lower bound [SI]."""
         queue, self.complete = self.open_nodes, True
         while queue:
             self.propose(queue[0].part)
@@ -190,7 +190,7 @@ class Box(NamedTuple):
 
 
 def halves(box: Box, cut: float | None = None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """Cut a box across its side, and return the bounds (lower, upper) of both parts.
+    """Cut a box in two across its selected side, and return the bounds (lower, upper) of both parts.
 
     The cut is the middle, or a position moved at least `CUT_MARGIN` away from the ends of the side.
     """

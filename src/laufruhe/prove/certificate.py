@@ -212,7 +212,10 @@ def is_moved(norm: AffineNorm) -> bool:
 
 
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
-    """Return the lower bound of the objective that any dual rows on the grid of the problem give (P4)."""
+    """Return a lower bound of the objective over all feasible designs, and its dual rows (P4).
+
+    Any dual rows on the grid of samples of the problem give a valid bound; better ones give a higher bound.
+    """
     affine = minorant(problem, multipliers)
     minimum = affine.constant + sum(domain.minimum(affine.gradient) for domain in problem.domains)
     # a sum of norms is never negative
@@ -220,7 +223,10 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
-    """Return True if the dual rows `limits` of the limits, shape (k, d) each, prove that no design keeps them (P4)."""
+    """Return True if dual rows prove that no design keeps all limits (P4).
+
+    `limits` has the dual rows of every limit, shape (k, d) each.
+    """
     proof = lower_bound(replace(problem, terms=()), Multipliers((), limits))
     sizes = [maximum + norm.value(np.zeros(problem.size)) for maximum, norm in problem.limits]
     scale = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
@@ -228,7 +234,7 @@ def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
 
 
 def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound:
-    """Return the best lower bound that a solution on the same or a coarser grid suggests (P6).
+    """Return the best lower bound of the objective from a solution on the same or a coarser grid of samples (P6).
 
     Two proposals are compared. One interpolates the solver's dual rows between the coarse samples. The other takes the
     subgradient of every term at x, and the solver's dual row only where a row of the term vanishes.
@@ -256,7 +262,7 @@ def best_bound(problem: AffineProblem, x: Array, solution: Multipliers) -> Bound
 
 
 def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound: Bound) -> None:
-    """Report a lower bound that exceeds the Lagrangian of its own dual rows at a decision vector (P4).
+    """Report an error if a lower bound exceeds the Lagrangian of its own dual rows at a decision vector (P4).
 
     The check needs no feasible design: violations of limits are priced.
 
@@ -288,7 +294,7 @@ def _size(norm: AffineNorm, x: Array) -> float:
 
 
 def interpolate_duals(problem: AffineProblem, solution: Multipliers) -> Multipliers:
-    """Interpolate the dual rows of a solution on a coarser grid to the grid of a problem (P6).
+    """Return dual rows on the samples of a problem, interpolated from a solution with fewer samples (P6).
 
     Terms of the problem beyond those of the solution are left out.
     """
@@ -299,7 +305,9 @@ def interpolate_duals(problem: AffineProblem, solution: Multipliers) -> Multipli
 
 
 def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
-    """Return dual rows of the terms, corrected as little as possible, so that the gradient vanishes in the interior.
+    """Return corrected dual rows, so that the linear lower bound has no slope along decisions between their bounds.
+
+    The dual rows of the objective terms change as little as possible.
 
     The interior directions are those in which no decision of x is on a bound. A slope along one of them, even a
     rounding error of the solver, costs slope times distance to the bound, which may be all of the lower bound.
@@ -332,7 +340,7 @@ def flatten_interior(problem: AffineProblem, x: Array, bound: Bound) -> Multipli
 
 
 def _interpolate(fine: AffineNorm, z: Array) -> Array:
-    """Interpolate dual rows of a coarser grid, shape (k, d), to the grid of a norm; dual rows of masses stay."""
+    """Return dual rows of a norm, shape (k, d), interpolated from fewer samples; dual rows of masses stay unchanged."""
     signals, kinks = len(fine.grid.weights) // fine.grid.steps, fine.grid.kinks
     factor, remainder = divmod(len(fine.grid.weights) - signals * kinks, max(len(z) - signals * kinks, 1))
     if remainder:

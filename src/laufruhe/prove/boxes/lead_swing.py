@@ -103,7 +103,7 @@ def _earlier(signal: Spectrum, lead: float) -> Spectrum:
 
 
 def largest_torque(torque: Spectrum) -> float:
-    """Return an upper bound of |torque - mean torque| over the cycle [N m]."""
+    """Return an upper bound of the deviation of a torque from its mean, anywhere in the cycle [N m]."""
     swing = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
     values = np.concatenate([swing.sample(steps), swing.values(swing.kink_angles)])

@@ -99,7 +99,7 @@ class LeadBoxes:
         return [swing.minimum_over(leads, np.zeros_like(leads)) for swing in self._swings.values()]
 
     def degrees(self, middle: Array, half: Array) -> tuple[float, dict[str, float]]:
-        """Return a lower bound of the weighted degrees of irregularity, and their violated limits, on a box of leads.
+        """Return a lower bound of the weighted degrees of irregularity on a box of lead angles, and violated limits.
 
         The second result has a lower bound of the relative violation by the name of each limit that is violated.
         """
@@ -113,9 +113,10 @@ class LeadBoxes:
         self, middle: Array, half: Array, program: AffineProblem, norms: Sequence[PhaseLeadNorm],
         multipliers: Multipliers,
     ) -> LeadBound:  # fmt: skip
-        """Return the bound of a box by dual rows of the affine program at its middle, on any grid.
+        """Return the lower bound of the objective on a box of lead angles, by dual rows of the program at its middle.
 
-        Dual rows of a program without terms prove that no design in the box is feasible, or prove nothing.
+        The dual rows may be on any grid of samples. Those of a program without objective terms prove that no design in
+        the box is feasible, or prove nothing.
 
         Parameters
         ----------
@@ -157,7 +158,10 @@ class LeadBoxes:
     def _remainder(
         self, measure: Measure, s: int, lead_norm: PhaseLeadNorm, z: Array, middle: Array, half: float
     ) -> float:
-        """Return an upper bound of the second-order change of <Z, V> by the lead of shaft s in the box."""
+        """Return an upper bound of the second-order change of <Z, V> by the lead angle of shaft s in the box.
+
+        Z are the dual rows `z` of the measure and V its load rows; `middle` and `half` are in radians.
+        """
         derivative, norm = self._curvatures[measure][s], lead_norm.norm
         if measure.norm.refinement == 1:
             return 0.5 * half**2 * derivative.norm * norm.dual_norm(z)
@@ -193,22 +197,24 @@ class LeadBoxes:
 
 
 def minimum_on_arcs(
-    domains: Sequence[Domain], ratios: Array, half: Array, gradient: Array, slopes: Array, tilts: Array
+    domains: Sequence[Domain], ratios: Array, half: Array, gradient: Array, slopes: Array, turned: Array
 ) -> float:
-    """Return a lower bound of a function of leads and unbalances in a box of leads (P13).
+    """Return a lower bound of a function of lead angles and unbalances over a box of lead angles (P13).
 
-    d . slopes + x . (gradient + sum_s ((cos(n_s d_s) - 1) tilts[0, s] + sin(n_s d_s) / n_s tilts[1, s]))
-    is the function, with changes of the leads |d_s| <= half_s [rad], unbalances x in the domains, and speed ratios n_s.
+    The function is d . slopes + x . g, with changes of the lead angles |d_s| <= half_s [rad], unbalances x in the
+    domains, speed ratios n_s, and the gradient by the unbalances at these angles:
+
+        g = gradient + sum_s ((cos(n_s d_s) - 1) turned[0, s] + sin(n_s d_s) / n_s turned[1, s])
 
     Parameters
     ----------
     domains
         Sets of the unbalances.
     ratios, half, slopes
-        Speed ratio, half width of the box, and slope by the lead of every shaft, shape (shafts,).
-    gradient, tilts
-        Gradient by the unbalances at the middle, shape (columns,). Part of it from each shaft, and derivative of this
-        part by the lead, shape (2, shafts, columns).
+        Speed ratio, half width of the box, and slope by the lead angle of every shaft, shape (shafts,).
+    gradient, turned
+        Gradient by the unbalances at the middle, shape (columns,). Part of it that turns with each shaft, and
+        derivative of this part by the lead angle, shape (2, shafts, columns).
     """
     if not domains:
         return -float(np.abs(slopes) @ half)
@@ -220,7 +226,7 @@ def minimum_on_arcs(
     for corner in itertools.product(*sides):
         cosine, sine = np.array(corner).T
         leads = sine / ratios
-        corner_gradient = gradient + (cosine - 1.0) @ tilts[0] + leads @ tilts[1]
+        corner_gradient = gradient + (cosine - 1.0) @ turned[0] + leads @ turned[1]
         minimum = min(minimum, float(leads @ slopes) + sum(domain.minimum(corner_gradient) for domain in domains))
     # d differs from sin(n d) / n by the cube
     return minimum - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0

@@ -89,7 +89,7 @@ class _MonotoneBoxes(BoxBisection):
         return self.cutoff if self._problem is not self._uncut else math.inf
 
     def bound_box(self, lower: Array, upper: Array) -> tuple[float, Box] | FathomedPart:
-        """Return the lower bound of a box and the box without slices that violate limits."""
+        """Return the lower bound of the objective on a box, and the box without infeasible slices at its ends."""
         contracted = _cut(self._problem, lower, upper)
         if contracted is None:
             return FathomedPart(self.level)
@@ -105,7 +105,9 @@ def bisect_monotone(
     problem: MonotoneProblem, value: float, gap_tolerance: float, max_boxes: int = MAX_BOXES,
     witness: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
-    """Halve boxes until none can hold a design better than `value` by more than the gap tolerance (T9).
+    """Prove a lower bound of a monotone objective by halving boxes of open numbers (T9).
+
+    The search ends when no box can hold a design better than `value` by more than the gap tolerance.
 
     The objective `value` of the incumbent is infinite without one. Without a witness, bounds are not checked.
     """
@@ -130,9 +132,9 @@ def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, A
 
 
 def _cut_side(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> float:
-    """Return the lower end of side k without slices in which a falling function violates its limit (sign -1).
+    """Return the new lower (sign -1) or upper (sign 1) end of side k of a box, moved inwards past infeasible slices.
 
-    For sign 1 it is the upper end, without slices in which a rising function does.
+    A slice is infeasible if a limited function that falls (sign -1) or rises (sign 1) with number k is violated on it.
     """
     limits = [(maximum, f, f.lowest_corner(lower, upper)) for maximum, f in problem.limits if f.signs[k] == sign]
     start, end = (lower[k], upper[k]) if sign < 0.0 else (upper[k], lower[k])

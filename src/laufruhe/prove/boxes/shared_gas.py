@@ -69,10 +69,10 @@ class _Travel:
 
 
 def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
-    """Return an upper bound of the torque change of a shared chamber [N m], on cells of a cycle, shape (cells,).
+    """Return an upper bound of the change of gas torque of two pistons that share a chamber [N m], shape (cells,).
 
-    The cells start at the dead centre of `part`. The crank of `part` is fixed, and the lead of the other piston changes
-    by at most `half` [rad].
+    The cells are equal parts of a cycle from the dead centre of `part`. The crank of `part` is fixed, and the lead
+    angle of the other piston's crank changes by at most `half` [rad].
     """
     facing, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(facing, Facing)
@@ -159,7 +159,7 @@ class SharedGasBoxes:
         return list(dict.fromkeys(measure for measure in self.problem.measures if measure.is_load))
 
     def _fixed_pistons(self, engine: Engine) -> list[str]:
-        """Return the name of the piston with the fixed crank in every shared chamber."""
+        """Return the name of the piston whose crank has no open lead angle, for every chamber of two pistons."""
         fixed = []
         for part in engine.slider_cranks:
             for other in engine.slider_cranks:
@@ -225,7 +225,7 @@ class SharedGasBoxes:
         return max(sum(term.weight * minimum(term.measure) for term in self.problem.objective), 0.0)
 
     def _torques(self, engine: Engine, half: float) -> list[Array]:
-        """Return the change of torque of all shared chambers at every operating point, on cells of a cycle [N m]."""
+        """Return upper bounds of the change of gas torque of shared chambers [N m], (cells,) per operating point."""
         torques = []
         for point in self.problem.points:
             total = np.zeros(CELLS * engine.cycle.turns)
@@ -239,7 +239,7 @@ class SharedGasBoxes:
         return torques
 
     def _gas_change(self, measure: Measure, changes: Sequence[Array]) -> float:
-        """Return an upper bound of the change of a norm by torque changes, shape (cells,) at every operating point."""
+        """Return an upper bound of the change of a measure [SI] by torque changes, (cells,) per operating point."""
         shares, gains, norm = measure.shares(self.problem.points), self._gains[measure], measure.norm
         squares = [float(np.mean(change**2)) for change in changes]
         if norm.refinement == 1:

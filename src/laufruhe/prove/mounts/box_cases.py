@@ -36,7 +36,7 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 
 @np.errstate(invalid="ignore", over="ignore")
 def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> LinearBound:
-    """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
+    """Return a linear lower bound, on every box, of the largest mount travel or force under static load cases (E60)."""
     mounting, best = model.mounting(model.lower), zero_bound(lower)
     all_stops = stops_of(mounting)
     used = all_stops.stiffness > 0.0
@@ -67,7 +67,10 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
 def _with_stops(
     model: BoxModel, measure: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
 ) -> tuple[LinearBound, Array]:
-    """Return the bound with some stops as springs, and the span of stop travels without the others, (boxes, stops).
+    """Return a lower bound of a static measure with the touched bump stops as springs, and how far their travels vary.
+
+    The second array has the largest deviation of each stop's travel from its value at the middle of the box, shape
+    (boxes, stops).
 
     Parameters
     ----------
@@ -139,7 +142,9 @@ def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
 def _stop_errors(
     stops: Stops, expansion: Expansion, corner: Array, signs: Array, equilibrium: Array
 ) -> tuple[Array, Array]:
-    """Return errors of stop forces [N], infinite if unknown, and the span of stop travels, (boxes, stops) each (E60).
+    """Return bounds of the errors of bump stop forces [N], and of the variation of stop travels in each box (E60).
+
+    Both have the shape (boxes, stops). Unknown errors are infinite.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class LinearRelaxation:
         return LinearRelaxation(self.value[indices], self.slopes[indices], limits, pulls)
 
     def add(self, weight: float, minimum: LinearBound, left_out: float = 0.0) -> None:
-        """Add the bound of a weighted term to the objective, or zero on boxes where the bound is not positive.
+        """Add the linear bound of a weighted objective term, or zero on boxes where that bound is not positive.
 
         The largest effect of omitted orders on the term is `left_out` [SI].
         """
@@ -70,7 +70,7 @@ class LinearRelaxation:
 
     @property
     def violation(self) -> Array:
-        """Lower bound of the largest relative violation of limits in each box, shape (boxes,); -1 without limits.
+        """Lower bound, in each box, of the relative violation of the worst limit, shape (boxes,); -1 without limits.
 
         Every weighted mean of the limits is a lower bound (P4). The method starts with the most violated limit and
         mixes in the others one by one. The minimum of the mean over the box is concave in the weight of a limit, with
@@ -104,7 +104,7 @@ class LinearRelaxation:
 
     @property
     def minimum(self) -> Array:
-        """Lower bound of the feasible objective in each box, shape (boxes,); infinite where limits are violated.
+        """Lower bound of the objective of feasible designs in each box, (boxes,); infinite where none is feasible.
 
         Multipliers of the limits (P4) are set one by one. The bound is piecewise linear in a multiplier, with kinks
         where a slope changes its sign. The kink with the largest bound is taken.

@@ -74,30 +74,32 @@ def zero_bound(lower: Array) -> LinearBound:
     return LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
-def lower_bound_of_norm(model: BoxModel, measure: Measure, lines: LoadedOrders, expansion: Expansion) -> LinearBound:
+def lower_bound_of_norm(
+    model: BoxModel, measure: Measure, loaded_orders: LoadedOrders, expansion: Expansion
+) -> LinearBound:
     """Return a linear lower bound of a norm of mount forces or travel on every box, from the series of motion (E38)."""
     rows, factors = counted_rows(model.problem, measure)
-    answer = model.answer(lines, expansion, measure.channel, rows, factors)
-    return norm_under(model.problem, measure, answer, lines)
+    answer = model.answer(loaded_orders, expansion, measure.channel, rows, factors)
+    return norm_under(model.problem, measure, answer, loaded_orders)
 
 
-def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
-    """Return a linear lower bound of a norm of forces or travel on every box (E38).
+def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, loaded_orders: LoadedOrders) -> LinearBound:
+    """Return a linear lower bound of a norm of mount forces or travel on every box (E38).
 
-    `answer` has the forces or travel of the counted mounts, r = 3 mounts components, for the loaded orders `lines`.
+    `answer` has the forces or travel of the counted mounts, r = 3 mounts components, for every loaded order.
     """
-    share, weights = measure.shares(problem.points), line_weights(problem, measure, lines)
+    share, weights = measure.shares(problem.points), line_weights(problem, measure, loaded_orders)
     if measure.norm.is_euclidean:
         return root_under(answer, weights)
-    points = [p for p in np.flatnonzero(share > 0.0) if np.any(lines.points == p)]
-    by_point = [_sampled(measure, answer, lines, int(p)) for p in points]
+    points = [p for p in np.flatnonzero(share > 0.0) if np.any(loaded_orders.points == p)]
+    by_point = [_sampled(measure, answer, loaded_orders, int(p)) for p in points]
     if not by_point:
         return zero_bound(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
     if not measure.norm.sums_lengths:
         largest = choose(by_point, np.argmax([bound.value for bound in by_point], axis=0))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
-        squares = 2.0 * weights * (lines.orders > 0.0) if measure.norm.is_diameter else weights
+        squares = 2.0 * weights * (loaded_orders.orders > 0.0) if measure.norm.is_diameter else weights
         return largest if measure.norm.is_largest_mean else largest.or_else(root_under(answer, squares))
     value, slopes = (
         sum(share[p] * getattr(bound, part) for p, bound in zip(points, by_point, strict=True))
@@ -114,19 +116,19 @@ def counted_rows(problem: Problem, measure: Measure) -> tuple[Indices, Array]:
     return rows, np.tile(np.array(measure.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
 
 
-def line_weights(problem: Problem, measure: Measure, lines: LoadedOrders) -> Array:
-    """Return the weight of each squared order in the mean over cycle, mounts and operating points, shape (lines,)."""
+def line_weights(problem: Problem, measure: Measure, loaded_orders: LoadedOrders) -> Array:
+    """Return the weight of each squared order in the mean over cycle, mounts and operating points, shape (orders,)."""
     chosen = measure.places([mount.name for mount in problem.engine.mounts])
     share = measure.shares(problem.points)
-    return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
+    return np.asarray(share[loaded_orders.points] * np.where(loaded_orders.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: int) -> LinearBound:
-    """Return a linear lower bound of a mean, maximum or peak to peak over the samples of operating point p."""
-    indices = np.flatnonzero(lines.points == p)
+def _sampled(measure: Measure, answer: LinearResponse, loaded_orders: LoadedOrders, p: int) -> LinearBound:
+    """Return a linear lower bound on boxes of a mean, maximum or peak to peak over samples of operating point p."""
+    indices = np.flatnonzero(loaded_orders.points == p)
     value, slopes = answer.value[:, indices], answer.slopes[:, indices]
     remainder, scores = answer.remainder[:, indices], answer.scores[:, indices]
-    factors = lines.phases(indices)
+    factors = loaded_orders.phases(indices)
     boxes, samples, mounts = len(value), len(factors), value.shape[-1] // 3
     # rows by direction, then mount; real and imaginary parts count as separate orders
     waves = np.hstack([factors.real, -factors.imag])
@@ -135,7 +137,7 @@ def _sampled(measure: Measure, answer: LinearResponse, lines: LoadedOrders, p: i
     if measure.norm.sums_lengths or measure.norm.is_largest_mean:
         size = _lengths(rows)
         # a mean of lengths is at most their root mean square
-        squares = np.where(lines.orders[indices] > 0.0, 0.5, 1.0) / mounts
+        squares = np.where(loaded_orders.orders[indices] > 0.0, 0.5, 1.0) / mounts
         rests = root_of(squares, remainder), root_of(squares, scores)
         by_mount, share = slopes.reshape(*slopes.shape[:3], mounts, 3), 1.0 / (samples * mounts)
 
@@ -173,7 +175,7 @@ def _lengths(rows: Array) -> Array:
 
 
 def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
-    """Return a linear lower bound of the root of a weighted sum of squares over orders, with weights of shape (lines,).
+    """Return a linear lower bound of the root of a sum of squares over orders with `weights`, shape (orders,).
 
     Orders whose series may diverge count as zero in value and slopes.
     """
@@ -189,7 +191,7 @@ def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
 
 
 def root_of(weights: Array, parts: Array) -> Array:
-    """Return the root of a weighted sum of squared `parts` over orders, shape (boxes, lines, ...) to (boxes, ...)."""
+    """Return the root of a weighted sum of squared `parts` over orders, shape (boxes, orders, ...) to (boxes, ...)."""
     return np.asarray(np.sqrt(np.tensordot(parts**2, weights, axes=(1, 0))))
 
 
@@ -200,23 +202,27 @@ def is_ratio(measure: Measure) -> bool:
 
 def ratio_under(
     elastic: LinearResponse, rigid: LinearResponse, measure: Measure, points: Sequence[OperatingPoint],
-    lines: LoadedOrders,
+    loaded_orders: LoadedOrders,
 ) -> tuple[Array, Array]:  # fmt: skip
-    """Return lower bounds of a transmissibility, shape (boxes,), and branching scores, shape (boxes, n) (E40).
+    """Return lower bounds of a transmissibility on boxes, shape (boxes,), and branching scores, shape (boxes, n) (E40).
+
+    The score of an open number is its part of the bound's error; the box is halved along the largest.
 
     Parameters
     ----------
     elastic, rigid
         Mount forces by order on elastic mounts, and on rigid mounts under the same loads.
-    measure, points, lines
+    measure, points, loaded_orders
         Transmissibility, operating points of the problem, and orders of the forces. Each named order, or all orders
         above zero together, has a ratio at each point.
     """
     groups: list[Mask] = []
-    for p in (p for p in np.unique(lines.points) if measure.includes_point(points[p])):
-        moving = (lines.points == p) & (lines.orders > 0.0)
+    for p in (p for p in np.unique(loaded_orders.points) if measure.includes_point(points[p])):
+        moving = (loaded_orders.points == p) & (loaded_orders.orders > 0.0)
         orders = measure.orders
-        groups += [moving] if orders is None else [moving & orders_equal(lines.orders, order) for order in orders]
+        groups += (
+            [moving] if orders is None else [moving & orders_equal(loaded_orders.orders, order) for order in orders]
+        )
     best, scores = np.zeros(len(elastic.value)), np.zeros(elastic.scores[:, 0].shape)
     for group in (group for group in groups if group.any()):
         weights = group.astype(float)

@@ -41,7 +41,7 @@ _EYE = np.eye(6, dtype=bool)
 
 
 def sag(model: BoxModel, x: Array) -> Array:
-    """Return the static sag of many designs [m], shape (boxes,); infinite with a free mode (E9)."""
+    """Return the static sag of many designs [m], shape (boxes,); infinite if a motion has no stiffness (E9)."""
     weight = weight_wrench(model.mounting(model.lower).block)
     matrices, pull = model.stiffness(x), model.root @ weight
     stable = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
@@ -50,7 +50,10 @@ def sag(model: BoxModel, x: Array) -> Array:
 
 
 def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> LinearBound:
-    """Return the tangent of the convex sag at the middle of boxes; zero with a free mode at the softest corner (E9)."""
+    """Return a linear lower bound of the static sag on boxes: its tangent at their middles, because sag is convex (E9).
+
+    The bound is zero if mounts leave a motion without stiffness at the softest corner.
+    """
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
     stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
@@ -60,7 +63,7 @@ def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Linear
 
 
 def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
-    """Return lower bounds of the convex torque-roll residual by tangents at the middle, shape (boxes,) (E19, E46)."""
+    """Return lower bounds of the torque-roll residual on boxes, (boxes,), by tangents at their middles (E19, E46)."""
     assert measure.channel.axis_residual is not None
     axis = measure.channel.axis_residual(model.mounting(model.lower).block, measure.frequency)
     bounds = np.zeros(len(lower))
@@ -112,7 +115,7 @@ class BoxModes:
 
 
 def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
-    """Return bounds of the modes of all designs in boxes of stiffness [N/m], shape (boxes, n)."""
+    """Return bounds of the natural modes (frequencies, shapes), valid in whole boxes of stiffness [N/m]."""
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
     slopes = np.einsum("bji,njk,bkl->bnil", modes, model.slopes["stiffness"], modes, optimize=True)
     slopes = slopes * (0.5 * (upper - lower))[:, :, None, None]
@@ -150,7 +153,7 @@ def maximum_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array
 
 
 def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
-    """Return lower bounds of the decoupling shortfall, shape (boxes,) (E47, E64)."""
+    """Return lower bounds of the decoupling shortfall (missing energy shares) on boxes, shape (boxes,) (E47, E64)."""
     box = box_modes(model, lower, upper)
     total, slopes, boxes = np.zeros(len(lower)), np.zeros_like(lower), np.arange(len(lower))
     alone = np.zeros(len(lower))
@@ -171,7 +174,7 @@ def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> 
 
 
 def _shares(model: BoxModel, box: BoxModes, motion: int) -> tuple[Array, Array, Array]:
-    """Return upper bounds of the energy share of a motion in every mode: value + slopes . s, and a constant.
+    """Return two upper bounds of a motion's kinetic energy share in every mode: value + slopes . s, and a constant.
 
     The shapes of value, slopes and constant are (boxes, modes), (boxes, modes, n) and (boxes, modes).
     """

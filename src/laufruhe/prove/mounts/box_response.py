@@ -38,11 +38,11 @@ class LoadedOrders:
     Attributes
     ----------
     points, places
-        Index of the operating point, and multiple of the lowest order of the sampled period, shape (lines,).
+        Index of the operating point, and multiple of the lowest order of the sampled period, shape (orders,).
     orders, omegas
-        Orders of crank speed, and angular frequencies [rad/s], shape (lines,).
+        Orders of crank speed, and angular frequencies [rad/s], shape (orders,).
     loads
-        Wrenches r in coordinates with unit mass, shape (lines, 6), or (lines, loads, 6) for several loads.
+        Wrenches r in coordinates with unit mass, shape (orders, 6), or (orders, loads, 6) for several loads.
     samples
         Samples of the period; zero if some order is no multiple of its lowest order.
     """
@@ -61,7 +61,7 @@ class LoadedOrders:
         return LoadedOrders(*indices, *numbers, self.loads[selection], self.samples)
 
     def at_rest(self) -> LoadedOrders:
-        """Return the loads with zero frequency, which give the forces on rigid mounts (E11)."""
+        """Return the same loads with zero frequency; their responses are the forces on rigid mounts (E11)."""
         return replace(self, omegas=np.zeros_like(self.omegas))
 
     @property
@@ -70,7 +70,10 @@ class LoadedOrders:
         return bool(2 * self.places.max(initial=0) < self.samples)
 
     def phases(self, selection: Indices) -> ComplexArray:
-        """Return factors e^{i h phi} over one period of selected orders, shape (samples, orders)."""
+        """Return factors e^{i h phi} from complex amplitudes of selected orders to samples, shape (samples, orders).
+
+        The samples cover one common period of these orders.
+        """
         factor = int(np.gcd.reduce(self.places[selection])) or 1
         factor = factor if self.samples % factor == 0 else 1
         places, samples = self.places[selection] // factor, self.samples // factor
@@ -131,8 +134,8 @@ class BoxModel:
         maps = ((part @ motions).reshape(-1, 6) for part in parts)
         return dict(zip((*SQUARE, *MAPS), (*totals, *maps), strict=True))
 
-    def lines(self, measure: Measure) -> LoadedOrders:
-        """Return the loaded orders that a measure counts, with the wrenches of the evaluation."""
+    def loaded_orders(self, measure: Measure) -> LoadedOrders:
+        """Return the orders with a load that a measure counts, with their wrenches on the block."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         base, samples = self.problem.engine.cycle.base_order, self.evaluation.samples
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
@@ -146,12 +149,12 @@ class BoxModel:
                     (p, int(int(k) * step), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k])
                 )
         points, places, orders, omegas, wrenches = zip(*rows, strict=True) if rows else ((), (), (), (), ())
-        lines = LoadedOrders(
+        loaded_orders = LoadedOrders(
             np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
             np.array(omegas, dtype=float), np.array(wrenches, dtype=complex).reshape(-1, 6), samples,
         )  # fmt: skip
         counted = [measure.points is None or point.name in measure.points for point in self.problem.points]
-        return lines.subset(np.array(counted)[lines.points] & measure.counted(lines.orders))
+        return loaded_orders.subset(np.array(counted)[loaded_orders.points] & measure.counted(loaded_orders.orders))
 
     def stiffness(self, x: Array) -> Array:
         """Return the stiffness matrix A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
@@ -161,49 +164,54 @@ class BoxModel:
         """Return the matrix `name` of `SQUARE` or `MAPS` at many designs, shape (boxes, n) to (boxes, ...)."""
         return np.asarray(self._base[name] + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
-    def expanded(self, lines: LoadedOrders, lower: Array, upper: Array) -> Expansion:
-        """Return the series of motion over boxes of stiffness, shape (boxes, n) (E37)."""
+    def expanded(self, loaded_orders: LoadedOrders, lower: Array, upper: Array) -> Expansion:
+        """Return the motion of the block over boxes of stiffness, as a series with a bound of its remainder (E37).
+
+        `lower` and `upper` are the bounds of the boxes [N/m], shape (boxes, n).
+        """
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         matrices = (self.at(name, centres)[:, None] for name in SQUARE)
-        impedance = _dynamic(lines, *matrices) + self._dynamic.impedance(lines.omegas, self.root.T)
-        impedance = impedance - lines.omegas[:, None, None] ** 2 * np.eye(6)
+        impedance = _dynamic(loaded_orders, *matrices) + self._dynamic.impedance(loaded_orders.omegas, self.root.T)
+        impedance = impedance - loaded_orders.omegas[:, None, None] ** 2 * np.eye(6)
         inverse = inverses(np.asarray(impedance, dtype=np.complex128))
-        motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
-        return series(centres, halves, inverse, self.sides, _dynamic(lines, *self._inside), motion)
+        motion = np.matmul(inverse, loaded_orders.loads[:, :, None])[..., 0]
+        return series(centres, halves, inverse, self.sides, _dynamic(loaded_orders, *self._inside), motion)
 
     def answer(
-        self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices, factors: Array
+        self, loaded_orders: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices, factors: Array
     ) -> LinearResponse:
         """Return mount forces or travels as linear functions on boxes (E37).
 
         `rows` are the indices of the mount components, and `factors` the weights on them, shape (r,).
         """
-        value, slopes = self.maps(lines, expansion, channel, rows)
+        value, slopes = self.maps(loaded_orders, expansion, channel, rows)
         return mapped(expansion, value * factors[:, None], None if slopes is None else slopes * factors[:, None])
 
     def maps(
-        self, lines: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices
+        self, loaded_orders: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices
     ) -> tuple[ComplexArray, ComplexArray | None]:
-        """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m) (E37)."""
+        """Return maps from motion to forces or travel, (boxes, orders, r, 6), and their slopes, (..., r, m) (E37)."""
         if is_travel(channel):
             flat = self.travels[rows].astype(complex)
-            return np.broadcast_to(flat, (len(expansion.centres), len(lines.omegas), *flat.shape)), None
+            return np.broadcast_to(flat, (len(expansion.centres), len(loaded_orders.omegas), *flat.shape)), None
         maps = (self.at(name, expansion.centres)[:, None, rows] for name in MAPS)
-        value = _dynamic(lines, *maps) + self._dynamic.forces(lines.omegas, self.root.T)[:, rows]
-        slopes = _dynamic(lines, *(matrix[rows] for matrix in self._along))
+        value = _dynamic(loaded_orders, *maps) + self._dynamic.forces(loaded_orders.omegas, self.root.T)[:, rows]
+        slopes = _dynamic(loaded_orders, *(matrix[rows] for matrix in self._along))
         return value, slopes * expansion.halves[:, None, None, self.sides.number_of_column]
 
-    def largest_response(self, lines: LoadedOrders, channel: Channel) -> Array:
-        """Return upper bounds of the length of all mount forces or travels of any design, shape (lines,) (E41).
+    def largest_response(self, loaded_orders: LoadedOrders, channel: Channel) -> Array:
+        """Return, for each loaded order, an upper bound of mount force or travel of any design, shape (orders,) (E41).
+
+        It bounds the length of the vector of all mounts' amplitudes.
 
         Orders that are not above all natural frequencies have an infinite bound.
         """
-        margin = lines.omegas**2 - self.highest
+        margin = loaded_orders.omegas**2 - self.highest
         if self._dynamic:
             # springs with frequency-dependent stiffness raise the largest eigenvalue (E50)
-            added = np.linalg.eigvalsh(self._dynamic.impedance(lines.omegas, self.root.T).real)[..., -1]
+            added = np.linalg.eigvalsh(self._dynamic.impedance(loaded_orders.omegas, self.root.T).real)[..., -1]
             margin = margin - np.maximum(added, 0.0)
-        motion = np.linalg.norm(lines.loads, axis=1) / np.where(margin > 0.0, margin, 1.0)
+        motion = np.linalg.norm(loaded_orders.loads, axis=1) / np.where(margin > 0.0, margin, 1.0)
         motion = np.where(margin > 0.0, motion, np.inf)
         if is_travel(channel):
             return motion * float(np.linalg.norm(self.travels))
@@ -212,11 +220,13 @@ class BoxModel:
         separate = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
         maximum, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
         static = math.sqrt(maximum) * float(np.linalg.norm(top["springs"] + 1j * top["losses"]))
-        static = static + np.linalg.norm(self._dynamic.forces(lines.omegas, self.root.T), axis=(1, 2))
-        return np.asarray(motion * (static + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top["dampers"]))))
+        static = static + np.linalg.norm(self._dynamic.forces(loaded_orders.omegas, self.root.T), axis=(1, 2))
+        return np.asarray(
+            motion * (static + loaded_orders.omegas * math.sqrt(maximum) * float(np.linalg.norm(top["dampers"])))
+        )
 
 
-def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
-    # dynamic stiffnesses at the frequencies of lines, (..., i, j) to (..., lines, i, j)
-    moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
+def _dynamic(loaded_orders: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
+    # dynamic stiffnesses at the frequencies of orders, (..., i, j) to (..., orders, i, j)
+    moving, omegas = (loaded_orders.omegas > 0.0)[:, None, None], loaded_orders.omegas[:, None, None]
     return np.asarray(springs + 1j * (moving * losses + omegas * dampers))

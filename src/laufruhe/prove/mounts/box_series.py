@@ -64,7 +64,10 @@ class Sides:
         return np.einsum("...mrd,dm->...rm", np.take(slopes, self.number_of_column, axis=-3), self.columns)
 
     def maps_by_number(self, turned: Any) -> list[Any]:
-        """Return the slopes E_j B_j' of a map by each open number, shape (..., r, d), from `turned` E, (..., r, m)."""
+        """Return the derivative E_j B_j' of a map by each open number, shape (..., r, d).
+
+        `turned` has the slopes E of the map along the directions, shape (..., r, m).
+        """
         return [
             turned[..., self.number_of_column == j] @ self.columns[:, self.number_of_column == j].T
             for j in range(self.count)
@@ -78,7 +81,11 @@ class Sides:
 
 
 def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
-    """Return the directions of open numbers: the row space of the slopes by each number, shape (any, d)."""
+    """Return the directions of motion along which each open number acts.
+
+    `matrices` has, for each number, the derivatives of all matrices by it, shape (any, d) each. Their rows span the
+    directions.
+    """
     bases = []
     for slopes in matrices:
         rows = np.vstack([slope / max(float(np.abs(slope).max(initial=0.0)), 1e-300) for slope in slopes])
@@ -90,7 +97,7 @@ def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """Series of motion over boxes, shapes (boxes, lines, ...) unless given otherwise (E37).
+    """Series of motion over boxes, shapes (boxes, orders, ...) unless given otherwise (E37).
 
     Symbols are those of the module.
 
@@ -130,7 +137,7 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse:
-    """Forces or travel on boxes: value + slopes . s and a remainder (E37), shapes (boxes, lines, ...).
+    """Forces or travel on boxes: value + slopes . s and a remainder (E37), shapes (boxes, orders, ...).
 
     Attributes
     ----------
@@ -157,16 +164,16 @@ class LinearResponse:
 def series(
     centres: Array, halves: Array, inverse: Any, sides: Sides, inside: Any, motion: Any
 ) -> Expansion:  # fmt: skip
-    """Return the series of motion over boxes (E37).
+    """Return the motion over boxes of open numbers as a series, with a bound of its remainder (E37).
 
     Parameters
     ----------
     centres, halves
         Centres and half widths of the boxes, (boxes, n).
     inverse, motion
-        Inverse impedance D(c)^-1 and motion y0 at the centres, (boxes, lines, d, d) and (boxes, lines, d).
+        Inverse impedance D(c)^-1 and motion y0 at the centres, (boxes, orders, d, d) and (boxes, orders, d).
     sides, inside
-        Directions B_j, and the stiffening C along them, (lines, m, m).
+        Directions B_j, and the stiffening C along them, (orders, m, m).
     """
     columns = sides.columns * np.sqrt(halves[:, sides.number_of_column])[:, None]
     column_motions = np.matmul(inverse, np.matmul(columns[:, None], inside))
@@ -178,7 +185,7 @@ def series(
 
 
 def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
-    """Return the diagonal of T that balances rows and columns of the gain G, T G T^-1, and a bound g of its norm."""
+    """Return the diagonal of a scaling T that makes the gain G small, the gain T G T^-1, and a bound g of its norm."""
     heights, widths = np.linalg.norm(gain, axis=-1), np.linalg.norm(gain, axis=-2)
     loaded = (heights > 0.0) & (widths > 0.0)
     balance = np.sqrt(np.where(loaded, widths, 1.0) / np.where(loaded, heights, 1.0))
@@ -187,7 +194,7 @@ def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
 
 
 def rest_of(even: ComplexArray, maximum: Array, hit: Array) -> Array:
-    """Return an upper bound of g / (1 - g) |T G S z0|, (...), infinite if the series may diverge.
+    """Return an upper bound of the remainder g / (1 - g) |T G S z0| of the series; infinite if it may diverge.
 
     Parameters
     ----------
@@ -205,14 +212,14 @@ def rest_of(even: ComplexArray, maximum: Array, hit: Array) -> Array:
 
 
 def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearResponse:
-    """Return the forces or travel of a motion as linear functions over boxes (E37).
+    """Return mount forces or travel as linear functions over boxes with bounds of their errors, from the motion (E37).
 
     Parameters
     ----------
     expansion
         Series of the motion.
     value
-        Map V from motion to forces or travel at the centres, (boxes, lines, r, d).
+        Map V from motion to forces or travel at the centres, (boxes, orders, r, d).
     turned
         Slopes E of the map, times half the width of each open number, (..., r, m); None for a constant map.
     """
@@ -240,7 +247,7 @@ def mapped(expansion: Expansion, value: Any, turned: Any = None) -> LinearRespon
 
 
 def norm_over(matrices: Any) -> Array:
-    """Bound the largest singular value of matrices A by (trace (A* A)^k)^(1 / 2k), shape (..., r, m) to (...)."""
+    """Return upper bounds (trace (A* A)^k)^(1 / 2k) of the largest singular value of matrices A, (..., r, m)."""
     squares = np.matmul(np.swapaxes(np.conj(matrices), -2, -1), matrices)
     size = np.trace(squares, axis1=-2, axis2=-1).real
     squares = squares / np.where(size > 0.0, size, 1.0)[..., None, None]
@@ -250,7 +257,7 @@ def norm_over(matrices: Any) -> Array:
 
 
 def inverses(matrices: ComplexArray) -> ComplexArray:
-    """Invert matrices; singular ones give infinite entries, so that their box has no bound."""
+    """Return the inverses of matrices; a singular matrix gives infinite entries, so that its box has no bound."""
     try:
         return np.asarray(np.linalg.inv(matrices))
     except np.linalg.LinAlgError:

@@ -80,7 +80,7 @@ class Compliance:
     factor: float
 
     def value(self, x: Array) -> float:
-        """Return the value at x; infinite with a free mode."""
+        """Return the compliance at stiffnesses x; infinite if mounts leave a motion without stiffness."""
         matrix = self.matrices.at(x)
         if np.linalg.eigvalsh(matrix)[0] <= 0.0:
             return math.inf
@@ -105,7 +105,10 @@ class Eigenvalue:
         return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return the linear function sign <V, A(x)>, with V from the dual matrix or else from the eigenvector at x."""
+        """Return a linear lower bound of the eigenvalue function: sign <V, A(x)>, as value and gradient.
+
+        The matrix V comes from the solver's `dual` matrix, or else from the eigenvector at x.
+        """
         _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
         weights, columns = np.eye(6)[-1], vectors
         if dual is not None:
@@ -130,7 +133,10 @@ class Residual:
         return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return the linear function along the dual vector, or else along the residual at x."""
+        """Return a linear lower bound of the residual's length, as value and gradient.
+
+        Its direction is the solver's `dual` vector, or else the residual at x.
+        """
         z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
         y, mass = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
         constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)
@@ -178,7 +184,11 @@ class ConvexDuals:
 
 
 def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[float, Array]:
-    """Return the lower bound of the objective by duals, and the gradient of the summed linear functions (E16-E19)."""
+    """Return a lower bound of the objective over all stiffnesses, and the gradient of the linear bound (E16-E19).
+
+    The duals of a solver weight the linear bounds of terms and limits at stiffnesses x. Any duals give a valid
+    bound.
+    """
     constant, gradient = 0.0, np.zeros(len(x))
     for (weight, term), dual in zip(program.terms, duals.terms, strict=True):
         c, g = term.minorant(x, dual)

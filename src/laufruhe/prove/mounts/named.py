@@ -16,7 +16,7 @@ _AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 def named_part(problem: Problem) -> Problem:
-    """Return a problem without the terms and limits that bounds of mounts do not support.
+    """Return a problem without the objective terms and limits that the bounds over boxes of mounts cannot compute.
 
     Its bound holds for the whole problem: no term is negative, and fewer limits allow more designs.
     """
@@ -28,7 +28,7 @@ def named_part(problem: Problem) -> Problem:
 
 
 def is_named(measure: Measure, problem: Problem) -> bool:
-    """Return True if a measure is constant, affine in unbalances, or has a formula over boxes of mounts."""
+    """Return True if a measure has a bound: it is constant, affine in unbalances, or has a formula for boxes."""
     norm = measure.norm
     is_bounded = norm.is_euclidean or norm.sums_lengths or norm.is_largest or norm.is_largest_mean or norm.is_diameter
     if measure.is_load and not (measure in problem.known_rows or is_bounded):

@@ -103,7 +103,7 @@ def provers() -> tuple[Prover, ...]:
 
 
 def run_provers(question: Question) -> BoxResult:
-    """Run all provers that apply in rounds of growing work, until one closes the gap or time is over.
+    """Prove a lower bound by all methods that apply, in rounds of growing work, until the gap closes or time is over.
 
     The bound of the question is raised to the best one found. The result has this bound, the number of all boxes, and
     the start points of the last prover that has any.

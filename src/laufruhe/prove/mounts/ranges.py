@@ -37,7 +37,7 @@ def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | N
 
 
 def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[tuple[float, float]]]:
-    """Return bounds of the stiffness matrix A of any design that keeps the limits.
+    """Return bounds of the stiffness matrix A that hold for every design within the limits.
 
     The results are matrices L <= A by lowest frequency and sag (E31), matrices U >= A (E43), and bands without any
     eigenvalue of A (E53). A is in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are

@@ -56,7 +56,9 @@ def is_stiffness_problem(problem: Problem) -> bool:
 def stiffness_bounds(
     problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield lower bounds by boxes of stiffness, until no design is better than `value` by the gap tolerance [SI].
+    """Yield rising lower bounds of the objective by branch and bound over boxes of mount stiffness.
+
+    The search ends when no design is better than `value` by the gap tolerance [SI].
 
     Parameters
     ----------
@@ -125,8 +127,8 @@ class StiffnessBoxes:
         self._ratios: dict[Measure, LoadedOrders] = {}
         for measure in filter(is_ratio, problem.measures):
             counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=measure.points, orders=measure.orders)
-            lines = self.model.lines(counted)
-            self._ratios[measure] = lines.subset(lines.omegas > 0.0)
+            loaded_orders = self.model.loaded_orders(counted)
+            self._ratios[measure] = loaded_orders.subset(loaded_orders.omegas > 0.0)
         measures = simulated_measures(problem)
         self.simulated: SimulatedBoxes | None = (
             call_by_name(f"{measures[0].channel.simulation}:boxes", self.model, measures) if measures else None
@@ -135,16 +137,16 @@ class StiffnessBoxes:
     @property
     def is_sampled_fully(self) -> bool:
         """Return True if sums of squares over orders equal those over samples, as the linear bounds suppose."""
-        return all(lines.is_full for _, _, lines, _ in (*self._terms, *self._limits))
+        return all(loaded_orders.is_full for _, _, loaded_orders, _ in (*self._terms, *self._limits))
 
     @property
     def _cost(self) -> int:
         mounts = len(self.problem.engine.mounts)
-        lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
+        loaded_orders = sum(len(loaded_orders.omegas) for _, _, loaded_orders, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]
-        lines += sum(2 * len(self._ratios[q].omegas) for q in ratios if q in self._ratios)
+        loaded_orders += sum(2 * len(self._ratios[q].omegas) for q in ratios if q in self._ratios)
         simulated = self.simulated.cost // SIMULATED_SHARE if self.simulated is not None else 0
-        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + simulated
+        return max(loaded_orders, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + simulated
 
     @property
     def batch_size(self) -> int:
@@ -153,7 +155,7 @@ class StiffnessBoxes:
 
     @property
     def max_boxes(self) -> int:
-        """Largest number of boxes: as requested, or by default enough for a few seconds."""
+        """Largest number of boxes to bound: as the file requests, or by default enough for a few seconds."""
         if not self.is_sampled_fully:
             return 0
         is_tractable = len(self.problem.mount_decisions) <= MAX_OPEN
@@ -161,18 +163,20 @@ class StiffnessBoxes:
 
     @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes of stiffness [N/m], shape (boxes, n), and the sides to halve.
+        """Return the lower bound of the objective on every box of stiffness [N/m], and the index of the side to halve.
 
         A bound is infinite if no design of its box is feasible.
         """
         boxes, scores, size = LinearRelaxation.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
-        for weight, measure, lines, left_out in self._terms:
-            expansion = self.model.expanded(lines, lower, upper)
-            minimum = lower_bound_of_norm(self.model, measure, lines, expansion)
+        for weight, measure, loaded_orders, left_out in self._terms:
+            expansion = self.model.expanded(loaded_orders, lower, upper)
+            minimum = lower_bound_of_norm(self.model, measure, loaded_orders, expansion)
             boxes.add(weight, minimum, left_out)
             scores, size = scores + weight * minimum.scores, size + weight * minimum.value
-        for maximum, measure, lines, left_out in self._limits:
-            minimum = lower_bound_of_norm(self.model, measure, lines, self.model.expanded(lines, lower, upper))
+        for maximum, measure, loaded_orders, left_out in self._limits:
+            minimum = lower_bound_of_norm(
+                self.model, measure, loaded_orders, self.model.expanded(loaded_orders, lower, upper)
+            )
             boxes.add_limit(minimum, left_out, maximum)
         for limit in self._priced:
             minimum = LINEAR_BOUNDS[limit.measure.channel](self.model, limit.measure, lower, upper)
@@ -197,7 +201,10 @@ class StiffnessBoxes:
         return np.where(violated, np.inf, bounds), np.asarray(sides)
 
     def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
-        """Add the bounds of simulated measures to the boxes (E65), and return branching scores, shape (boxes, n)."""
+        """Add the bounds of run-ups and other simulated measures to the boxes, and return branching scores (E65).
+
+        The scores have the shape (boxes, n); `boxes` collects the bounds of all terms and limits.
+        """
         assert self.simulated is not None
         scores, problem = np.zeros_like(lower), self.problem
         weights = {term.measure: term.weight for term in problem.objective}
@@ -235,25 +242,25 @@ class StiffnessBoxes:
 
     def _ratio(self, measure: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
         # lower bounds of a transmissibility, and branching scores (E40)
-        lines = self._ratios[measure]
+        loaded_orders = self._ratios[measure]
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
-        loads = (lines, lines.at_rest())
+        loads = (loaded_orders, loaded_orders.at_rest())
         expansions = [self.model.expanded(orders, lower, upper) for orders in loads]
         elastic, rigid = (
             self.model.answer(orders, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for orders, expansion in zip(loads, expansions, strict=True)
         )
-        return ratio_under(elastic, rigid, measure, self.problem.points, lines)
+        return ratio_under(elastic, rigid, measure, self.problem.points, loaded_orders)
 
 
 def _relevant_lines(model: BoxModel, measure: Measure, budget: float) -> tuple[LoadedOrders, float]:
     # leaves out small orders whose responses sum to at most the budget, and returns their effect on the norm (E41)
-    lines = model.lines(measure)
-    size = max(measure.direction_weights or (1.0,)) * model.largest_response(lines, measure.channel)
+    loaded_orders = model.loaded_orders(measure)
+    size = max(measure.direction_weights or (1.0,)) * model.largest_response(loaded_orders, measure.channel)
     order = np.argsort(size, kind="stable")
     # the sum is over any root of squares, so it serves every norm
     ignored = order[np.cumsum(size[order]) <= budget]
     relevant = np.ones(len(size), dtype=bool)
     relevant[ignored] = False
     # a peak to peak is at most twice the largest length
-    return lines.subset(relevant), (2.0 if measure.norm.is_diameter else 1.0) * float(size[ignored].sum())
+    return loaded_orders.subset(relevant), (2.0 if measure.norm.is_diameter else 1.0) * float(size[ignored].sum())

@@ -47,9 +47,10 @@ class ArcBox:
         self._chord_errors = np.minimum(curvatures, 2.0)
 
     def functions(self, waves: ComplexArray, slopes: Array, shared: Array) -> Arcs:
-        """Return the minima of a function of throw angles theta and shared angles beta over the box.
+        """Return the minimum of a function of all angles over the box, also with each angle fixed at each grid angle.
 
-        The function is the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, plus sigma . beta.
+        The function of throw angles theta and shared angles beta is the sum over throws of
+        Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, plus sigma . beta.
 
         Parameters
         ----------
@@ -94,7 +95,10 @@ class Arcs:
         return float(self.values[0].min()) - self.bend
 
     def cut(self, margin: float) -> tuple[Array, Array] | None:
-        """Return bounds of the angles where the sum may be less than `margin` above `minimum`; None without any."""
+        """Return the lowest and highest angles at which the function may be less than `margin` above `minimum`.
+
+        The result has two arrays of angles [rad]; it is None if there are no such angles.
+        """
         # between two angles of the grid both ends bound the sum
         is_open = np.minimum(self.values[:, :-1], self.values[:, 1:]) - self.bend - self.minimum < margin
         if not is_open.any(axis=1).all():

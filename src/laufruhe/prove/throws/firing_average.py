@@ -22,7 +22,10 @@ from laufruhe.problem.problem import Problem
 
 
 def firing_bound(problem: Problem, design: Evaluation) -> float:
-    """Return a lower bound of the objective over all crank stars that fire evenly, or zero if none is known [SI].
+    """Return a lower bound of the objective over all crank stars with even firing [SI]; zero if none is known.
+
+    The mean of a design's loads over shifts by firing intervals is the same for all these stars, and no star's norm
+    is below that of the mean.
 
     `design` is the evaluation of one of these stars, with any counterweights; all have its bank angle and split pin.
     """

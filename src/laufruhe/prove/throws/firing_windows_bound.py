@@ -54,7 +54,7 @@ def uneven_bound(
 
 
 def steady_bound(problem: Problem) -> float:
-    """Return a lower bound of the objective for any throws [SI]: that of the mean loads, on given mounts (S24)."""
+    """Return a lower bound of the objective for any throw angles [SI], from the mean loads on fixed mounts (S24)."""
     initial, total = evaluate(problem), 0.0
     for term in problem.objective:
         measure = term.measure
@@ -65,7 +65,7 @@ def steady_bound(problem: Problem) -> float:
 
 
 def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
-    """Return the minimum of `star_bounds` over stars, shape (stars, throws), or `incumbent` if that is less.
+    """Return the lowest bound of many crank stars, shape (stars, throws), or `incumbent` if that is less [SI].
 
     `costs` are those of `throw_costs`, and `incumbent` is the minimum over earlier stars. Directions are evaluated in
     batches. A star whose bound exceeds the minimum needs no further directions.
@@ -82,7 +82,10 @@ def minimum_bound(costs: Array, stars: Stars, incumbent: float) -> float:
 
 
 def star_bounds(costs: Array, stars: Stars) -> Array:
-    """Return the largest bound of every star over all directions, shape (n,), from the `costs` of `throw_costs`."""
+    """Return a lower bound of the objective of every crank star, shape (n,): the largest over all dual directions.
+
+    `costs` are the minima from `throw_costs`.
+    """
     total = np.zeros((len(stars), len(costs)))
     for k in range(stars.shape[1]):
         total += costs[:, k, stars[:, k]].T
@@ -90,9 +93,11 @@ def star_bounds(costs: Array, stars: Stars) -> Array:
 
 
 def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjective, intervals: Intervals) -> Array:
-    """Return the minimum of x_k a_k over the angle window of each step, shape (directions, throws, steps).
+    """Return the smallest contribution of each throw to a couple bound, on each step: (directions, throws, steps).
 
-    x_k is the position of throw k [m], and a_k the component of its rotating load along a dual direction.
+    It is the minimum of x_k a_k over the angles that the firing intervals allow near the step.
+
+        x_k is the position of throw k [m], and a_k the component of its rotating load along a dual direction.
     """
     lower, upper = windows(phasing, intervals)
     v = dual_directions(objective)
@@ -111,7 +116,7 @@ def throw_costs(phasing: Phasing, space: StarSpace, objective: AmplitudeObjectiv
 
 
 def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
-    """Return the lowest and highest deviation of a throw from each step [rad], shape (steps,) each.
+    """Return how far a throw may stand before and after each evenly spaced step [rad], shape (steps,) each.
 
     Cylinder 1 stays at its dead centre. The s-th firing follows the first by s minimum to s maximum intervals, and the
     other intervals remain until the next cycle. A throw that stands less far ahead fires later.

@@ -40,7 +40,10 @@ class IrregularityBound:
     def from_engine(
         cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float
     ) -> IrregularityBound:
-        """Return the bound for any firing angles of the cylinders; `inertia` is of all rotating parts [kg m2]."""
+        """Return the bound of the degree of irregularity at an operating point, for any firing angles of the cylinders.
+
+        `inertia` is the moment of inertia of all rotating parts [kg m2].
+        """
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
         cylinders = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
         inertias = [moving_inertia(cylinder, fidelity, angles)[0] for cylinder in cylinders]

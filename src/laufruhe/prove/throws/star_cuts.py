@@ -76,7 +76,7 @@ class Cut:
         return sums
 
     def minimum(self, space: StarSpace) -> float:
-        """Return a lower bound over all stars of a space, at least zero, by the best assignment of throws to steps."""
+        """Return a lower bound of the cut over all crank stars, at least zero, by assignment of throws to steps."""
         from scipy.optimize import linear_sum_assignment
 
         if self.gradient_moves is not None:
@@ -93,7 +93,10 @@ class Cut:
 
 
 def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
-    """Return the cut by the dual rows of one star, on the grid of the problem `fine` of all stars (S14)."""
+    """Return a lower bound of the objective of every crank star (a cut), from the dual rows of one star (S14).
+
+    `fine` is the problem of all crank stars on the grid on which the bound is to hold.
+    """
     throws, steps = fine.terms[0][1].moves.shape[:2]
     size = fine.terms[0][1].slope.shape[-1]
     constant, moves, scale = 0.0, np.zeros((throws, steps)), 0.0
