@@ -119,7 +119,7 @@ class AffineProblem:
 
     @cached_property
     def units(self) -> Array:
-        """Unit of every column for a solver, shape (n,): its bound, or less if a small value balances the loads.
+        """Unit of every decision in a solver, shape (n,): its bound, or less if a small value balances the loads.
 
         The unit is at most `UNIT_MARGIN` times the value that balances the constant rows. Otherwise a huge bound of one
         column would leave no significant digits for the others.
@@ -221,7 +221,7 @@ class AffineModel:
         return max(int(self.problem.fidelity.samples * float(cycle.base_order / self.base)), 24)
 
     def at(self, samples: int, averaged: bool = False, finer: bool = False) -> AffineProblem:
-        """Return the problem at a number of samples over the common period.
+        """Return every measure as a norm of rows V0 + B x in the decisions x, sampled over the period of the loads.
 
         Parameters
         ----------
@@ -248,14 +248,14 @@ class AffineModel:
         return other
 
     def wrenches(self) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
-        """Return the wrench of the bare design and of one unit of every column, for each operating point."""
+        """Return, for each operating point, the wrench without the open unbalances, and that of one unit of each."""
         return [
             (loads.wrench, tuple(column.wrench for column in columns))
             for loads, columns in zip(self.bare.loads, self._slopes, strict=True)
         ]
 
     def spectra(self, channel: LoadChannel) -> list[tuple[Spectrum, tuple[Spectrum, ...]]]:
-        """Return the signal of a channel for the bare design and for one unit of every column, per operating point."""
+        """Return, for each operating point, a load without the open unbalances, and that of one unit of each."""
         signals = self.bare.signals(channel)
         return [
             (bare, tuple(map(channel.signal, columns))) for bare, columns in zip(signals, self._slopes, strict=True)
@@ -342,7 +342,7 @@ def _only_changed(engine: Engine, change: _Change) -> Engine:
 def _loads(
     parts: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
 ) -> PointLoads:
-    """Return the loads of some parts of the engine at an operating point, at the speed of the whole engine.
+    """Return the loads that some parts of the engine cause at an operating point, at the speed of the whole engine.
 
     `parts` is the engine with these parts as its only masses. `shares` are names of geared shafts whose whole inertia
     is added.

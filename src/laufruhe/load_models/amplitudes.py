@@ -131,11 +131,11 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
 
 
 def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
-    """Return dual vectors v of the couples C_h of a crank star, shape (directions, orders) (S4).
+    """Return dual vectors v that bound the objective by the couples of a crank star, (directions, orders) (S4).
 
+    Each v gives a lower bound Re sum_h conj(v_h) C_h of the objective, with the couple C_h in order h. Here
     v_h = sum_t w_t c_th u_th, with weight w_t and couple factors c_th of term t, and any vector u_t with
-    sum_h |u_th|^2 <= 1. Each v gives a lower bound Re sum_h conj(v_h) C_h of the objective. v is zero in all but the
-    three orders with the largest factors, which keeps the bound valid.
+    sum_h |u_th|^2 <= 1. v is zero in all but the three orders with the largest factors, so the bound stays valid.
     """
     total = np.sum([np.multiply(t.weight, t.couple) for t in objective.terms], axis=0)
     strongest = [int(h) for h in np.argsort(total)[::-1] if total[h] > 0.0][:3]
@@ -153,7 +153,7 @@ def dual_directions(objective: AmplitudeObjective) -> NDArray[np.complex128]:
 
 
 def _sizes(objective: AmplitudeObjective, strongest: Sequence[int]) -> Iterator[Array]:
-    """Yield magnitudes |v_h| of dual vectors for the orders with the largest couple factors (S4).
+    """Yield possible magnitudes |v_h| of dual vectors in the orders with the largest couple factors (S4).
 
     `strongest` are the indices of these orders. A term with several of them divides its unit vector between them.
     """

@@ -41,7 +41,10 @@ class BatchNorm:
     grid: Grid
 
     def values(self, features: Array, threads: int = 1) -> Array:
-        """Return the norm of each design, shape (designs,), from the feature vectors, shape (designs, features)."""
+        """Return the norm of a load for many designs, shape (designs,).
+
+        `features` has the vector (1, decision vector) of each design, shape (designs, features).
+        """
         components, _, k = self.rows.shape
         block = max(CACHE_BYTES // (8 * (components + 1) * max(k, 1)), _MIN_BLOCK)
         norms = np.empty(len(features))
@@ -74,7 +77,9 @@ class BatchNorm:
         return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
 
     def _lengths(self, product: Array, output: Array) -> Array:
-        """Return the row lengths of every design, shape (designs, k), from the product of features and coefficients.
+        """Return the lengths of the load rows of every design, shape (designs, k).
+
+        `product` has the rows of all designs: features times coefficients. It is overwritten.
 
         The product is overwritten.
         """
@@ -119,7 +124,10 @@ class Designs:
         return np.stack([np.ones(len(values)), *columns], axis=1)
 
     def objective_from_features(self, features: Array, threads: int = 1) -> Array:
-        """Return the objective of every design from the vectors (1, decision vector), shape (designs, 1 + columns)."""
+        """Return the objective of many designs, shape (designs,).
+
+        `features` has the vector (1, decision vector) of each design, shape (designs, 1 + columns).
+        """
         total = np.zeros(len(features))
         for weight, norm in self.terms:
             total += weight * norm.values(features, threads)
@@ -132,7 +140,7 @@ class Designs:
 
 
 def prepare(problem: Problem, prune: bool = True) -> Designs:
-    """Compute all that does not depend on the decisions.
+    """Return a fast evaluator of many designs: it keeps all parts of the loads that do not depend on the decisions.
 
     With `prune`, samples that repeat within the cycle, and components that are zero, are left out to save time.
 

@@ -32,7 +32,7 @@ class FixedCrankLoads:
         self._model, self._unbalances = model, unbalances
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return the product of `transform`, shape (6, 6), and the wrench at every operating point.
+        """Return the symbolic wrench on the block at every operating point, multiplied by a 6 x 6 `transform`.
 
         Negligible orders are left out.
         """
@@ -80,7 +80,7 @@ class OpenCrankLoads(UnevenModel):
         self._moves, self._variables = moves, [deviations, unbalances]
 
     def wrenches(self, transform: Array) -> list[SymbolicSpectrum]:
-        """Return the product of `transform`, shape (6, 6), and the wrench at every operating point.
+        """Return the symbolic wrench on the block at every operating point, multiplied by a 6 x 6 `transform`.
 
         Orders that are small at all of `PROBES` random designs are left out.
         """

@@ -81,7 +81,10 @@ class FiringModel(StarModel):
         return StarProblem(tuple(norms[:count]), tuple(norms[count:]), self.domains, samples)
 
     def _norm(self, measure: Measure, samples: int, averaged: bool, star_norms: Iterator[StarNorm]) -> StarNorm:
-        """Return the norm of a measure for all firing orders; `star_norms` yields the norms over throw angles alone."""
+        """Return a measure as a function of the firing order.
+
+        `star_norms` yields the same measures as functions of the throw angles alone.
+        """
         if not measure.is_inside:
             return next(star_norms)
         signals = [signal.with_base(self.base) for signal in self._origin_evaluation.signals(measure.load)]

@@ -53,7 +53,7 @@ def split_by_bank(upright: ComplexArray, across: ComplexArray, upside: ComplexAr
 
 
 def only_gas_of(problem: Problem, name: str) -> Problem:
-    """Return the problem with the gas of the named cylinder only."""
+    """Return the problem with gas pressure in the named cylinder only."""
     points = []
     for point in problem.points:
         gas = point.gas
@@ -71,7 +71,7 @@ def motored(problem: Problem) -> Problem:
 
 
 def gas_distinguishes_cylinders(problem: Problem) -> bool:
-    """Return True if gas acts on measures of the problem, and differs between cylinders."""
+    """Return True if a measure depends on gas, and the gas pressure differs between cylinders."""
     if not problem.depends_on_gas:
         return False
     gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]

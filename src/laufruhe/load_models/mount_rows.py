@@ -21,7 +21,7 @@ SAMPLES_PER_ORDER = 4
 
 
 def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure: Measure) -> tuple[Any, Grid]:
-    """Return the load rows of a measure of mount forces or deflections, in the layout of `load_rows` (P1).
+    """Return the vectors (rows) whose norm is a measure of mount forces or deflections, as CasADi expressions (P1).
 
     Rows are values at samples, or coefficients of orders for a root mean square (Parseval); their expression has the
     shape (k, 3). `points` are the responses at the operating points, and `names` the names of the mounts in them.
@@ -53,7 +53,9 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], measure:
 
 
 def transmitted_squares(points: Sequence[PointResponse], measure: Measure) -> list[tuple[Any, Any]]:
-    """Return sums of squares of forces on elastic and on rigid mounts, for each operating point and order (E11).
+    """Return sums of squared mount forces on elastic and on rigid mounts, whose ratio is a transmissibility (E11).
+
+    The list has a pair for each operating point and order.
 
     If the measure names no orders, all orders above zero count together.
     """

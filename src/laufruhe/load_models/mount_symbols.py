@@ -60,7 +60,10 @@ class SymbolicMounts:
 
 
 def mount_matrices(problem: Problem, block: Block) -> Any:
-    """Return a CasADi function from the mount decisions to the matrices of `SymbolicMounts`, in that order."""
+    """Return a CasADi function from the mount decisions to the matrices of a block on mounts.
+
+    Its outputs are the matrices of `SymbolicMounts`, in their order.
+    """
     lib = symbols()
     decisions = ca.SX.sym("mounts", len(problem.mount_decisions))
     root = ca.DM(mass_root(block))
@@ -106,7 +109,7 @@ def symbolic_mounts(problem: Problem, block: Block, decisions: Any) -> SymbolicM
 
 
 def elimination() -> Any:
-    """Return a CasADi function y = (A + i B)^-1 (r + i s) for symmetric A and B (E20).
+    """Return a CasADi function that solves (A + i B) y = r + i s for the complex motion y of a block (E20).
 
     The inputs are A and B of shape (6, 6), r and s of shape (6,); the outputs are the real and imaginary parts of y.
     Elimination has no pivoting. Loss or damping keeps every pivot from zero. Without both, a pivot is zero only at
@@ -162,7 +165,7 @@ class PointResponse:
 
 
 def response(mounts: SymbolicMounts, point: OperatingPoint, wrench: SymbolicSpectrum) -> PointResponse:
-    """Return the response of the mounted block at one operating point.
+    """Return the motion of the mounted block and its mount forces at one operating point, as CasADi expressions.
 
     `wrench` is the wrench of the loads in coordinates with unit mass: R times the wrench about the centre of gravity,
     with the inverse square root R of the mass matrix.

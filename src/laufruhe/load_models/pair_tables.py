@@ -44,16 +44,17 @@ class PairTable:
     rounding: float
 
     def squares(self, stars: Stars) -> Array:
-        """Return the square for each of n crank stars, shape (n,), from the step of every throw, shape (n, throws)."""
+        """Return the squared norm of each of n crank stars, shape (n,), from the step of every throw, (n, throws)."""
         total = np.full(len(stars), self.constant)
         for k in range(stars.shape[1]):
             total += self.increments(stars, stars[:, k], k)
         return total
 
     def increments(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """Return the increase of the squares, shape (n,), when one throw on `steps`, shape (n,), is added to stars.
+        """Return the increase of the squared norms, shape (n,), when a throw is added to n incomplete crank stars.
 
-        `stars` has the steps of the throws before this one, shape (n, at least `throw`).
+        `stars` has the steps of the throws before this one, shape (n, at least `throw`), and `steps` the step of the
+        new throw in each star, shape (n,).
         """
         total = self.linear[throw, steps]
         count = self.linear.shape[1]
@@ -64,7 +65,7 @@ class PairTable:
 
 
 def pair_table(norm: StarNorm) -> PairTable:
-    """Return the table of a root mean square without decisions other than the crank star."""
+    """Return a root mean square of loads as a table over pairs of throws, if only the crank star is open."""
     weights = np.sqrt(norm.grid.weights)[:, None]
     first = (norm.constant * weights).reshape(-1)
     throws, steps = norm.moves.shape[:2]
@@ -86,7 +87,7 @@ class PairObjective:
 
     @classmethod
     def from_problem(cls, problem: StarProblem) -> PairObjective:
-        """Build the objective of a problem of root mean squares whose only decision is the crank star."""
+        """Return the objective as tables over pairs of throws, for root mean squares and an open crank star alone."""
         terms, limits = (
             tuple((number, pair_table(norm)) for number, norm in pairs) for pairs in (problem.terms, problem.limits)
         )
@@ -98,7 +99,10 @@ class PairObjective:
         return [table for _, table in (*self.terms, *self.limits)]
 
     def values(self, squares: Array) -> Array:
-        """Return the objective of n stars, infinite over a limit, from the squares of all tables, shape (n, tables)."""
+        """Return the objective of n crank stars, from the squared norms of all tables, shape (n, tables).
+
+        It is infinite for a star that violates a limit.
+        """
         total = np.zeros(len(squares))
         for k, (weight, _) in enumerate(self.terms):
             total += weight * np.sqrt(np.maximum(squares[:, k], 0.0))

@@ -70,16 +70,16 @@ class PhaseLeadNorm:
 
 
 class PhaseLeadModel:
-    """Loads of an engine at any leads of its geared shafts; the decisions of the problem are leads and unbalances.
+    """Loads of an engine for any lead angles of its geared shafts; only lead angles and unbalances are open.
 
     Attributes
     ----------
     lower, upper, start
-        Bounds and initial values of the leads [rad], shape (leads,).
+        Bounds and initial values of the lead angles [rad], shape (leads,).
     names
-        Names of the shafts with an open lead.
+        Names of the shafts with an open lead angle.
     base_model
-        Loads of the whole engine with the leads at their initial values.
+        Loads of the whole engine with the lead angles at their initial values.
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -95,7 +95,10 @@ class PhaseLeadModel:
         self._cache: dict[Measure, tuple[LoadShare, list[LoadShare]]] = {}
 
     def shares(self, measure: Measure) -> tuple[LoadShare, list[LoadShare]]:
-        """Return the shares of the fixed parts and of each shaft in the load of a measure, over a common period."""
+        """Return the parts of a load: from all parts with a fixed phase, and from each shaft with an open lead angle.
+
+        Their spectra have a common period, so that they can be added.
+        """
         if measure not in self._cache:
             shares = []
             for model in (self._fixed, *self._shafts):
@@ -111,7 +114,10 @@ class PhaseLeadModel:
         return self._cache[measure]
 
     def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
-        """Return the norm of a measure at given leads, with derivatives by the leads; see `at` for the parameters."""
+        """Return a measure at fixed lead angles as a norm of the unbalances, with derivatives by the lead angles.
+
+        See `at` for the parameters.
+        """
         if not measure.is_load:
             norm = self.base_model.norm(measure, samples)
             zeros = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
@@ -147,7 +153,7 @@ class PhaseLeadModel:
         return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope(columns), grid), tuple(derivatives), angles)
 
     def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[PhaseLeadNorm, ...]]:
-        """Return the affine problem of the unbalances at given leads [rad], and its norms with lead derivatives.
+        """Return the problem of the unbalances at fixed lead angles [rad], and its norms with derivatives by them.
 
         The norms of the terms stand before those of the limits.
 
@@ -176,7 +182,7 @@ class PhaseLeadModel:
         return program, tuple(norm for _, norm in (*terms, *limits))
 
     def counted(self, measure: Measure, shaft: int) -> list[Spectrum]:
-        """Return the counted orders of a shaft's load at its initial lead, for each operating point that counts."""
+        """Return the load of a shaft at its initial lead angle in the orders of a measure, per operating point."""
         shares = measure.shares(self.problem.points)
         signals = self.shares(measure)[1][shaft].bare
         engine = self.problem.engine
@@ -184,7 +190,7 @@ class PhaseLeadModel:
 
 
 def problem_of_shafts(problem: Problem, is_included: Callable[[str], bool]) -> Problem:
-    """Return the problem of an engine reduced to the parts on those shafts whose name `is_included` accepts."""
+    """Return the problem with only those parts of the engine that are on shafts whose name `is_included` accepts."""
     engine = problem.engine
     parts = tuple(part for part in engine.slider_cranks if is_included(part.shaft.name))
     # other rotors stay without unbalance, so that every decision keeps its column

@@ -37,7 +37,9 @@ class Peaks(Protocol):
 
 
 def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
-    """Return the simulated measures of objective and limits, except those that have linearised rows in the problem.
+    """Return the measures of objective and limits that need a simulation in time, such as run-ups.
+
+    Measures that have linearised rows in the problem are left out.
 
     Raises
     ------
@@ -51,7 +53,7 @@ def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
 
 
 def peaks_of(problem: Problem, step_factor: int, is_coarse: bool = False) -> Peaks | None:
-    """Return the local maxima of all simulated measures, or None if there are no such measures.
+    """Return a function object for the local maxima over time of all simulated measures; None without such measures.
 
     The time step is `step_factor` times that of the final evaluation. A coarse simulation may leave out its most
     expensive part.

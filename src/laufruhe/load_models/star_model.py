@@ -55,7 +55,7 @@ class StarNorm:
     grid: Grid
 
     def at(self, star: Sequence[int]) -> AffineNorm:
-        """Return the norm of one crank star, given by the step of every throw."""
+        """Return the norm as a function of the unbalances, for the crank star with these steps of its throws."""
         indices = np.arange(len(star)), np.asarray(star, dtype=np.intp)
 
         def total(first: Array, changes: Array) -> Array:
@@ -88,7 +88,7 @@ class StarProblem:
 
     @property
     def compressed(self) -> StarProblem:
-        """Equivalent problem with fewer rows in root mean squares (S12); see `compress_norm`."""
+        """Problem with the same objective and fewer rows in root mean squares (S12); see `compress_norm`."""
         terms, limits = (
             tuple((number, compress_norm(norm) if norm.norm.is_euclidean else norm) for number, norm in pairs)
             for pairs in (self.terms, self.limits)
@@ -154,7 +154,7 @@ class StarModel:
         return AffineModel(with_upright_angles(self.phasing.problem_of(candidate)), keep_all=True)
 
     def at(self, samples: int, averaged: bool = False) -> StarProblem:
-        """Return the problem of all crank stars at a number of samples over the period of the loads.
+        """Return every measure as a function of crank star and unbalances, sampled over the period of the loads.
 
         Rows of means are averages over the step about each sample if `averaged` (P7).
         """
@@ -189,10 +189,10 @@ class StarModel:
 
 
 def with_upright_angles(problem: Problem) -> Problem:
-    """Return the problem with the angles of open unbalances counted from upright, and not from their throw.
+    """Return the problem with the angles of open unbalances counted from the vertical, and not from their throw.
 
-    Only unbalances of free angle change: their set, a disc, is the same from every angle. Counted from upright, they
-    act alike in every star.
+    Only unbalances of free angle change: their set, a disc, is the same from every angle. Counted from the vertical,
+    they cause the same load in every crank star.
     """
     decisions = []
     for decision in problem.decisions:
@@ -209,10 +209,10 @@ def with_upright_angles(problem: Problem) -> Problem:
 
 
 def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
-    """Return rows of shape (..., m, 1) whose sums have the same lengths as those of `parts`, shape (..., k, d) (S12).
+    """Return fewer load rows with the same length, for any sum of the arrays `parts`, shape (..., k, d) (S12).
 
-    They come from the factor R of a QR decomposition, because the factor Q keeps every length. The result is None if R
-    would have no fewer rows than k d.
+    The result has the shape (..., m, 1). Its rows come from the factor R of a QR decomposition, because the factor Q
+    keeps every length. The result is None if R would have no fewer rows than k d.
     """
     k, d = parts[0].shape[-2:]
     flat = [part.reshape(-1, k * d) for part in parts]
@@ -225,7 +225,7 @@ def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
 
 
 def compress_norm(norm: StarNorm) -> StarNorm:
-    """Return the same root mean square with at most one row for each constant, move and slope (S12)."""
+    """Return the same root mean square of loads with at most one row for each constant, throw move and slope (S12)."""
     root = np.sqrt(norm.grid.weights)[:, None]
     parts = [norm.constant * root, norm.moves * root, np.moveaxis(norm.slope * root[..., None], -1, 0)]
     if norm.slope_moves is not None:

@@ -44,7 +44,7 @@ class SymbolicSpectrum:
         return SymbolicSpectrum(self.orders, m @ self.real, m @ self.imaginary)
 
     def map_orders(self, matrices: Sequence[NDArray[np.complex128]]) -> SymbolicSpectrum:
-        """Return the spectrum with the components of each order multiplied by a complex matrix, shape (m, d) each."""
+        """Return the spectrum with each order multiplied by its own complex matrix, shape (m, d) each."""
         pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
         columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]
         real = [a @ x - b @ y for (a, b), (x, y) in zip(pairs, columns, strict=True)]

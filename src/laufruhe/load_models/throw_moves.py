@@ -61,7 +61,7 @@ class ThrowMoves:
         self.lower, self.upper = np.array(ends).reshape(-1, 2).T
 
     def angles(self, x: Any) -> tuple[list[Any], Any, Any]:
-        """Return the throws, bank angle and split pin [rad] at deviations x, shape (size,)."""
+        """Return throw angles, bank angle and split pin angle [rad] at deviations x from the start, shape (size,)."""
         start, position = self.start, len(self._throws)
         bank, split = start.bank_angle, start.split_pin
         if self._open_bank:
@@ -79,7 +79,7 @@ class ThrowMoves:
         return moved if self.phasing.throw_bounds else [first, *moved], bank, split
 
     def candidate(self, x: Array) -> Candidate:
-        """Return the crank at deviations x [rad], shape (size,)."""
+        """Return the crank whose open angles deviate by x from the start [rad], shape (size,)."""
         # a rounding error of a deviation would count as another firing angle
         throws, bank, split = self.angles(np.where(np.abs(x) < ZERO_DEVIATION, 0.0, x))
         return replace(
@@ -90,7 +90,7 @@ class ThrowMoves:
         )
 
     def firing_intervals(self, x: Any) -> tuple[list[Any], list[str]]:
-        """Return the firing intervals [rad], linear in the deviations x (S20), and their names."""
+        """Return the firing intervals [rad] at deviations x of the open angles, linear in x (S20), and their names."""
         throws, bank, split = self.angles(x)
         start, cycle, pins = self.start, self.phasing.cycle, self.layout.pins
         order = start.firing_order or ()

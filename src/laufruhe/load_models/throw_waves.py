@@ -221,7 +221,7 @@ class ThrowWaves:
         return uses_averages(self.problem, measure) and not measure.norm.averages
 
     def counted(self, measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
-        """Return the counted orders of the load of a measure, for each operating point that counts."""
+        """Return the load of a design in the orders of a measure, for each operating point of the measure."""
         engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
@@ -231,7 +231,7 @@ class ThrowWaves:
         ]
 
     def _kept_orders(self, measure: Measure) -> set[Fraction]:
-        """Return the orders that a measure needs, so that omitted orders have at most the share `share_left_out`."""
+        """Return the orders of load to keep for a measure; the others have at most the share `share_left_out` of it."""
         squares: dict[Fraction, float] = defaultdict(float)
         evaluations = (evaluation for part in self.parts for evaluation in part.evaluations)
         for signal in (signal for evaluation in evaluations for signal in self.counted(measure, evaluation)):
@@ -248,7 +248,7 @@ class ThrowWaves:
         return {ordered[k] for k in np.flatnonzero(tail > shares**2 * tail[:1])}
 
     def left_out(self, measure: Measure, samples: int) -> float:
-        """Return the largest change of a measure by the omitted orders, for throws at any angles [SI]."""
+        """Return an upper bound of the change of a measure by its omitted orders, for throws at any angles [SI]."""
         total = 0.0
         for part in self.parts if measure.is_load else ():
             signals = [self.counted(measure, evaluation) for evaluation in part.evaluations]
@@ -267,7 +267,7 @@ class ThrowWaves:
         return total
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
-        """Return the largest norm of the omitted orders of signals, orders beyond the last listed one included [SI]."""
+        """Return the largest norm of the omitted orders of signals [SI], including those beyond the computed ones."""
         total, kept_orders = 0.0, np.array([float(order) for order in self.times])
         for short in signals:
             # kinks have orders without end; those beyond the listed ones are negligible
@@ -289,7 +289,10 @@ class ThrowWaves:
         return total
 
     def norm(self, measure: Measure, samples: int) -> WaveNorm:
-        """Return the norm of a measure at `samples` steps over the period; means are averaged over each step (P7)."""
+        """Return a measure as a function of throw angles and unbalances, at `samples` steps over the period.
+
+        Means are averaged over each step (P7).
+        """
         fixed = self.rest.norm(
             measure, samples, averaged=True, peaks=PEAK_STEPS if uses_averages(self.problem, measure) else 0
         )

@@ -63,7 +63,7 @@ def turned_loads(
     selections: Sequence[OrderSelection], keep_places: bool, angles: Sequence[tuple[Any, Any]], banks_are_open: bool,
     unbalance: Callable[[Rotor], Any],
 ) -> list[SymbolicSpectrum]:  # fmt: skip
-    """Return a load at one operating point at every place, for throws and banks at any angles.
+    """Return a load at one operating point as an expression of throw and bank angles, one spectrum per place.
 
     Parameters
     ----------

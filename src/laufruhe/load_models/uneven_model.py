@@ -97,7 +97,7 @@ class UnevenModel:
             self._angles.append((symbols.throws[layout.pins[k]] + offset - bank - math.tau * turns, bank))
 
     def rows(self, measure: Measure) -> tuple[Any, Grid]:
-        """Return the load rows of a measure, shape (k, d), and their grid (P1).
+        """Return the vectors (rows) whose norm is a measure, shape (k, d), as CasADi expressions, and their grid (P1).
 
         Rows are coefficients of orders for a root mean square (Parseval), and values at samples for other norms.
         """
@@ -187,7 +187,10 @@ class UnevenModel:
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
     def wrench(self, point: OperatingPoint, gain: Callable[[float], float] | None = None) -> SymbolicSpectrum:
-        """Return the wrench at an operating point; `gain` weights the orders of the roll moment in their selection."""
+        """Return the symbolic wrench on the block at an operating point.
+
+        `gain` weights each order of the roll moment when negligible orders are dropped.
+        """
         if gain is None and point in self._wrenches:
             return self._wrenches[point]
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else LEFT_OUT
@@ -199,7 +202,7 @@ class UnevenModel:
         return wrench
 
     def _unbalance(self, rotor: Rotor) -> Any:
-        """Return the unbalance of a rotor (re, im) [kg m], turned with its throw."""
+        """Return the unbalance of a rotor as expressions (re, im) [kg m], at the present angle of its throw."""
         real: Any = rotor.unbalance.real
         imaginary: Any = rotor.unbalance.imag
         for domain in self.domains:
@@ -245,7 +248,7 @@ def _rotor_throws_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
 
 
 def rotor_states(problem: Problem) -> dict[str, tuple[complex, ...]]:
-    """Return the unbalance of every rotor, with the gains of the decisions that drive it, by rotor name."""
+    """Return by rotor name: the fixed unbalance, then the unbalance per unit of each decision [kg m]."""
     gains: dict[str, list[complex]] = {rotor.name: [] for rotor in problem.engine.rotors}
     for decision in problem.decisions:
         for drive in decision.rotor_drives:

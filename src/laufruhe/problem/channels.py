@@ -44,7 +44,7 @@ OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
 def crankcase_signal(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
-    """Return a function from loads to a signal inside the crankcase, which depends on the moving parts only.
+    """Return a function from loads at an operating point to a signal inside the crankcase, such as pin force.
 
     `signal` is a function of the engine with these parts and of the loads; an error without them gives the `name`.
     """
@@ -239,7 +239,7 @@ class LoadChannel(Channel):
     is_load: ClassVar[bool] = True
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
-        """Return the `size_factors` at an operating point, shape (places, d or 1); None without such factors."""
+        """Return factors from load to stress by place at an operating point, (places, d or 1); None without factors."""
         if self.size_factors is None:
             return None
         factors = self.size_factors(engine, point)
@@ -309,7 +309,7 @@ Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
 
 
 def crankcase_channel(name: str, unit: str, where: PlaceSpec, load: Load, factor: Factor | None = None) -> LoadChannel:
-    """Return the channel of a load inside the crankcase (Z1).
+    """Return the channel (a quantity that measures can use) of a load inside the crankcase (Z1).
 
     Parameters
     ----------
@@ -339,7 +339,7 @@ def _of_wheel(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
     needs: Need = Needs.FLYWHEEL, depends_on_torque: bool = False,
 ) -> NumberChannel:  # fmt: skip
-    """Return the channel of a number of the flywheel: its largest value over the operating points that count."""
+    """Return the channel of a flywheel number, such as speed variation: the largest value over a measure's points."""
 
     def flywheel_value(measure: MeasureQuery, evaluation: EvaluatedDesign) -> FlywheelFunction:
         counted = [loads.point for loads in evaluation.loads if measure.includes_point(loads.point)]
@@ -426,7 +426,7 @@ def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
 
 
 def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
-    """Return the channel of the largest vector length over the mounts and load cases that count."""
+    """Return the channel of the largest static force or travel, over the mounts and load cases of a measure."""
 
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         mounting = mounting_in(evaluation.engine)

@@ -70,7 +70,7 @@ class Field:
     values: Array
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
-        """Yield heading and index of each column, one for each index of its own axes."""
+        """Yield heading and array index of each table column of the field: one for each combination of its axes."""
         for index in itertools.product(*(range(len(axis.labels)) for axis in self.own_axes)):
             labels = [(axis.name, axis.labels[k]) for axis, k in zip(self.own_axes, index, strict=True)]
             texts = [f"{name} {label}" if isinstance(label, int | float) else str(label) for name, label in labels]
@@ -113,7 +113,7 @@ class Fields:
         return xr.Dataset(variables, coords, {"title": self.title})
 
     def table(self) -> tuple[list[str], Iterator[list[Any]]]:
-        """Return headings and rows: one row for each index of the row axes, with the designs in columns."""
+        """Return headings and rows of a table: one row for each index of the row axes, columns for each design."""
         named = len(self.designs.labels) > 1
         columns = [
             (f"{design}: {head}" if named else head, field.values[k][..., *index])

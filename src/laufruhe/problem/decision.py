@@ -124,7 +124,7 @@ class Numbers:
     changes: dict[tuple[Kind, Any], float] = field(default_factory=dict)
 
     def engine(self, base: Engine) -> Engine:
-        """Return the engine `base` with these numbers."""
+        """Return the engine `base` with its unbalances, mounts and other open numbers replaced by these."""
         rotors = []
         for rotor in base.rotors:
             unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
@@ -270,7 +270,7 @@ class AddressDrive:
 
 
 def mount_from_numbers(mount: Mount, numbers: Sequence[float]) -> Mount:
-    """Return a mount with these fourteen numbers (E13)."""
+    """Return a mount with fourteen other numbers: place, stiffness, damping and inclination (E13)."""
     rows = turned_axes(NUMBERS, numbers[TURNED]).tolist()
     # a sum of changes may fall below zero by a rounding error
     (a, b, c), (p, q, r) = (tuple(max(float(v), 0.0) for v in numbers[s]) for s in (STIFFNESS, DAMPING))
@@ -360,7 +360,7 @@ class Decision:
 
 
 def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tuple[Decision, ...]:
-    """Return decisions without effects on the named rotors; decisions without any other effect are dropped."""
+    """Return the decisions for an engine without the named rotors; decisions without any other effect are dropped."""
     reduced = (
         replace(d, drives=tuple(v for v in d.drives if getattr(v, "rotor", None) not in names)) for d in decisions
     )
@@ -368,7 +368,7 @@ def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tup
 
 
 def apply_decisions(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
-    """Change the numbers of an engine in place to these values of the decisions, and return them."""
+    """Set the values of decisions in the numbers of an engine, in place, and return these numbers."""
     for decision, value in zip(decisions, values, strict=True):
         for drive in decision.drives:
             drive.move(numbers, value - decision.start)
@@ -427,7 +427,7 @@ class Domain:
 
 
 def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
-    """Return the domains of decisions, with consecutive columns in the same order."""
+    """Return the domain of each decision: its allowed set, and its columns in the decision vector."""
     domains: list[Domain] = []
     for decision in decisions:
         domains.append(Domain(decision, domains[-1].columns.stop if domains else 0))
@@ -458,7 +458,7 @@ def decision_vector(domains: Sequence[Domain], values: Sequence[Value] | Array |
 
 
 def projected_vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    """Return the decision vector of values, each moved to the nearest allowed value, shape (columns,)."""
+    """Return the decision vector, shape (columns,), from values that are moved to the nearest allowed value."""
     vector = decision_vector(domains, values)
     for domain in domains:
         vector[domain.columns] = domain.project(vector)

@@ -100,7 +100,7 @@ def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
 
 
 def _with_extensions(core_rows: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
-    """Return the table of the core with the lines of extensions about their own channels or kinds."""
+    """Return the table of dependences by channel and kind of decision, with the entries of extensions."""
     missing = set(CHANNELS).difference(core_rows)
     table: dict[str, Mapping[Kind, Dependence]] = {
         name: row | {kind: Dependence.NONE for kind in KINDS.values() if kind.is_alone and kind not in row}
@@ -134,7 +134,7 @@ _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
 
 def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
-    """Return how a channel varies with decisions of one kind (affine, smooth ...): table entry and exceptions."""
+    """Return how a channel follows decisions of one kind, such as affine or smooth, in this problem."""
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
     entry = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
@@ -173,7 +173,7 @@ def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool
 
 
 def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
-    """Return True if a channel is affine in decisions of these kinds together, or constant."""
+    """Return True if a channel is an affine function of all decisions of these kinds together, or constant."""
     if {Kind.SHARE, Kind.PISTON} <= set(kinds):
         # the inertia on a geared shaft is a fraction of one that depends on the pistons
         return not depends(channel, kinds, problem)
@@ -182,7 +182,7 @@ def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bo
 
 
 def shares_gas(problem: Problem) -> bool:
-    """Return True if a piston on a shaft with open lead angle shares its gas, and the gas affects a measure."""
+    """Return True if a measure depends on gas, and a piston with an open lead angle shares a chamber with another."""
     names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
     moving = (part for part in parts if part.shaft.name in names)

@@ -55,10 +55,10 @@ class Evaluation(EvaluatedDesign):
         return [mount.name for mount in self.engine.mounts]
 
     def rows(self, measure: Measure, samples: int | None = None, kink_angles: Sequence[Array] | None = None) -> Rows:
-        """Return the vectors (rows) whose norm is a measure of loads or masses, over the whole cycle.
+        """Return the vectors (rows) of a measure of loads or masses; the value of the measure is their norm.
 
         `samples` is the number of samples over the cycle, by default that of the evaluation. `kink_angles` has the
-        angles of kinks at each operating point [rad], by default those of the signals.
+        angles at which slopes jump, at each operating point [rad], by default those of the signals.
         """
         if not measure.is_load:
             return mass_rows(measure, self.engine.rotors, self.engine.slider_cranks)
@@ -227,7 +227,7 @@ def channel_samples(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT
 
 
 def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> list[CycleMeasures]:
-    """Return mean, maximum and rms at each place of a channel at operating point k [SI].
+    """Return mean, maximum and rms over the cycle of a load at each mount, bearing or other place, at point k [SI].
 
     Maxima are computed with refined samples and at kinks; all are infinite on an undamped resonance.
     """

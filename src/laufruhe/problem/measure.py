@@ -160,9 +160,9 @@ class Limit:
     outside: tuple[float, float] | None = None
 
     def slack(self, value: float) -> tuple[float, float, str]:
-        """Return slack, bound and sense ("at most" or "at least") of the side with the smallest slack (E15).
+        """Return the distance of a value from the nearer side of a limit: slack, bound, "at most" or "at least" (E15).
 
-        The slack is relative to the bound, and negative if the value violates it. The bound is in SI units.
+        The slack is relative to the bound, and negative if the value violates the limit. The bound is in SI units.
         """
         sides = []
         if self.minimum > -math.inf:
@@ -248,7 +248,10 @@ def load_rows(
 
 
 def kinks_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
-    """Return the angles of kinks where a peak may lie, the same number for each operating point [rad] (L5a)."""
+    """Return the crank angles [rad] at which the slope of a signal jumps, so that a peak may lie there (L5a).
+
+    The list has one array for each operating point, all of the same length.
+    """
     if measure.norm.refinement == 1:
         return [np.zeros(0)] * len(signals)
     kinks = [narrow_signal(measure, signal, engine).kink_angles for signal in signals]
@@ -257,7 +260,7 @@ def kinks_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> l
 
 
 def narrow_signal(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
-    """Return the counted places and orders of a signal, shape (n, places, d), with weighted directions.
+    """Return the part of a signal that a measure counts: its places, orders and weighted directions, (n, places, d).
 
     A channel that sums its places is multiplied by their number, so that the mean over places is the sum.
     """

@@ -47,7 +47,7 @@ def evaluate_start(problem: Problem) -> Evaluation:
 
 
 def off_resonance(problem: Problem) -> Problem:
-    """Return the problem with mounts off resonance: the initial mounts, or others within their bounds.
+    """Return the problem with initial mounts that are not on a resonance, moved within their bounds if necessary.
 
     Raises
     ------

@@ -124,7 +124,10 @@ class ShaftChoice:
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
-        """Choices of sets, as tuples of indices, that satisfy the limits of number and mass and do not collide."""
+        """Sets of optional shafts that may be built together, as tuples of indices.
+
+        They satisfy the limits of number and mass, and their shafts do not collide.
+        """
         count = len(self.optional)
         choices = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
         return tuple(
@@ -228,7 +231,7 @@ class PhasingOf(Generic[P]):
 
     @property
     def open_names(self) -> tuple[str, ...]:
-        """Names of the open parts."""
+        """Names of the open parts of the phasing: throws, firing order, bank angle, split pin or shafts."""
         names = (
             ("throws", self.throws is None),
             ("firing order", self.firing_order is None),
@@ -264,7 +267,7 @@ class PhasingOf(Generic[P]):
 
     @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:
-        """Pairs of bank angle and split pin angle within their bounds that allow even firing (S6) [rad].
+        """Pairs of bank angle and split pin angle within their bounds at which even firing is possible (S6) [rad].
 
         If both are open, three bank angles are tried: the bounds and the middle.
         """
@@ -287,7 +290,7 @@ class PhasingOf(Generic[P]):
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
-    """Return start cranks within the bounds of the throws [rad]: the middle, then the nearest evenly firing cranks.
+    """Return throw angles [rad] at which searches start: the middle of their bounds, then the nearest with even firing.
 
     For more than seven cylinders without a firing order, only the middle is returned.
     """

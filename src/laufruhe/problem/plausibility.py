@@ -31,7 +31,10 @@ MAX_SAG, MIN_SAG = 0.1, 1e-6
 def plausibility_warnings(
     engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False
 ) -> tuple[Complaint, ...]:
-    """Return warnings about unusual numbers, one for each part; `fires_together` allows cylinders to fire at once."""
+    """Return warnings about unusual numbers of an engine, such as a rod ratio above 0.5, one for each part.
+
+    `fires_together` is True if cylinders may fire at the same time without a warning.
+    """
     warnings = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
     warnings += [] if fires_together else _of_firing(engine)
     first: dict[str, Complaint] = {}
@@ -41,7 +44,7 @@ def plausibility_warnings(
 
 
 def simultaneous_firings(engine: Engine) -> list[list[str]]:
-    """Return groups of names of cylinders that fire at one crank angle."""
+    """Return the names of cylinders that fire at the same crank angle, in groups of two or more."""
     fires: dict[float, list[str]] = defaultdict(list)
     for part in engine.cylinders:
         fires[round(float(reduced_turn(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)

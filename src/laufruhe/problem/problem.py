@@ -314,7 +314,7 @@ class Problem:
         return units.pop() if len(units) == 1 else ""
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """Return the problem with other numbers, named as in results or by paths as in studies.
+        """Return the problem with other numbers of its file, named as in results or by paths as in studies.
 
         An open number starts at its new value and stays open.
 
@@ -350,7 +350,7 @@ class Problem:
         return self.origin.edited(self.origin, edit, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
-        """Return the problem with other attributes, also in the problems of its candidates if crank stars are open."""
+        """Return the problem with other attributes; with open crank stars, the problem of every star has them too."""
         changes = {"origin": None, **changes}
         if self.phasing is not None:
             problem_of = self.phasing.problem_of
@@ -387,7 +387,7 @@ class Problem:
         )  # fmt: skip
 
     def _drawn(self, changes: Mapping[Path, str | float]) -> Problem:
-        """Return the problem built again from its file with other numbers; decisions keep their sets."""
+        """Return the problem built again from its file with `changes` of numbers; decisions keep their sets."""
         if not changes:
             return self
         drawing = self.rebuild(changes)
@@ -408,14 +408,17 @@ class Problem:
         )  # fmt: skip
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
-        """Return the engine with decisions at these values; by default all decisions."""
+        """Return the engine of a design: `decisions`, by default all, have these values, the others their start."""
         selected = self.decisions if decisions is None else decisions
         if any(decision.address_drives for decision in selected):
             return self.fixed_at(values, selected).engine
         return self.numbers(values, selected).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
-        """Return the numbers of the engine with decisions at these values; symbols of a smooth program are allowed."""
+        """Return unbalances, mounts and other open numbers of the engine with decisions at these values.
+
+        Values may be symbols of a smooth program.
+        """
         selected = self.decisions if decisions is None else decisions
         unbalances = {rotor.name: rotor.unbalance for rotor in self.engine.rotors}
         places = {rotor.name: list(rotor.place) for rotor in self.engine.rotors}

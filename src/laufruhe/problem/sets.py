@@ -140,7 +140,7 @@ class Sector:
         return arc, *(sense * float(a * v[1] - b * v[0]) / self.scale for (a, b), sense in sides)
 
     def inside(self, v: Array) -> Array:
-        """Return the directions in which a point of the set can move both ways, shape (2, m), m = 0 ... 2."""
+        """Return the directions along which a point of the set can move forward and back, shape (2, m), m = 0 ... 2."""
         size = float(np.hypot(*v))
         if size >= self.upper * (1.0 - EDGE):
             return np.zeros((2, 0))

@@ -35,7 +35,7 @@ class StaticPart:
 
 
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
-    """Return the static part of the objective for loads on block and mounts, or None if it is negligible."""
+    """Return the part of the objective from the constant (mean) loads on block and mounts; None if negligible."""
     with_means = with_loads(problem, alternating=False)
     counted = [term for term in with_means.objective if term.measure.includes_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
@@ -48,7 +48,7 @@ def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
 
 
 def with_loads(problem: Problem, alternating: bool) -> Problem:
-    """Return the problem with an objective without the means of loads if `alternating`, else with them."""
+    """Return the problem with an objective of alternating loads if `alternating`, else of loads with their means."""
     terms = []
     for term in problem.objective:
         measure = replace(term.measure, alternating=False)

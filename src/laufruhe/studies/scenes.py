@@ -31,7 +31,7 @@ DISPLAY = {"report", "plots", "live", "cli"}
 
 @dataclass(frozen=True)
 class Point:
-    """One computation of a study: a problem file, changed values by their paths, a metric in place of its objective.
+    """Point of a study: a problem file, changed values by their paths, and a metric in place of its objective.
 
     `shafts` names the balancer shafts that remain, all if None. `base` replaces the tables of the
     case's problem file. `span` is the range of draws, first number and end.
