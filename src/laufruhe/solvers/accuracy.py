@@ -29,7 +29,7 @@ TIMES, MAX_GAS = 4, 23040
 
 
 def objective_error(problem: Problem, evaluation: Evaluation) -> float:
-    """Return an upper bound of the relative error of the objective.
+    """Return an upper bound of the relative error of a design's objective from samples and simplified physics.
 
     With an automatic fidelity the error is against the reference physics. A fidelity that the file states counts as
     exact, so only the error of sampling remains.
@@ -58,7 +58,7 @@ def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Result) -> Result:
-    """Solve again with more steps of the gas pressure until their error is within the tolerance.
+    """Return the result of a solve with enough steps of the gas pressure for the problem's tolerance.
 
     If the error stays larger, subtract it from the lower bound. Keep a number of steps that the file states.
     """
@@ -92,7 +92,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
 
 
 def solve_accurately(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Call `solve`, and choose a better fidelity until the optimum is as accurate as the file demands (F11).
+    """Return the result of `solve` at a fidelity at which the optimum is as accurate as the file demands (F11).
 
     The physics that a fidelity leaves out adds a fixed force. This may be a small share of the initial forces and a
     large share of the optimal ones.

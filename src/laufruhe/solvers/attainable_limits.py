@@ -142,7 +142,7 @@ def _violated_names(result: Result, problem: Problem) -> Collection[str]:
 
 
 def _find_attainable(limit: Limit, problem: Problem, kinds: Collection[Kind], result: Result, solve: Solve) -> _Answer:
-    """Return the attainable value of a limit while the other limits hold.
+    """Return the value that a limited measure can reach while all other limits hold.
 
     The upper side of the limit comes first. The lower side follows if no design meets it together with the others.
     """
@@ -206,7 +206,10 @@ def _answer_without_design(entry: AttainableLimit, result: Result) -> _Answer:
 def _bisect(
     entry: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
 ) -> _Answer:
-    """Return the attainable value of a limit by bisection between the limit and the value of a design without it."""
+    """Return the value that a limited measure can reach, by bisection of the limit.
+
+    The bisection starts from the limit as given and from the value of a design without this limit.
+    """
     is_maximum = entry.side == "at most"
     unlimited = solve(_subproblem(problem, problem.objective, others))
     if not unlimited.status.has_design:
@@ -233,7 +236,7 @@ def _bisect(
 
 
 def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Result:
-    """Return a feasible design that the search found, with the lower bound of the original objective."""
+    """Return the feasible design of the result `candidate` with the lower bound of the original problem's objective."""
     bound = result.certificate.lower_bound if result.certificate else 0.0
     zero_level, value = numerical_zero(problem, candidate.final.engine), objective_value(problem, candidate.final)
     final, value, doubt = refine_objective(problem, candidate.final, value, bound, zero_level)

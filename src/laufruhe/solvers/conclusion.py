@@ -127,7 +127,7 @@ def refine_objective(
     problem: Problem, evaluation: Evaluation, value: float, bound: float, zero_level: float,
     prices: Mapping[Side, Price] | None = None,
 ) -> tuple[Evaluation, float, float]:  # fmt: skip
-    """Return evaluation and objective of a design with more samples while a lower bound exceeds the objective (P7).
+    """Return a design's evaluation and objective, with more samples while a lower bound exceeds the objective (P7).
 
     A bound holds for the mean over the cycle, and a mean of few samples may be smaller than that.
 
@@ -162,7 +162,7 @@ def refine_objective(
 
 
 def refine_result(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
-    """Return a result with more samples while a bound exceeds its objective, and the error of that objective."""
+    """Return a result, with more samples while a bound exceeds its objective, and the error of that objective [SI]."""
     if result.objective is None:
         return result, 0.0
     final, value, doubt = refine_objective(
@@ -195,7 +195,9 @@ def without_proof(result: Result, error: BoundError) -> Result:
 
 
 def witness_of(design: Design, place: Array, violation: float = FEASIBLE) -> Witness | None:
-    """Return a design as a witness of lower bounds; None if its relative violation is larger than `violation`.
+    """Return a design as a witness, a value that no lower bound may exceed.
+
+    The result is None if the design's relative violation of limits is larger than `violation`.
 
     Its coordinates in the boxes of the bound are `place`, shape (n,).
     """
@@ -217,7 +219,7 @@ def is_sampled(measure: Measure) -> bool:
 
 
 def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: dict[str, float]) -> Result:
-    """Return the result of a design, or of the initial design if that is better; `timing` has seconds by stage."""
+    """Return the result with the better of a design and the initial design; `timing` has seconds by stage."""
     problem = design.problem
     baseline = Design.of(problem, problem.start, initial)
     design = min(design, baseline, key=lambda candidate: candidate.rank)
@@ -264,7 +266,7 @@ def violation_message(problem: Problem, evaluation: Evaluation) -> str:
 
 
 def evaluate_only(problem: Problem, allow_resonance: bool = False) -> Result:
-    """Evaluate the initial design; the result is infeasible if its throws have no permitted firing order.
+    """Return the initial design as a result, without optimisation; infeasible if no firing order fits its throws.
 
     If `allow_resonance` is True, the design may stand on an undamped resonance, as the start of a search may.
     """
@@ -299,7 +301,7 @@ def conflict_message(conflict: Sequence[str]) -> str:
 
 
 def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
-    """Return a minimal subset for which `conflicts` is True: if any element is removed, it is False."""
+    """Return a smallest set of limits that contradict each other: without any one of them, `conflicts` is False."""
     subset = list(conflicting)
     for element in tuple(subset):
         reduced = [other for other in subset if other is not element]
@@ -343,7 +345,7 @@ def violated_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[st
 
 
 def nearest_record(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> NearestDesign:
-    """Return the record of an infeasible design: its decisions, and the limit with the largest violation."""
+    """Return the record of an infeasible design for reports: its decisions, and the limit that it violates most."""
     limit = max(problem.limits, key=lambda limit: design.check_limit(limit).violation)
     standing = design.check_limit(limit)
     return NearestDesign(
@@ -397,7 +399,7 @@ def _limit_value(
 
 
 def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
-    """Return True if a small step of a decision from its start changes the limited measure of a design."""
+    """Return True if a limited measure changes when some decision takes a small step from its start."""
     channel = limit.measure.channel
     if not depends(channel, open_kinds(problem), problem):
         return False
@@ -423,7 +425,7 @@ def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
 
 
 def with_constant_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
-    """Return a result with further limits that no decision changes, in the order of `limits`."""
+    """Return a result with the values of further limits that no decision changes, in the order of `limits`."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     final, fine = result.final, with_fine_sampling(result.final)
     values = tuple(
@@ -456,9 +458,10 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
 def priced_decisions(
     design: Design, bounds: Mapping[str, Price] | None = None, price_floor: float = 0.0
 ) -> tuple[DecisionValue, ...]:
-    """Return the decision values of a design, with shadow prices of active bounds by the name of the size or angle.
+    """Return the decision values of a design, with shadow prices of those that lie on a bound.
 
-    A price counts as zero below the share `price_floor` of the objective.
+    `bounds` has the prices by the name of the size or angle. A price counts as zero below the share `price_floor` of
+    the objective.
     """
     minimum = price_floor * design.value
     entries = []
@@ -473,7 +476,7 @@ def priced_decisions(
 
 
 def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ...]:
-    """Return the entry of a decision's size, and that of its angle if the angle is open."""
+    """Return the entries of a decision for the result: its size, and its angle if the angle is open."""
     bounds = decision.set
     (size, angle), (initial_size, initial_angle) = bounds.split(value), bounds.split(decision.start)
     tolerance = bounds.scale * ACTIVE if decision.is_affine else (bounds.upper - bounds.lower) * ACTIVE

@@ -104,7 +104,10 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
 
 
 def _joint_certificate(results: list[Result], value: float) -> Certificate:
-    """Return the certificate of the sum: lower bounds add up, and a part without decisions is its own bound."""
+    """Return the certificate of an objective that is a sum over independent parts of the problem.
+
+    Their lower bounds add up. The value of a part without decisions is its own bound.
+    """
     pairs = [(r.certificate, r.objective.value if r.objective else 0.0) for r in results]
     bound = sum(objective if certificate is None else certificate.lower_bound for certificate, objective in pairs)
     certificates = [certificate for certificate, _ in pairs if certificate is not None]

@@ -41,7 +41,7 @@ MAX_STARS = 60
 def solve_by_local_programs(
     problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool], starts: Sequence[Sequence[Value]] = ()
 ) -> Result:  # fmt: skip
-    """Return the best design of local programs from several starts, with the lower bound zero.
+    """Return the best design of local searches from several starts, with zero as its lower bound.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def solve_by_local_programs(
 
 
 def _alternate_with_cones(program: LocalProgram, best: Array, decide: Decide) -> Array:
-    """Alternate cone programs of `INNER` decisions and local programs of all while the objective falls."""
+    """Return a better design: cone programs of the unbalances alternate with local searches over all decisions."""
     problem = program.problem
     other_decisions = tuple(decision for decision in problem.decisions if decision.kind not in INNER)
     for k in timed_rounds(ROUNDS):
@@ -96,7 +96,10 @@ def _alternate_with_cones(program: LocalProgram, best: Array, decide: Decide) ->
 
 
 def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
-    """Solve each crank star with even firing and each set of shafts as a problem of its own, up to `MAX_STARS`."""
+    """Return the best result over all crank stars with even firing and all sets of shafts, up to `MAX_STARS`.
+
+    Each is solved as a problem of its own.
+    """
     phasing = problem.phasing
     assert phasing is not None
     stars = even_stars(phasing)

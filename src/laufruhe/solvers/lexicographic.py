@@ -36,7 +36,10 @@ WIDER = (0.0, 10.0 * SAMPLED)
 
 
 def solve_lexicographic(problem: Problem, solve: Solve) -> Result:
-    """Minimise each rank in order, with limits on the objectives of earlier ranks."""
+    """Return the result of several objectives in order of priority.
+
+    Each is minimised with limits on the objectives before it.
+    """
     single = problem.changed(ranks=())
     stages: list[Result] = []
     rank_limits: list[Limit] = []

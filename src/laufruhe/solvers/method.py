@@ -87,7 +87,7 @@ class Method:
         return frozenset(self.dependences)
 
     def suits(self, problem: Problem) -> bool:
-        """Return True if the method solves a problem, by its open numbers and its measures."""
+        """Return True if the method can solve a problem with these open numbers and measures."""
         kinds = open_kinds(problem)
         return (
             kinds <= self.kinds

@@ -222,7 +222,7 @@ METHODS: tuple[Method, ...] = in_order("methods", Method, _CORE)
 def solve(
     problem: Problem, listener: Listener | None = None, time_limit: float | None = None, diagnose: bool = False
 ) -> Result:
-    """Optimise the open numbers of a problem.
+    """Return the best values of the open numbers of a problem, with a proven lower bound where one is known.
 
     Parameters
     ----------
@@ -327,7 +327,7 @@ def refuse(problem: Problem) -> None:
 
 
 def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = None) -> Result:
-    """Solve a problem by the first reduction that applies, else by the first method that suits it.
+    """Return the result of the first reduction that applies to a problem, else of the first method that suits it.
 
     An exact method for part of the measures may raise the lower bound of the method.
     """
@@ -428,7 +428,10 @@ def reductions() -> tuple[Reduction, ...]:
 
 
 def _exact_part(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
-    """Return an exact method for part of the measures, and the problem with these measures; None if there is none."""
+    """Return an exact method that bounds a problem from below, and its problem with fewer terms and limits.
+
+    The result is None if no exact method suits a part of the measures.
+    """
     if method.strength is ProofStrength.EXACT or not problem.search.proves:
         return None
     for other in METHODS:

@@ -115,7 +115,7 @@ class Slopes:
 
 
 def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
-    """Return the price of every active limit, then of every active bound (P19).
+    """Return the shadow price of every active limit, then of every active bound, from subgradients (P19).
 
     The result is None if slopes do not balance: the design is not optimal to first order, or a kink is unknown.
 
@@ -158,7 +158,7 @@ def _unique_prices(rows: Array, slope: Array) -> list[float] | None:
 
 
 def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
-    """Return smallest and largest multiplier of every limit and bound, by linear programs over balanced slopes.
+    """Return the range of each shadow price: smallest and largest multiplier that balance the slopes.
 
     `size` is the largest slope of the objective, a unit of the balance. See `prices_of`.
     """
@@ -301,7 +301,7 @@ def affine_prices(
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """Return all subgradients of a norm at x, times `weight`; None if unknown, or if too many rows are zero.
+    """Return all subgradients of a norm at a design x, times `weight`; None if unknown, or if too many rows are zero.
 
     `z` has dual rows of the norm, shape (k, d); None for those of a subgradient.
     """

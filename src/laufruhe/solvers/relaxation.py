@@ -22,7 +22,7 @@ Solve = Callable[[Problem], Result]
 
 
 def solve_by_relaxation(problem: Problem, relaxed: Problem, prove: Solve, solve: Solve) -> Result:
-    """Return the optimum of a relaxation if it is feasible, else the design of `solve` with the relaxation's bound.
+    """Return the optimum of an easier problem if it is feasible, else the design of `solve` with its lower bound.
 
     Parameters
     ----------

@@ -37,7 +37,7 @@ tolerances."""
 
 
 def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Call `solve` with more samples until fine sampling confirms limits and gap; the last result has fine sampling."""
+    """Return the result of `solve` with enough samples per cycle: fine sampling confirms its limits and gap."""
     result = solve(problem)
     for _ in timed_rounds(ROUNDS):
         fidelity = problem.fidelity
@@ -56,7 +56,7 @@ def _sampling_disagreement(result: Result) -> float:
 
 
 def _with_fine_values(result: Result) -> Result:
-    """Return the result of a design with values, limits and gap at fine sampling."""
+    """Return a result with values, limits and gap computed again from many samples per cycle."""
     problem, objective, proof = result.problem, result.objective, result.certificate
     if objective is None or proof is None or not result.status.has_design:
         return result
@@ -128,7 +128,7 @@ def sampling_overestimate(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _gap_disagreement(result: Result) -> float:
-    """Return the sampling error of the objective in tolerances if it changes the proof, else zero."""
+    """Return the sampling error of the objective over its tolerance, if it changes the proof, else zero."""
     problem, proof, objective = result.problem, result.certificate, result.objective
     if proof is None or objective is None or not result.status.has_design or not problem.search.proves:
         return 0.0

@@ -84,7 +84,9 @@ class EvaluatedPoint:
 
 
 def check_by_walk(problem: Problem, result: Result, spent: float) -> Result:
-    """Return the result, without proof if a walk from its design finds a better feasible design than the bound allows.
+    """Return the result, without its proof if a nearby design is better than the claimed lower bound allows.
+
+    Random steps from the result's design, each evaluated exactly, look for such a design.
 
     Parameters
     ----------
@@ -131,7 +133,7 @@ class _LocalSearch:
         self.phasing = result.problem.phasing
 
     def run(self, seconds: float) -> EvaluatedPoint | None:
-        """Return the best feasible design within a processor time [s]; None if no step leads to one."""
+        """Return the best feasible design near the start that steps reach in a processor time [s]; None without one."""
         until = time.thread_time() + seconds
         best = self._evaluate(self.start, None)
         if best is None:
@@ -165,7 +167,7 @@ class _LocalSearch:
         return witness
 
     def _evaluate(self, point: Point, best: EvaluatedPoint | None) -> EvaluatedPoint | None:
-        """Evaluate a design; None without finite loads, or if a feasible best design is at least as good."""
+        """Return the exact evaluation of a design; None if it is no better than `best`, or has no finite loads."""
         problem = point.problem
         try:
             engine, final = problem.design(point.values), self.final
@@ -184,7 +186,7 @@ class _LocalSearch:
         return EvaluatedPoint(point, evaluation, value, max(violations, default=0.0), upper_violation)
 
     def _number_steps(self) -> Generator[tuple[Move, float], bool, None]:
-        """Yield steps along coordinates and random directions; repeat each while it leads to better designs."""
+        """Yield steps of the open numbers along coordinates and random directions; a successful one is repeated."""
         columns = sum(domain.width for domain in domains_of(self.start.problem.decisions))
         moves = [*(partial(_move_along, row) for row in np.eye(columns)), *self._angle_moves()]
         sizes = [STEP] * len(moves)
@@ -219,7 +221,10 @@ class _LocalSearch:
                 return
 
     def _star_moves(self) -> list[Move]:
-        """Return exchanges of throws, alone or symmetric to the middle, and other firing orders and optional shafts."""
+        """Return the changes of a crank star that the search tries.
+
+        These are exchanges of throws, alone or symmetric to the middle, other firing orders, and other optional shafts.
+        """
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None:
             return []
@@ -238,7 +243,7 @@ class _LocalSearch:
 
 
 def _move_along(direction: Array, point: Point, step: float) -> Point | None:
-    """Return a step along a direction relative to the ranges of the decisions, shape (n,), with projection."""
+    """Return the design after a step along a direction, shape (n,), relative to the ranges of the decisions."""
     domains = domains_of(point.problem.decisions)
     x = decision_vector(domains, point.values)
     if len(x) != len(direction):
@@ -278,7 +283,7 @@ def _move_angle(phasing: Phasing, name: str, candidate: Candidate, step: float) 
 
 
 def _exchange(phasing: Phasing, pairs: Sequence[tuple[int, int]], candidate: Candidate, _: float) -> Candidate | None:
-    """Exchange the throws of each pair, and their cylinders in the firing order."""
+    """Return the crank with the throws of each pair exchanged, and their cylinders in the firing order."""
     pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
     for i, j in pairs:
         cylinders, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
@@ -327,7 +332,7 @@ def _change(phasing: Phasing, change: Change, point: Point, step: float) -> Poin
 
 
 def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -> bool:
-    """Return True if a design is feasible and below the bound by more than the sampling error.
+    """Return True if a known design refutes a bound: it is feasible and below it by more than the sampling error.
 
     `bound` is None if the result claims that no design is feasible.
     """
@@ -349,7 +354,7 @@ def _contradicts(result: Result, witness: EvaluatedPoint, bound: float | None) -
 
 
 def _without_proof(problem: Problem, result: Result, witness: EvaluatedPoint, bound: float) -> Result:
-    """Return the design of the walk as a result without proof."""
+    """Return the better design of the check as a result without proof."""
     point, candidate, original = witness.point, witness.point.candidate, result.problem
     problem_of_design = replace(point.problem, phasing=original.phasing)
     design = Design(problem_of_design, point.values, witness.evaluation, witness.value, witness.violation)

@@ -57,7 +57,7 @@ def solve_by_cones(problem: Problem, samples: int | None = None) -> Engine | Non
 
 
 def first_search(problem: Problem) -> Result | None:
-    """Return the result of `solve` with few starts and boxes, without proof; None if it found no feasible design."""
+    """Return a quick result of `solve` with few starts and boxes, without proof; None without a feasible design."""
     phasing = problem.phasing
     if phasing is not None:
         is_continuous = phasing.continuous or bool(problem.mount_decisions)
@@ -69,9 +69,10 @@ def first_search(problem: Problem) -> Result | None:
 
 
 def reoptimise(problem: Problem, neighbour: Result) -> Engine | None:
-    """Return the best engine of searches from a known result; None if no search ends within the limits.
+    """Return the best engine of searches that start from the known result of a similar problem.
 
-    The known result is of a problem with the same decisions. It gives the start values and the crank stars to compare.
+    The similar problem has the same decisions. Its result gives the start values and the crank stars to compare. None
+    if no search ends within the limits.
     """
     if compares_stars(problem):
         # the best star may differ from the best one of the neighbour
@@ -101,7 +102,7 @@ def _best_engine(problem: Problem, engines: Sequence[Engine | None]) -> Engine |
 
 
 def _best_star(problem: Problem, neighbour: Result) -> Engine | None:
-    """Return the best engine of the first-ranked crank stars; open throws may then leave the best star."""
+    """Return the best engine over the first crank stars of a ranking; open throws may then leave the best star."""
     phasing = problem.phasing
     if phasing is None or neighbour.phasing is None:
         return None

@@ -84,7 +84,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
         self.problem = problem
 
     def witness_of(self, design: RebalancedDesign) -> Witness | None:
-        """Return a design as a witness of bounds, or None if it violates limits."""
+        """Return a design as a witness (a value that no lower bound may exceed); None if it violates limits."""
         return witness_of(design.design, self.place(design))
 
     def place(self, design: RebalancedDesign) -> Array:
@@ -109,7 +109,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
     def solve(
         self, root: S | FathomedPart, first: RebalancedDesign | None, maximum: int, numbers: str, method: str
     ) -> Result:
-        """Return the best design of a branch and bound search over at most `maximum` boxes, with its certificate.
+        """Return the best design and its certificate, from branch and bound over at most `maximum` boxes.
 
         `root` is the box of all open numbers with its bound, and `first` is the first incumbent.
         `numbers` and `method` are the names of the open numbers and of the bounding method, for reports.
@@ -135,7 +135,7 @@ class RebalancedSearch(BoxSearch[S, RebalancedDesign]):
 
 
 def rebalance(problem: Problem, balance: Problem, fixed_values: dict[str, Value], angles: int = 0) -> RebalancedDesign:
-    """Optimise the unbalances of a design with fixed values of all other decisions.
+    """Return the design with optimal unbalances, for fixed values of all other decisions.
 
     If no design is feasible, the unbalances keep their start values, and the design violates limits.
 

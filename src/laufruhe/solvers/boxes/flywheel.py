@@ -53,7 +53,7 @@ class _Coordinates:
 
     @classmethod
     def from_problem(cls, problem: Problem, by_mass: bool) -> _Coordinates:
-        """Build the coordinates of a problem; if `by_mass`, the rim's mass replaces its width."""
+        """Return the coordinates of a flywheel's open rim sizes; if `by_mass`, the rim's mass replaces its width."""
         if problem.engine.flywheel is None:
             raise TypeError("the engine has no flywheel")
         names = [decision.name for decision in problem.decisions]
@@ -75,7 +75,7 @@ class _Coordinates:
         return np.clip(np.insert(x[:-1], self.width, self.wheel(x).ring.width), *self.bounds)
 
     def place(self, values: Sequence[Value]) -> Array:
-        """Return the coordinates of a design, shape (n,), from the values of its decisions."""
+        """Return the coordinates of a flywheel, shape (n,), from the values of the decisions."""
         x = np.array([float(value.real) for value in values])
         if self.width is None:
             return x
@@ -88,7 +88,7 @@ class _Coordinates:
         return real_bounds(self.problem.decisions)
 
     def monotone_problem(self, initial: Evaluation, limits: Sequence[Limit]) -> MonotoneProblem:
-        """Return the objective and the given limits as monotone functions of the coordinates.
+        """Return objective and limits as functions that rise or fall steadily with each coordinate.
 
         At constant speed the flywheel changes no load, so the loads are those of the evaluation `initial`.
         """
@@ -133,7 +133,7 @@ class _WheelProgram(LocalProgram):
 
 
 def solve_flywheel(problem: Problem) -> Result:
-    """Return the best flywheel with its certificate, or the limits that contradict each other."""
+    """Return the best flywheel with its certificate, or an infeasible result with limits that contradict each other."""
     started = time.perf_counter()
     initial = evaluate(problem)
     coordinates, decision_coordinates = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))

@@ -58,7 +58,7 @@ cranks that share gas end."""
 
 
 def solve_leads(problem: Problem) -> Result:
-    """Return the best leads and unbalances, with a lower bound by branch and bound over leads."""
+    """Return the best lead angles of geared shafts and their unbalances, with a bound by branch and bound."""
     search = LeadSearch(problem)
     search.check_acts()
     root, first = search.box(search.model.lower, search.model.upper), search.first()
@@ -85,7 +85,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
 
     def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
-        """Yield the halves of a box, each with the best design at its middle if that may be better than `value`."""
+        """Yield the halves of a box of lead angles, each with the design at its middle if that may beat `value`."""
         for low, high in halves(Box(box.lower, box.upper, box.side)):
             half = self.box(low, high, box.bound, value)
             level = value * (1.0 - SHARE * self.problem.tolerance)
@@ -93,7 +93,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             yield half, self.rebalance_at(0.5 * (low + high)) if may_improve else None
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | FathomedPart:
-        """Bound the objective in a box of leads [rad], at least by the known bound `floor` [SI].
+        """Return a box of lead angles [rad] with a lower bound of the objective, at least the known bound `floor` [SI].
 
         Bounds close to the objective of the incumbent, `value` [SI], use all samples. A box without a feasible design
         is an `INFEASIBLE_PART`.
@@ -153,7 +153,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         return self.box(*thin_box(self.place(design), self.model.lower, self.model.upper), 0.0, design.value)
 
     def check_acts(self) -> None:
-        """Raise ModelError if a lead changes neither the objective nor a limit."""
+        """Raise ModelError if an open lead angle changes neither the objective nor a limit."""
         lower, upper = self.model.lower, self.model.upper
         for k, decision in enumerate(self.model.leads if not self.model.domains else ()):
             is_lead = np.arange(len(lower)) == k
@@ -168,7 +168,10 @@ class LeadSearch(RebalancedSearch[_Box]):
                 raise ModelError(f"{decision.name} {reason}")
 
     def first(self) -> RebalancedDesign:
-        """Return the best of the initial design, designs with optimal unbalances, and ends of simplex searches."""
+        """Return the first incumbent of the branch and bound search.
+
+        It is the best of the initial design, designs with optimal unbalances, and ends of simplex searches.
+        """
         designs = [RebalancedDesign(evaluate_design(self.problem, self.problem.start))]
         if self.model.domains:
             middle = 0.5 * (self.model.lower + self.model.upper)
@@ -179,7 +182,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         return min(designs, key=lambda design: design.rank)
 
     def rebalance_at(self, leads: Array) -> RebalancedDesign:
-        """Return the best design with these leads [rad], shape (leads,)."""
+        """Return the best design with these lead angles [rad], shape (leads,): its unbalances are optimal."""
         fixed_values: dict[str, Value] = {d.name: float(x) for d, x in zip(self.model.leads, leads, strict=True)}
         turns = dict(zip(self.model.names, leads - self.model.start, strict=True))
         shafts = {rotor.name: rotor.shaft for rotor in self.problem.engine.rotors}
@@ -204,7 +207,7 @@ class LeadSearch(RebalancedSearch[_Box]):
 
 
 def solve_shared_leads(problem: Problem) -> Result:
-    """Return the best leads between cranks that share gas chambers, with a lower bound by branch and bound (P15)."""
+    """Return the best lead angles between cranks that share gas chambers, with a proven lower bound (P15)."""
     started, initial = time.perf_counter(), evaluate(problem)
     lower, upper = real_bounds(problem.decisions)
     boxes, best = SharedGasBoxes(problem), _best_design(problem, lower, upper)
@@ -222,7 +225,7 @@ def solve_shared_leads(problem: Problem) -> Result:
 
 
 def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
-    """Return the best of the initial design and the ends of simplex searches from a grid of leads."""
+    """Return the best of the initial design and the ends of simplex searches from a grid of lead angles."""
 
     def design(leads: Array) -> Design | None:
         try:
@@ -243,9 +246,10 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
 def _search_from_grid(
     penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
 ) -> list[Array]:
-    """Return the ends of simplex searches from the best points of a grid, shape (n,) each.
+    """Return the ends of simplex (Nelder-Mead) searches from the best points of a grid of lead angles, shape (n,) each.
 
-    The grid has at most `steps` points along a lead and `maximum` in all. A search has at most `most_steps` iterations.
+    The grid has at most `steps` points along a lead angle and `maximum` in all. A search has at most `most_steps`
+    iterations.
     """
     from scipy.optimize import minimize
 

@@ -41,7 +41,7 @@ UNUSED = 1e-6
 
 
 class Relaxation:
-    """Relaxations of a problem over boxes of positions; `share` is their share of the problem's tolerance."""
+    """Relaxations of a problem over boxes of rotor positions; each is solved to the share `share` of its tolerance."""
 
     def __init__(self, problem: Problem, share: float) -> None:
         self._tolerance = share * problem.tolerance
@@ -72,7 +72,7 @@ class Relaxation:
         return [np.array([low, *kinks[(kinks > low) & (kinks < high)], high]) for kinks, low, high in sides]
 
     def program(self, lower: Array, upper: Array) -> Problem:
-        """Return the relaxation over a box [m]: open unbalances stand at its vertices, and no position is open."""
+        """Return the relaxation over a box of positions [m]: unbalances at its vertices replace the open positions."""
         nodes = self._nodes(lower, upper)
         rotors, decisions = self._fixed_unbalances(nodes)
         limits: list[Limit] = []
@@ -113,11 +113,13 @@ class Relaxation:
         )
 
     def _fixed_unbalances(self, nodes: Sequence[Array]) -> tuple[list[Rotor], list[Decision]]:
-        """Return rotors and decisions of fixed unbalances, whose loads are linear in the position within a cell.
+        """Return rotors and decisions that stand for fixed unbalances with an open position.
 
-        A cell is the range of a position between neighbouring bounds or inner bearings of the box. Each decision is the
-        share of a cell that the position has covered. The relaxation drops the condition that a position covers a whole
-        cell before it enters the next.
+        Their loads are linear in the position within a cell.
+
+        A cell is the range of a position between neighbouring bounds or inner bearings of the box. Each decision is
+        the fraction of a cell that lies behind the position. The relaxation drops the condition that a whole cell lies
+        behind the position before it enters the next.
         """
         rotors: list[Rotor] = []
         decisions: list[Decision] = []
@@ -153,7 +155,7 @@ class Relaxation:
         return placed if new_name == name else replace(placed, unbalance=0.0j, radius=rotor.radius or 1.0)
 
     def recover_places(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return the positions of a relaxed solution in a box and the spread of its unbalances [m], shape (places,)."""
+        """Return mean positions of the unbalances of a relaxed solution, and their spread [m], shape (places,) each."""
         unbalances = dict(zip((d.name for d in relaxed.unbalances), unbalance_values(relaxed, result), strict=True))
         # unbalances and their coordinates along each position, a pair of arrays per decision
         moments: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
@@ -179,7 +181,7 @@ class Relaxation:
         return middle, spread
 
     def values(self, relaxed: Problem, result: Result, middle: Array) -> tuple[Value, ...]:
-        """Return values of all decisions from a relaxed solution, with positions `middle` [m], shape (places,)."""
+        """Return values of all decisions of the problem from a relaxed solution, with the positions `middle` [m]."""
         relaxed_values = dict(zip((d.name for d in relaxed.decisions), values_of(relaxed, result), strict=True))
         values: dict[str, Value] = {place.name: float(x) for place, x in zip(self.places, middle, strict=True)}
         for decision in self.other_decisions:

@@ -66,7 +66,7 @@ class _Box(BoundedBox):
 
 
 def solve_places(problem: Problem) -> Result:
-    """Return the best positions and unbalances, with a lower bound by branch and bound over positions."""
+    """Return the best positions of rotors and their unbalances, with a lower bound by branch and bound."""
     search = PlaceSearch(problem)
     root = search.box(*search.bounds)
     first = None if isinstance(root, FathomedPart) else search.rebalance_at(root.middle)
@@ -74,7 +74,9 @@ def solve_places(problem: Problem) -> Result:
 
 
 def solve_places_with(problem: Problem, prove: Solve, method: str, propose: Propose) -> Result:
-    """Return a design of a local search, with the lower bound of the relaxation over all positions (P20).
+    """Return the best design of a local search over positions and other decisions, with a lower bound (P20).
+
+    The bound is that of the relaxation over all positions.
 
     Parameters
     ----------
@@ -118,7 +120,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return real_bounds(self.places)
 
     def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | FathomedPart, RebalancedDesign | None]]:
-        """Yield the parts of a box, each with the best design at its middle if that may be better than `value`."""
+        """Yield the halves of a box of positions, each with the design at its middle if that may beat `value` [SI]."""
         width, root_width = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         scores = box.spread if box.spread.max(initial=0.0) > 1e-9 * root_width.max() else width / root_width
         side = int(np.argmax(scores))
@@ -127,7 +129,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
             yield half, self.rebalance_at(half.middle) if isinstance(half, _Box) and half.bound < value else None
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | FathomedPart:
-        """Solve the relaxation over a box of positions [m], which has at least the known bound `floor` [SI].
+        """Return a box of positions [m] with the bound of its relaxation, at least the known bound `floor` [SI].
 
         A box without a feasible design is an `INFEASIBLE_PART`.
         """
@@ -183,7 +185,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return ()
 
     def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Shrink a box by slices at its bounds in which every position violates a limit on distances."""
+        """Return a box without slices at its ends in which every position violates a limit on distances."""
         lower, upper = lower.copy(), upper.copy()
         for side, is_upper in product(range(len(lower)) if self._envelope else (), (True, False)):
             low, high, width = 0.0, 1.0, upper[side] - lower[side]
@@ -202,7 +204,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return lower, upper
 
     def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
-        """Return positions in a box close to `middle` that keep the limits on distances, or None."""
+        """Return positions in a box close to `middle` that keep the limits on distances [m], or None."""
 
         def slacks(places: Array) -> Array:
             spans = self._spans(places, places)
@@ -231,7 +233,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return min(feasible, key=distance, default=None)
 
     def prices(self, design: Design) -> dict[Side, Price]:
-        """Return prices of limits on distances, by finite differences of objective and distances (P19)."""
+        """Return shadow prices of limits on distances, from finite differences of objective and distances (P19)."""
         places = self.place(RebalancedDesign(design))
         # a limit has one distance per shaft
         active = [
@@ -266,7 +268,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return by_side
 
     def rebalance_at(self, places: Array) -> RebalancedDesign:
-        """Return the best design with these positions [m], shape (places,)."""
+        """Return the best design with these positions [m], shape (places,): its unbalances are optimal."""
         fixed_values: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
         engine = self.problem.design(list(fixed_values.values()), self.places)
         balance = replace(self.relaxation.problem, engine=engine, decisions=self.relaxation.other_decisions)

@@ -59,7 +59,7 @@ class BoxSearch(Generic[B, D]):
         raise NotImplementedError
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | FathomedPart, D | None]]:
-        """Yield parts that cover a box, each with a design in it, or None.
+        """Yield parts that together make up a box, each with a design in it, or None.
 
         A part is a box, or the proof that no design in it has an objective below a level. The objective of the
         incumbent is `value` [SI].
@@ -113,7 +113,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
         return gap <= GAP_SAFETY * self._tolerance or (gap < np.inf and node.part.is_exact)
 
     def branch(self, nodes: Sequence[OpenNode[B]]) -> BoundedParts[B]:
-        """Yield the parts of a box, computed by workers if the search is shared."""
+        """Yield the parts of a box with their bounds, computed ahead by workers if the search is shared."""
         ((bound, name, box),) = nodes
         search, step = self._search, (self._search, box, self.value)
         if search.is_shared:
@@ -134,7 +134,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
 def divide_boxes(
     search: BoxSearch[B, D], root: B, best: D, zero_level: float, tolerance: float, maximum: int, what: str
 ) -> tuple[D, float, int]:
-    """Divide boxes until the least bound closes the gap to the best design.
+    """Search for the best design by dividing boxes until the lowest bound closes the gap to it.
 
     Parameters
     ----------

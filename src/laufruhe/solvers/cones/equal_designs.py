@@ -155,7 +155,7 @@ def _free_domains(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]
 
 
 def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
-    """Return the range of a decision's size over designs, shape (n,) each, and of its angle [rad], if these vary."""
+    """Return the ranges of a decision's size and angle [rad] over several designs, shape (n,) each, if these vary."""
     sizes = [_size(domain, design) for design in designs]
     smallest, largest = min(sizes), max(sizes)
     decision = domain.decision

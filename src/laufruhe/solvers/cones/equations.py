@@ -46,7 +46,10 @@ class Equations:
     shapes: tuple[tuple[int, ...], ...]
 
     def project(self, problem: AffineProblem, x: Array) -> Array:
-        """Project x, shape (n,), on the equations and on the sets of the decisions, alternately."""
+        """Return the decision vector x, shape (n,), moved to meet the equations and the sets of the decisions.
+
+        It is projected on both alternately.
+        """
         for _ in range(MAX_PROJECTIONS):
             residual = self.right - self.matrix @ x
             x = x + self.units**2 * (residual @ self.matrix)
@@ -63,7 +66,10 @@ class Equations:
 
 
 def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | None:
-    """Return the equations of limits of zero from their indices; None if there are no limits, or they contradict."""
+    """Return linear equations that hold where measures limited to zero vanish, from the indices of these limits.
+
+    The result is None if there are no such limits, or if they contradict each other.
+    """
     norms = [problem.limits[k][1] for k in limits]
     if not norms:
         return None

@@ -69,7 +69,7 @@ class Optimum:
 
 
 def polish(model: AffineModel, coarse: Optimum) -> Optimum:
-    """Return the optimum at `REFINEMENT` times as many samples, or the coarse optimum if that is no better."""
+    """Return a more accurate optimum at `REFINEMENT` times as many samples; the coarse one if Newton steps fail."""
     if coarse.gap <= TARGET_GAP or not _is_smooth(coarse.problem):
         return coarse
     samples = REFINEMENT * coarse.samples

@@ -21,7 +21,7 @@ NEGLIGIBLE = 1e-6
 
 
 def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
-    """Return the lightest design with the loads of an optimum x, shape (n,), negligible decisions set to zero."""
+    """Return the lightest design with the same loads as the optimum x, shape (n,); negligible unbalances are zero."""
     directions = _free_directions(problem, affine)
     if directions.shape[1]:
         x = _minimise_mass(affine, x, directions)
@@ -29,7 +29,7 @@ def break_ties(problem: Problem, affine: AffineProblem, x: Array) -> Array:
 
 
 def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
-    """Return directions in which no load of the problem changes, shape (n, m); m = 0 if a mass is minimised."""
+    """Return directions of unbalances that change no load of the problem, (n, m); m = 0 if a mass is minimised."""
     if not affine.size or any(term.measure.is_mass for term in problem.objective):
         return np.zeros((affine.size, 0))
     loads = [norm for _, norm in affine.terms]
@@ -51,7 +51,7 @@ def _free_directions(problem: Problem, affine: AffineProblem) -> Array:
 
 
 def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
-    """Minimise the total mass of x + directions z within the sets and limits."""
+    """Return the lightest x + directions z within the sets and limits, for any z."""
     domains = affine.domains
     weights = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in domains]
     sizes = [float(np.hypot.reduce(x[domain.columns])) for domain in domains]
@@ -92,7 +92,7 @@ def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
 
 
 def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
-    """Set decisions to zero whose loads are negligible, or whose absence does not increase the objective.
+    """Return x with those unbalances set to zero that have a negligible load, or do not lower the objective.
 
     The test compares loads and not bounds, which may be a million times too wide.
     """

@@ -139,9 +139,10 @@ def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tu
 
 
 def _refine(problem: Problem, model: AffineModel, zero_level: float, start_samples: int) -> tuple[Optimum | None, int]:
-    """Double the samples until the bound on a grid twice as fine closes the gap (P6).
+    """Return the optimal unbalances with as many samples as their proof needs (P6).
 
-    Return the optimum, or None if the limits contradict each other, and the last number of samples per period.
+    The samples are doubled until the bound on a grid twice as fine closes the gap. The optimum is None if the limits
+    contradict each other. The second result is the last number of samples per period.
     """
     # with many rows, start at half the samples: the bound is computed at twice as many
     half = model.full_samples // 2
@@ -183,7 +184,7 @@ def _is_feasible(problem: Problem, optimum: Optimum | None) -> bool:
 
 
 def allowed_optimum(problem: Problem, model: AffineModel, samples: int, zero_level: float) -> Optimum | None:
-    """Return an optimum at `samples` samples that keeps its limits between them too; None if no design does.
+    """Return an optimum at `samples` samples that keeps its limits between samples too; None if no design does.
 
     A peak between samples exceeds its limit slightly. The next attempt lowers all limits by that excess.
 

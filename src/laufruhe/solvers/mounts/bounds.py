@@ -36,9 +36,10 @@ def mount_numbers(design: Design) -> Array:
 
 
 def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> BoxResult:
-    """Bound the result of a search by all provers; continue the search where their bounds are lowest.
+    """Return the lower bound of a mount search by all provers, which also tell where to search on.
 
-    Bounds are left to `with_mount_bounds` if `defer_bounds` is True, unless only stiffness is open.
+    The search continues where the bounds are lowest. Bounds are left to `with_mount_bounds` if `defer_bounds` is True,
+    unless only stiffness is open.
     """
     division = BoxResult(0.0, 0)
     if search.moves is not None or not problem.search.proves or (defer_bounds and not is_stiffness_problem(problem)):
@@ -66,7 +67,7 @@ def bound_search(problem: Problem, search: MountSearch, defer_bounds: bool) -> B
 
 
 def with_mount_bounds(result: Result, value: float, cutoff: float = math.inf, in_batch: bool = False) -> Result:
-    """Improve the lower bound of a result by all provers of its mounts.
+    """Return a result with a better lower bound, by all provers of its open mounts.
 
     Parameters
     ----------

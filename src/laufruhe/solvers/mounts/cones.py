@@ -99,7 +99,10 @@ class _Program:
         raise TypeError(f"{type(function).__name__} may be limited, not minimised")
 
     def _residual(self, axis: AxisResidual) -> tuple[Any, Any]:
-        """Return the residual and its cone; its squared angular frequency is a variable within bounds."""
+        """Return the expression of the torque-roll residual and the constraint that defines it.
+
+        The squared angular frequency of the roll motion is a variable within bounds.
+        """
         response = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
         unit = float(np.linalg.norm(response)) or 1.0
         square_unit = unit / float(np.linalg.norm(axis.mass))

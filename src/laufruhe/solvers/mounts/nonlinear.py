@@ -88,7 +88,7 @@ def solve_joint(
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even_result: Result | None) -> tuple[Result, Candidate]:
-    """Solve a problem whose throws may leave their crank star; return the result and the moved star (E36).
+    """Return the best mounts and throws if throws may leave an evenly spaced crank star, and the moved crank (E36).
 
     The first start is `even_result`, the result of the star without moves.
     """
@@ -105,7 +105,7 @@ def _search_and_bound(
     first: StartPoint | None,
     defer_bounds: bool,
 ) -> tuple[Result, Array]:
-    """Return the result, and the moves of the throws from their crank star [rad], shape (moves,)."""
+    """Return the best mounts with their bounds, and the moves of the throws from their crank star [rad], (moves,)."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
     uses_workers = evaluation_count(problem) >= MANY_EVALUATIONS and workers != 1 and not defer_bounds
@@ -144,7 +144,7 @@ def _search_and_bound(
 
 
 def search_proof(best: SearchResult, division: BoxResult, bound: float, method: str) -> ProofData:
-    """Return the proof of the best result of a search by a lower bound [SI]."""
+    """Return the proof of a search's best result: its lower bound [SI], gap and method."""
     return ProofData(
         bound=bound,
         strength=ProofStrength.PARTIAL if division.boxes else ProofStrength.RELAXED,
@@ -155,7 +155,7 @@ def search_proof(best: SearchResult, division: BoxResult, bound: float, method: 
 
 
 def _rebalanced(best: SearchResult) -> tuple[SearchResult, float | None]:
-    """Optimise the unbalances of a result on its mounts; return the better design, and the gap of the unbalances.
+    """Return a result with optimal unbalances on the same mounts, and the proven gap of these unbalances.
 
     The gap is None if the program of the unbalances is not convex, or gives no feasible design.
     """
@@ -190,7 +190,7 @@ def _convex_part(problem: Problem) -> Problem | None:
 
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
-    """Return limits that contradict each other, by convex programs or by branch and bound over stiffness."""
+    """Return names of limits that are proven to contradict each other, by convex programs or by branch and bound."""
     conflict = conflict_on_any_mounts(problem)
     if conflict:
         return conflict
@@ -207,11 +207,11 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
 
 
 def mounts_bound(problem: Problem, values: Sequence[Value] = ()) -> float:
-    """Return a lower bound of the objective [SI]: the sum of bounds for each kind of terms. No term is negative.
+    """Return a lower bound of the objective [SI] that holds for all mounts: the sum of bounds by kind of term.
 
-    Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
-    and masses (P4). If the objective has other terms too, provers bound forces and travel of the mounts. They need
-    `values`, the decisions of a good design.
+    No term is negative. Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound
+    loads of the block and masses (P4). If the objective has other terms too, provers bound forces and travel of the
+    mounts. They need `values`, the decisions of a good design.
     """
     problem, total, results = named_part(problem), 0.0, []
     on_mounts, block = (

@@ -118,9 +118,10 @@ class MountSearch:
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
-        """Search from all starts; repeat in a smaller unit of the objective if the result is far below the unit.
+        """Search for the best mounts from all starts, and store the best result.
 
-        If no time is left and the first start is feasible, it is the result.
+        The search is repeated in a smaller unit of the objective if the result is far below the unit. If no time is
+        left and the first start is feasible, it is the result.
         """
         start = design_at_start(self.problem, self._points[0]) if is_time_over() and self.moves is None else None
         if start is not None and start.violation <= SLACK:
@@ -149,17 +150,18 @@ class MountSearch:
         self._evaluate_optima(self._solve([self.joint.start(*start) for start in starts]))
         self._tighten()
 
-    def search_from(self, places: Sequence[StartPoint]) -> bool:
-        """Search from additional starts; return True if the best design improved.
+    def search_from(self, points: Sequence[StartPoint]) -> bool:
+        """Search for better mounts from additional start points; return True if the best design improved.
 
-        Starts without columns of unbalances take those of the best design. Complete starts are candidates themselves.
+        A start point has numbers of mounts and values of unbalances. Without unbalances, it takes those of the best
+        design. A complete start point is itself a candidate for the best design.
         """
         previous = self.best
         default = self._points[0][1] if previous is None or previous.optimum is None else _start_of(previous)[1]
         starts = []
-        for mounts, columns in places:
-            starts.append((mounts, default if columns is None else columns))
-            if columns is not None or not self.problem.unbalances:
+        for mounts, unbalances in points:
+            starts.append((mounts, default if unbalances is None else unbalances))
+            if unbalances is not None or not self.problem.unbalances:
                 start = design_at_start(self.problem, starts[-1])
                 # a start that exceeds a limit by rounding is no candidate
                 if start is not None and start.violation <= 0.0:
@@ -172,7 +174,7 @@ class MountSearch:
 
     @property
     def best_or_initial(self) -> SearchResult | None:
-        """Best of the results and the initial design, which takes the prices of an equally good local optimum."""
+        """Best of search results and initial design, which takes the prices of an equally good local optimum."""
         best, initial = self.best, self._initial
         if initial is None or (best is not None and best.rank <= SearchResult(initial, self.joint).rank):
             return best
@@ -190,7 +192,7 @@ class MountSearch:
         return self.best is not None and self.best.design.violation <= SLACK
 
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        """Search from points, then from random points around the best local optima."""
+        """Search for better mounts from start points, then from random points around the best local optima."""
         problem, joint = self.problem, self.joint
         generator = np.random.default_rng(problem.search.seed)
         starts = [
@@ -296,7 +298,7 @@ class MountSearch:
         return np.clip(deviations, self.moves.lower, self.moves.upper)
 
     def _tighten(self) -> None:
-        """Search with tighter limits from good local optima that a peak between samples makes infeasible."""
+        """Search again, with tighter limits, from good local optima that violate a limit between two samples."""
         by_value = sorted(self._nearly_feasible, key=lambda result: result.design.value)
         self._nearly_feasible = []
         values = [result.design.value for result in by_value]

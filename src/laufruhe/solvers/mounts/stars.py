@@ -63,7 +63,7 @@ def _minimum_value(designs: list[StarDesign]) -> float:
 
 
 def solve_star_mounts(problem: Problem) -> Result:
-    """Return the best of the crank stars, each with its optimal mounts and unbalances (E35).
+    """Return the best crank star with its mounts and unbalances; those of every star are optimised (E35).
 
     Raises
     ------
@@ -90,7 +90,7 @@ def solve_star_mounts(problem: Problem) -> Result:
 
 
 def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
-    """Return crank stars in ascending order of the objective on the initial mounts, and the number of all."""
+    """Return crank stars to solve, best on the initial mounts first, and the number of all crank stars."""
     if phasing.throws is not None:
         star = Candidate(phasing.throws, None, *phasing.minimum_geometry)
         sets = phasing.shafts.allowed
@@ -142,7 +142,10 @@ def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts
 
 
 def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
-    """Solve the first crank star from all starts, the others from its mounts and few starts; return the best first."""
+    """Return the optimal mounts of every crank star, best first.
+
+    The first star is solved from all starts, the others from its mounts and few starts.
+    """
     starts = problem.search.starts
     problems = [_problem_of(problem, phasing, candidate, starts) for candidate, _ in stars[:1]]
     problems += [_problem_of(problem, phasing, candidate, min(starts, FEW_STARTS)) for candidate, _ in stars[1:]]
@@ -161,7 +164,7 @@ def _solve_with_few_starts(problem: Problem, phasing: Phasing, stars: list[Star]
 
 
 def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarDesign]:
-    """Solve the best few crank stars again from all starts."""
+    """Return the designs with the best few crank stars solved again from all starts."""
     improved = list(designs)
     starts = problem.search.starts
     for k, design in enumerate(() if is_time_over() else designs[:MAX_SEARCHED]):
@@ -179,7 +182,7 @@ def _solve_best_again(problem: Problem, designs: list[StarDesign]) -> list[StarD
 
 
 def _with_bounds(designs: list[StarDesign], phasing: Phasing, design_count: int) -> list[StarDesign]:
-    """Improve the bounds of all crank stars by provers of mounts, up to the objective of the best star (E54)."""
+    """Return the designs with better lower bounds by the provers of mounts, up to the best star's objective (E54)."""
     minimum = _minimum_value(designs)
     if len(designs) < design_count or phasing.continuous or not 0.0 < minimum < math.inf:
         return designs

@@ -42,7 +42,7 @@ StartPoint: TypeAlias = tuple[list[float], Array | None]
 
 
 def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | None:
-    """Evaluate the design with these values of its decisions; None on an undamped resonance."""
+    """Return the exact evaluation of a design with these values of its decisions; None on an undamped resonance."""
     try:
         return evaluate_design(problem, values)
     except ModelError:
@@ -94,9 +94,9 @@ def _initial_balance(problem: Problem) -> list[complex] | None:
 
 
 def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
-    """Return mounts and columns of unbalances of all starts, and a unit of the objective [SI].
+    """Return start points of a mount search (numbers of mounts, unbalances), and a unit of the objective [SI].
 
-    The first start is the initial design. The other starts cover all bounds, with stiffnesses on a logarithmic scale.
+    The first start is the initial design. The others are spread over all bounds, stiffnesses on a logarithmic scale.
     The unit is the smallest positive objective of all candidates: the solver's tolerance is relative to it.
     """
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
@@ -156,7 +156,7 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
 
 
 def _scores(task: tuple[Problem, Evaluation, Array]) -> Array:
-    """Return the sum of violations and the objective [SI] of each point, shape (points, 2).
+    """Return the sum of violated limits and the objective [SI] of each candidate start, shape (points, 2).
 
     Points not evaluated in time have infinite rows.
     """

@@ -50,7 +50,7 @@ class StaticCases:
         self._stops, self._responses = stops_of(mounting), dict[LoadCase, MountResponse]()
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
-        """Return an expression that is at least the length of each vector of a measure, from a new variable (E22)."""
+        """Return a new variable for the largest static force or travel: it is at least each of them (E22)."""
         part, selected = measure.channel.case_vectors, measure.places([mount.name for mount in engine.mounts])
         assert part is not None
         cases, weights = counted_cases(measure, engine), ca.DM(list(measure.direction_weights or (1.0, 1.0, 1.0)))

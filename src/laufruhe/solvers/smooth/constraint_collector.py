@@ -39,7 +39,7 @@ class ConstraintCollector:
     def add(
         self, expression: Any, lower: float, upper: float, name: str, minimum: Slope = None, maximum: Slope = None
     ) -> None:
-        """Constrain every entry of an expression, a scalar or a column.
+        """Add the constraint lower <= expression <= upper for every entry of an expression, a scalar or a column.
 
         Shadow prices of the sides `minimum` and `maximum` follow from multipliers of the lower and upper bound.
         """
@@ -64,7 +64,7 @@ class MeasureCollector:
     name: str
 
     def head(self, value: Any, lower: float = 0.0) -> Any:
-        """Add a column of epigraph variables with a lower bound, and return it; `value` is its start (E22)."""
+        """Return new epigraph variables (upper bounds to minimise), at least `lower`; `value` is the start (E22)."""
         variable = ca.MX.sym(f"head{len(self.into.heads)}", value.numel())
         self.into.heads.append((variable, value))
         self.into.floors += [lower] * value.numel()

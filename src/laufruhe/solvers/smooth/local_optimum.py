@@ -73,7 +73,7 @@ class LocalOptimum:
 
 
 def distinct_optima(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
-    """Return usable optima, best first, whose objectives differ by more than `tolerance * scale`."""
+    """Return the different usable optima, best first: their objectives differ by more than `tolerance * scale`."""
     best_optima: list[LocalOptimum] = []
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: o.value):
         if not best_optima or optimum.value - best_optima[-1].value > tolerance * scale:
@@ -94,7 +94,7 @@ def describe_starts(optima: Sequence[LocalOptimum], count: int) -> str:
 
 
 def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
-    """Return True if random starts have very likely found the best optimum, and more than once (N5).
+    """Return True if a search may stop, because more random starts hardly find a better optimum (N5).
 
     If n starts found w different optima, the next start finds a new one with probability w (w + 1) / (n (n - 1))
     (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80). The new one is the best of all w + 1 with probability

@@ -68,9 +68,10 @@ class LocalProgram:
         return [d.complex_value(inside) if d.decision.is_affine else float(inside[d.start]) for d in self.domains]
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective [SI], relative distances to limits, and those to edges of sets that are no intervals.
+        """Return the objective [SI], then relative margins to limits, then margins to the edges of sets.
 
-        The objective is infinite at an undamped resonance.
+        `shares` are the decisions relative to their ranges, shape (n,). Only sets that are no intervals have edges
+        here. The objective is infinite at an undamped resonance.
         """
         edges = self.edges(shares)
         try:
@@ -106,7 +107,7 @@ class LocalProgram:
 
 
 def spread_starts(problem: Problem) -> list[Array]:
-    """Return start points by Latin hypercube sampling, shape (n,) each."""
+    """Return start points of local searches, relative to the ranges of the decisions, by Latin hypercube sampling."""
     rng, count = np.random.default_rng(problem.search.seed), POINTS_PER_START * problem.search.starts
     # one point in each of `count` equal intervals of every column
     columns = [
@@ -116,7 +117,7 @@ def spread_starts(problem: Problem) -> list[Array]:
 
 
 def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) -> Array:
-    """Return the best end of up to `starts` local searches from the best start points `places`, shape (n,) each."""
+    """Return the best local optimum, shape (n,), of up to `starts` searches from the best start points `places`."""
     ranked = sorted(until_time_limit(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, POINTS_PER_START))]:
@@ -127,7 +128,7 @@ def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) 
 
 
 def _local_optimum(program: LocalProgram, place: Array) -> Array:
-    """Return a local optimum from the shares `place` by SLSQP with derivatives by differences."""
+    """Return the local optimum that SLSQP reaches from the start point `place`, with derivatives by differences."""
     from scipy.optimize import minimize
 
     initial = program.numbers(place)

@@ -42,7 +42,7 @@ class ModeVariables:
         return ca.vertcat(self._vectors, self._squares)
 
     def hold(self, stiffness: Any, root: Array, mounting: ElasticMounting) -> None:
-        """Constrain the variables to modes of a stiffness, in coordinates in which the mass matrix is one (E21).
+        """Add the constraints that the variables are natural modes of a stiffness, in coordinates with unit mass (E21).
 
         Parameters
         ----------
@@ -84,7 +84,10 @@ class ModeVariables:
             self._constraints.add(share, max(limit.minimum, 0.0), np.inf, limit.name, minimum)
 
     def shortfall(self, measure: Measure) -> Any:
-        """Return the sum of variables, each at least zero and at least the missing share of energy (E47)."""
+        """Return the decoupling shortfall: the sum of the energy shares that motions lack in their best mode (E47).
+
+        Each share is a variable, at least zero and at least the missing share.
+        """
         total, collector = ca.MX(0.0), self._constraints.named(measure.name)
         for share in self._shares(measure):
             # the start value is the whole share, because modes are not yet known
@@ -123,7 +126,7 @@ class ModeVariables:
         return prices_by_side
 
     def start(self, mounting: ElasticMounting) -> list[Array]:
-        """Return start values of shapes and squares, each mode in the column of its main motion."""
+        """Return start values of mode shapes and squared frequencies, each mode in the column of its main motion."""
         if not self.has_modes:
             return []
         modes = mounting.modes

@@ -164,7 +164,7 @@ def solve_nonlinear(
 def _run_first_stage(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, stop_when: StopWhen | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], RunStarts]:
-    """Return the optima of the starts, and the function that runs further starts."""
+    """Return the local optima of the first stage from all starts, and the function that runs further starts."""
     remaining = points[1:]
     count = min(len(remaining), workers if workers is not None else worker_count())
     # the linear solver is not safe for threads
@@ -243,7 +243,10 @@ def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimu
 
 
 def _run_later_stages(task: Task, groups: Sequence[LocalOptimum], run_starts: RunStarts) -> list[LocalOptimum]:
-    """Run the later stages from the ends of the first; at the time limit an end stays as it is."""
+    """Return the local optima of the later stages, started from the ends of the first stage.
+
+    At the time limit an end of the first stage stays as it is.
+    """
     if len(task.stages) < 2:
         return list(groups)
     if is_time_over():

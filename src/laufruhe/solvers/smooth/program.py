@@ -235,7 +235,7 @@ class SmoothProgram:
                 )
 
     def _mounting_expression(self, quantity: Measure) -> Any:
-        """Return the expression of a measure of mounts or modes."""
+        """Return the CasADi expression of a measure of mounts or natural modes, such as sag."""
         mounts = self._mounts
         if quantity.channel is channels.SAG:
             weight = weight_wrench(self._mounting.block)
@@ -317,7 +317,7 @@ class SmoothProgram:
         return np.asarray(x[self._throw_columns])
 
     def problem_at(self, x: Array) -> Problem:
-        """Return the problem with the throws of an optimum x, shape (n,)."""
+        """Return the problem with the throw angles of an optimum, from its variables x, shape (n,)."""
         if self.moves is None:
             return self.problem
         problem = self.problem
@@ -327,7 +327,7 @@ class SmoothProgram:
         )
 
     def start(self, mounts: Sequence[float], columns: Array, throw_deviations: Array | None = None) -> Array:
-        """Return variables, shape (n,), at numbers of mounts, columns of unbalances and deviations of throws.
+        """Return a start point of the program, shape (n,), from numbers of mounts, unbalances and deviations of throws.
 
         Start values of modes and epigraph variables follow from these.
         """

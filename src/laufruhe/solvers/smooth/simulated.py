@@ -59,7 +59,7 @@ class SimulatedVariables:
         return np.zeros(0) if self._peaks is None else self._peaks.values(np.concatenate([mounts, columns]))
 
     def minimum(self, measure: Measure) -> Any:
-        """Return a variable constrained to be at least every peak of a measure (E22)."""
+        """Return a new variable for the largest peak of a simulated measure: it is at least every peak (E22)."""
         size, collector = self._sizes[measure], self._constraints.named(measure.name)
         peaks = self._symbols_of[measure] / size
         largest = collector.head(ca.mmax(peaks))
@@ -67,7 +67,7 @@ class SimulatedVariables:
         return size * largest
 
     def limit(self, limit: Limit, tight: float) -> None:
-        """Constrain every peak to at most a share `tight` of the limit."""
+        """Add the constraints that every peak of a limited measure is at most the share `tight` of the limit."""
         unit = limit.maximum or 1.0
         side = ((limit, "at most"), tight / unit)
         self._constraints.add(

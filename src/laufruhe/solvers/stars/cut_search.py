@@ -52,7 +52,7 @@ class CutSearchResult:
 def search_designs(
     model: StarModel, stars: Stars, count: int, tolerance: float, time_limit: float = math.inf, zero_level: float = 0.0
 ) -> CutSearchResult:
-    """Return the best designs of crank stars and shafts, with a proof (S15). See `solve_design`.
+    """Return the best designs over crank stars and sets of optional shafts, with a proof (S15).
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def search_designs(
 
 
 def _distinct_values(space: StarSpace, solved: Sequence[SolvedStar]) -> list[float]:
-    """Return ascending objectives of designs [SI]; images of one crank star with equal objectives count once (S2)."""
+    """Return the objectives of distinct designs, ascending [SI]; equally good mirror images count once (S2)."""
     if not solved:
         return []
     images = replace(space, mirror=True, reflect=True)

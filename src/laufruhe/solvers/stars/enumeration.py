@@ -57,7 +57,7 @@ class BestStars:
         return float(self.values[-1]) if len(self.values) >= self.count else float("inf")
 
     def offer(self, stars: Stars, values: Array) -> None:
-        """Add crank stars that are among the best, without duplicates; `values` are objectives [SI], shape (n,)."""
+        """Keep those of n crank stars that are among the best so far, without duplicates; `values` are objectives."""
         if not len(values) or float(values.min()) > self.cut * (1.0 + SLACK):
             return
         best = np.argsort(values, kind="stable")[: 4 * self.count]

@@ -87,7 +87,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
 
 
 def _any_star(problem: Problem, phasing: Phasing) -> Result:
-    """Return the result of the first crank star; all crank stars have the same objective."""
+    """Return the result of the first crank star, because all evenly firing crank stars have the same objective."""
     families, reason = families_of(phasing)
     if not families:
         return no_star(problem, f"no crank star exists: {reason}")

@@ -54,7 +54,7 @@ class EvenDesign:
 
     @property
     def ranking_entry(self) -> RankedStar:
-        """Entry of the design in a ranking."""
+        """Entry of the design in the ranking of crank stars of a result."""
         phasing = self.phasing
         if self.family.is_of_orders:
             phasing = replace(phasing, firing_order=self.candidate.firing_order)
@@ -116,7 +116,7 @@ def refuse_long(problem: Problem) -> None:
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even crank stars in `families`.
+    """Return the best designs over all evenly firing crank stars in `families`.
 
     The method is enumeration if the objective depends on single orders or on squares of loads, else cuts of cone
     programs.
@@ -152,7 +152,7 @@ def _differ_by_squares(problem: Problem, families: Sequence[Family]) -> bool:
 
 
 def amplitudes(phasing: Phasing, family: Family) -> AmplitudeObjective | None:
-    """Return the objective of a family as a sum of norms of single load orders; None if it has another form (S3)."""
+    """Return the objective of a family of crank stars as norms of single orders; None if it has another form (S3)."""
     if family.fixed or family.is_of_orders:
         return None
     first = phasing.problem_of(family.candidate(phasing, family.first))

@@ -68,9 +68,10 @@ class Family:
 
 
 def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
-    """Return families of even crank stars for every bank and split pin angle allowed, and the reason if there are none.
+    """Return the evenly firing crank stars as families, one for each bank and split pin angle allowed.
 
-    If loads depend on the firing order, `by_firing`, every firing order is a design.
+    The second result is the reason if there are none, else empty. `by_firing` is True if loads depend on the firing
+    order; then every firing order is a design.
     """
     families, reason = [], "no bank angle and split pin within the bounds allow even firing"
     lattice = firing_lattice(phasing.cycle, phasing.cylinders)

@@ -40,9 +40,9 @@ Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], EvenStarResul
 
 
 def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
-    """Solve for open throws, firing orders, shafts and unbalances together.
+    """Return the best throws, firing order, shafts and unbalances together, with a ranking of crank stars.
 
-    The result has a ranking. Its certificate is `global` if the search ended with a proof, `global within gap` if its
+    Its certificate is `global` if the search ended with a proof, `global within gap` if its
     time ended, and `local` if throws left the even steps. `search` returns the best designs of families of even stars.
     """
     phasing = problem.phasing
@@ -109,7 +109,7 @@ def _with_half_tolerance(problem: Problem) -> Problem:
 
 
 def _with_more_samples(problem: Problem, families: Sequence[Family], result: Result, search: Search) -> Result:
-    """Search again at more samples, while their number limits the gap (P7)."""
+    """Return the result of searches with more samples, while sampling errors keep the gap open (P7)."""
     for _ in range(ROUNDS):
         gap = result.certificate.gap if result.certificate else 0.0
         if gap <= problem.tolerance or is_time_over():
@@ -129,7 +129,7 @@ def _with_more_samples(problem: Problem, families: Sequence[Family], result: Res
 
 
 def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) -> Result:
-    """Solve the problem of the best even crank star, and certify it with the bound of all designs (S17)."""
+    """Return the result of the best even crank star, certified by the lower bound over all designs (S17)."""
     designs = [(design, entry) for design in search_result.designs if (entry := design.ranking_entry).firing_orders]
     if not designs:
         return no_star(problem, "no crank star has a firing order that keeps the firing intervals allowed")
@@ -162,7 +162,7 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
 
 
 def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tuple[int, ...]:
-    """Return the sets of shafts that the best design needs; without any of them, it would be worse."""
+    """Return the indices of the sets of shafts that the best design needs: without one of them, it would be worse."""
     needed = best.built
     if not needed:
         return needed

@@ -50,7 +50,10 @@ class RankedOrder:
         return max(self.intervals) - min(self.intervals) <= 1e-9 * math.tau
 
     def score(self, criterion: OrderCriterion) -> float:
-        """Return the value of a criterion; smaller is better."""
+        """Return the value of a firing order by a criterion of the ranking, such as neighbours that fire in turn.
+
+        Smaller is better.
+        """
         if criterion is OrderCriterion.NEIGHBOURS:
             return float(self.neighbours)
         exact = self.longest_gap if criterion is OrderCriterion.LONGEST_GAP else self.roll_content
@@ -225,7 +228,7 @@ def distinct_orders(
 def ranked_star(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
-    """Build the entry of a crank star in a ranking. See `RankedStar` and `ranked_orders`."""
+    """Return the entry of a crank star in a ranking, with its firing orders. See `RankedStar`."""
     orders = ranked_orders(phasing, candidate, steps)
     places = np.array(phasing.layout_of(candidate).throw_positions)
     # unit force per throw, and unit throw spacing (S1)

@@ -13,7 +13,7 @@ from laufruhe.solvers.conclusion import violated_limits
 
 
 def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
-    """Exclude sets of optional shafts that violate limits on their positions.
+    """Return the problem without those sets of optional shafts that violate limits on their positions.
 
     Parameters
     ----------

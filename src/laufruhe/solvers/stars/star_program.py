@@ -39,7 +39,7 @@ class SolvedStar:
 
 
 def shaft_owners(model: StarModel) -> tuple[int, ...]:
-    """Return for every unbalance the index of the set of optional shafts that it belongs to, or -1."""
+    """Return for every open unbalance the index of the set of optional shafts that carries it, or -1."""
     shaft_of = {rotor.name: rotor.shaft.name for rotor in model.problem.engine.rotors}
     sets = model.phasing.shafts.optional
     shafts = [shaft_of[decision.rotor_drives[0].rotor] for decision in model.problem.unbalances]
@@ -116,7 +116,7 @@ def solve_design(
 
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> float:
-    """Return the optimum of one crank star at few samples [SI]; infinite if infeasible. See `solve_design`."""
+    """Return the optimal objective of one crank star, estimated at few samples [SI]; infinite if infeasible."""
     affine = _with_shafts(model.at(_sample_counts(model.samples)[0]).at(star), shaft_owners(model), built)
     if not affine.size:
         return affine.objective(np.zeros(0))
@@ -170,7 +170,7 @@ def _sample_counts(full: int) -> list[int]:
 
 
 def _with_shafts(affine: AffineProblem, owners: Sequence[int], built: tuple[int, ...]) -> AffineProblem:
-    """Remove the decisions of shafts that are not built."""
+    """Return the problem without the unbalances of optional shafts that are not built."""
     is_built = [owner < 0 or owner in built for owner in owners]
     if all(is_built):
         return affine

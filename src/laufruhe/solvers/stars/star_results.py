@@ -75,7 +75,7 @@ def with_star(
     problem: Problem, phasing: Phasing, best: Result, candidate: Candidate, certificate: Certificate | None,
     details: PhasingResult,
 ) -> Result:  # fmt: skip
-    """Convert the result of the best crank star into the result of the search.
+    """Return the result of the search over crank stars, from the result of the best star alone.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def with_star(
 
 
 def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) -> tuple[DecisionValue, ...]:
-    """Return throws, bank angle, split pin and shafts of a design as decisions of the result."""
+    """Return the open throws, bank angle, split pin and shafts of a design as decision values for the result."""
     parts, layout = problem.engine.slider_cranks, phasing.layout_of(candidate)
     decisions = []
     if phasing.throws is None:

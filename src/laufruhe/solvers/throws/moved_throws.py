@@ -36,7 +36,7 @@ class _MovedCrank:
     candidate: Candidate
 
     def at(self, changes: Mapping[Path, str | float]) -> Candidate:
-        """Return the crank with changed angles [rad]."""
+        """Return the crank with other values of its open angles [rad]."""
         crank = self.candidate
         bank, split = (
             None if angle is None else float(changes.get((CRANK, name), angle))
@@ -46,7 +46,7 @@ class _MovedCrank:
         return replace(crank, throws=throws, bank_angle=bank, split_pin=split)
 
     def __call__(self, changes: Mapping[Path, str | float]) -> Drawing:
-        """Return the drawing with changed values; raise `ModelError` if the crank violates the firing intervals."""
+        """Return the drawn engine with changed numbers; raise `ModelError` if a firing interval leaves its bounds."""
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
             raise ModelError(f"these throws violate the firing intervals allowed, {self.phasing.intervals.text}")
@@ -58,7 +58,7 @@ class _MovedCrank:
 
 
 def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Problem], Result]) -> Result:
-    """Return the best local optimum from several start cranks, over throws and all other decisions together.
+    """Return the best local optimum over throws and all other decisions together, from several start cranks.
 
     `search` is a local search over the numbers of a problem.
     """

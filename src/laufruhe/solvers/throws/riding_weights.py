@@ -184,10 +184,11 @@ class Riders:
         return BoxColumns(domains_of(decisions), matrix, limits, tuple(shared))
 
     def spread(self, columns: BoxColumns, y: Array, middle: Array) -> list[tuple[int, int, float]]:
-        """Return throw, column of the model and relaxation error [kg m] of every unbalance on a throw.
+        """Return how far the relaxation of a box splits each unbalance that turns with a throw [kg m].
 
-        The error is the distance between two values of the unbalance: the relaxed one, from the values `y` of the
-        columns of a box, and the one at the throw angles `middle` [rad], shape (throws,).
+        The list has throw, column of the model and error for each. The error is the distance between two values of the
+        unbalance: the relaxed one, from the values `y` of the columns of a box, and the one at the throw angles
+        `middle` [rad], shape (throws,).
         """
         x, distances = columns.matrix @ y, []
         for group, shared in zip(self._groups, columns.shared, strict=True):

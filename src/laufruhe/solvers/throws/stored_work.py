@@ -20,7 +20,10 @@ from laufruhe.prove.throws.irregularity_bound import IrregularityBound
 
 
 def with_work_for_search(problem: Problem) -> Problem:
-    """Replace the degree of irregularity by work, with weights that keep its value in the initial design."""
+    """Return the problem with stored work in place of degrees of irregularity, for a local search.
+
+    Weights keep the value of each degree in the initial design.
+    """
     if not _has_degree(problem):
         return problem
     initial, bounds = evaluate(problem), _bounds(problem)
@@ -37,10 +40,10 @@ def with_work_for_search(problem: Problem) -> Problem:
 
 
 def work_for_bounds(problem: Problem, value: float) -> Callable[[Problem], Problem]:
-    """Return a function that replaces the degree of irregularity by work and never raises the objective.
+    """Return a function that replaces degrees of irregularity in a problem by stored work, for lower bounds.
 
-    The replacement is linear in the work. It is a lower bound of the degree (T11) for all designs better than `value`,
-    the objective of the best design [SI].
+    The replacement is linear in the work and never raises the objective. It is a lower bound of the degree (T11) for
+    all designs better than `value`, the objective of the best design [SI].
     """
     if not _has_degree(problem):
         return lambda problem: problem
@@ -72,7 +75,9 @@ def _exchange(
     slope: Callable[[Measure, str], float],
     maximum: Callable[[Measure, str, float], float],
 ) -> Problem:
-    """Replace every degree by work: in the objective at one operating point, in limits at every point.
+    """Return the problem with stored work in place of every degree of irregularity.
+
+    An objective term counts the work at one operating point, a limit that at every point.
 
     Parameters
     ----------

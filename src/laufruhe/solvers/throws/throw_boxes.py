@@ -138,7 +138,7 @@ class ThrowPrograms:
         return sum(weight * norm.left_out for weight, norm in self._terms)
 
     def program(self, window: FiringWindow) -> ThrowProgram:
-        """Return the norms of a firing window."""
+        """Return objective and limits as norms of throw angles, for the whole turns and bounds of one firing window."""
         if window.laps not in self._by_laps:
             self._by_laps[window.laps] = self._with_laps(window)
         program = self._by_laps[window.laps]
@@ -151,7 +151,7 @@ class ThrowPrograms:
         return replace(program, window=window, rows=rows, reduced=reduced, names=(*program.names, ""))
 
     def _with_laps(self, window: FiringWindow) -> ThrowProgram:
-        """Return the norms of all firing orders with the same whole turns (laps), without limits on intervals."""
+        """Return objective and limits for all firing orders with the same whole turns, for any firing intervals."""
         terms = tuple((weight, self._rows(norm, window.laps)) for weight, norm in self._terms)
         limits = tuple((limit.maximum + norm.left_out, self._rows(norm, window.laps)) for limit, norm in self._limits)
         count = len(self.waves.orders)
@@ -197,7 +197,10 @@ class ThrowPrograms:
         return AffineNorm(fixed.norm, fixed.constant, all_slopes, fixed.grid)
 
     def _intervals(self, window: FiringWindow) -> AffineNorm:
-        """Return firing intervals as a norm: deviation from the middle of their bounds over half their range."""
+        """Return the firing intervals as a norm: at most 1 if all are within their bounds.
+
+        Each interval counts by its deviation from the middle of its bounds, over half their range.
+        """
         matrix, constants = self._firing.rows(window)
         firing = self._firing
         maximum = min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)
@@ -215,7 +218,7 @@ class ThrowPrograms:
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float,
         reuse_multipliers: bool = False,
     ) -> ThrowBox | FathomedPart:  # fmt: skip
-        """Shrink a box to the angles where a design may be better than `cutoff`, and bound it.
+        """Return a box shrunk to the angles where a design may be better than `cutoff`, with its lower bound.
 
         Parameters
         ----------
@@ -247,7 +250,7 @@ class ThrowPrograms:
         return result
 
     def parts(self, box: ThrowBox, cutoff: float) -> Iterator[ThrowBox | FathomedPart]:
-        """Yield the parts of a box, divided at the mean angle of the mixture with the largest spread."""
+        """Yield the two parts of a box of throws, divided at the mean angle of the mixture with the largest spread."""
         width = box.upper - box.lower
         spread = np.where(width > NARROWEST, box.spread, 0.0)
         side = int(np.argmax(spread if spread.any() else width))
@@ -257,7 +260,7 @@ class ThrowPrograms:
     def _bound_box(
         self, program: ThrowProgram, lower: Array, upper: Array, floor: float, cutoff: float, reuse_multipliers: bool
     ) -> ThrowBox | FathomedPart:
-        """Bound a box by multipliers of other boxes or by its cone program."""
+        """Return a box with its lower bound of the objective, by multipliers of other boxes or by its cone program."""
         columns = self._riders.columns(*self.waves.throw_bounds(lower, upper))
         arc_box = ArcBox(self.waves.orders[: self._order_count], lower, upper)
         for proof in self._proofs if reuse_multipliers else ():
@@ -291,7 +294,7 @@ class ThrowPrograms:
     def _bound(
         self, rows: AffineProblem, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox
     ) -> tuple[float, Arcs]:
-        """Return the lower bound of a box by multipliers, and the functions of its throws (S27)."""
+        """Return the lower bound of the objective on a box by multipliers, and the minima over its angles (S27)."""
         count = len(rows.limits)
         lower_function = minorant(
             rows, Multipliers(multipliers.terms if rows.terms else (), multipliers.limits[:count])
@@ -326,7 +329,7 @@ class ThrowPrograms:
 
 
 def compress(norm: WaveNorm) -> WaveNorm:
-    """Reduce the rows of a root mean square to the number of columns (S12), and drop zero components of other norms."""
+    """Return the same norm with fewer rows: root mean squares are reduced (S12), others lose zero components."""
     fixed = norm.fixed
     if not fixed.norm.is_euclidean:
         is_nonzero = np.flatnonzero(
@@ -401,7 +404,7 @@ class Mixture:
         self.problem = AffineProblem(terms, (*limits, *ties, *self._share_limits(size)), domains, 1)
 
     def _through(self, norm: AffineNorm, matrix: Array, points: Sequence[Array]) -> AffineNorm:
-        """Return a norm of the columns of the model as a norm of the columns of the box."""
+        """Return a norm of the model's columns (waves, unbalances) as a norm of the box's columns (mixture weights)."""
         k, d, n = norm.slope.shape
         flat, first = norm.slope.reshape(k * d, n), len(matrix)
         shared = flat[:, n - self._shared.shape[1] :] @ self._shared.T
@@ -417,7 +420,7 @@ class Mixture:
         return AffineNorm(norm.norm, constant.reshape(k, d), slope.reshape(k, d, -1), norm.grid)
 
     def _share_limits(self, size: int) -> list[tuple[float, AffineNorm]]:
-        """Limit the sum of shares of shared angles to 1, and the sum for a throw to the share of its shared angle."""
+        """Return limits on the weights of a mixture of angles: a sum of 1, and of a throw's weights to its angle's."""
         count, first = len(self._shared), self._places[0]
         slopes, constants = [np.zeros((0, size))], [np.zeros(0)]
         if count > 1:
@@ -442,9 +445,10 @@ class Mixture:
         return [(0.5, AffineNorm(NORMS["maximum"], constant[:, None] - 0.5, slope[:, None], grid))]
 
     def middle(self, x: Array) -> tuple[Array, Array]:
-        """Return the mean angle of every mixture [rad], and its weighted distance from the waves at that angle.
+        """Return the mean angle of every mixture of angles [rad], and how far the mixture is from that angle.
 
-        They are those of a solution `x` of the program, shape (columns,).
+        Both are from a solution `x` of the program, shape (columns,). The distance is that of the mixture's waves from
+        those at the mean angle, weighted.
         """
         count, first = len(self._shared), self._places[0]
         shares = x[first : first + count - 1]

@@ -153,7 +153,7 @@ class Stage:
 
 
 def peak_error(measure: Measure, best: Result, samples: int) -> float:
-    """Return an upper bound of the difference between a peak and its samples over the period at any phase (F7) [SI]."""
+    """Return an upper bound of the error of a sampled peak, at any phase of the samples (F7) [SI]."""
     signals = best.final.signals(measure.load)
     rebased = with_common_base(common_base([signal.repeat_order() for signal in signals]), signals)
     spectra = [narrow_signal(measure, signal, best.final.engine) for signal in rebased]
@@ -191,7 +191,7 @@ class _Best:
 def search_throws(
     problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
 ) -> ThrowBound | None:
-    """Bound the objective over all throws by branch and bound; None if the method proves nothing.
+    """Return a lower bound of the objective over all throw angles, by branch and bound; None if nothing is proven.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     def _programs(
         self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
     ) -> tuple[Callable[[int], ThrowPrograms], Callable[[int], float]]:
-        """Return functions from the number of samples to the programs, and to the truncated part of the objective."""
+        """Return two functions of the number of samples: bounding programs, and the part of the objective they omit."""
         phasing = self._phasing
         candidate, star_problem = self._first_crank(windows, left_out)
         throw_of_rotor, layout = rotor_throws_of(phasing, candidate), phasing.layout_of(candidate)
@@ -333,7 +333,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return value * (1.0 - SHARE * self._problem.tolerance)
 
     def witness_of(self, incumbent: _Best) -> Witness | None:
-        """Return the best design as a witness of bounds; None without a feasible design."""
+        """Return the best design as a witness, a value that no bound may exceed; None without a feasible design."""
         best = incumbent.design
         if best is None or best.result.final.violation(best.result.problem.limits) > FEASIBLE:
             return None
@@ -358,7 +358,10 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
         return None
 
     def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | FathomedPart, _Best | None]]:
-        """Yield the boxes of all windows for the root, else a box at more samples or its halves."""
+        """Yield the parts of a search node, each with a better design if one was computed.
+
+        The parts are the boxes of all firing windows for the root, else the box at more samples, or its halves.
+        """
         box, stage, cutoff = part.box, part.stage, self.level(value)
         if box is None or stage is None:
             for first, window, left_out in self.roots:
@@ -376,7 +379,7 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     def _examine(
         self, stage: Stage, box: ThrowBox | FathomedPart, left_out: tuple[str, ...]
     ) -> tuple[_Part | FathomedPart, _Best | None]:
-        """Return a box, and the best design if one near its middle was computed."""
+        """Return a box as a search node, and a design near its middle if one was computed and is the best."""
         self._violated |= stage.programs.conflict
         self._finest = stage
         if isinstance(box, FathomedPart):

@@ -47,7 +47,7 @@ def firing_intervals(phasing: Phasing, candidate: Candidate) -> tuple[float, ...
 
 
 def start_candidates(phasing: Phasing, even_result: Result | None, with_gas: bool = False) -> list[Candidate]:
-    """Return start candidates for the search of uneven throws, best first.
+    """Return cranks at which a search over throw angles starts, best first.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
 
 
 def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
-    """Return throws within their bounds, with firing orders that these throws allow."""
+    """Return start cranks with throws within their bounds, and with firing orders that these throws allow."""
     unlimited = replace(phasing, intervals=Intervals(0.0, math.inf), criteria=(OrderCriterion.ROLL_MOMENT,))
     allowed = phasing.intervals
 
@@ -209,7 +209,7 @@ def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) ->
 
 
 def reverse_rotation(phasing: Phasing, candidate: Candidate) -> Candidate:
-    """Return the equivalent of a candidate with reversed rotation: banks swap sides, and the firing order reverses."""
+    """Return the crank that is equivalent if it turns backwards: banks swap sides, and the firing order reverses."""
     layout = phasing.layout_of(candidate)
     number = {(pin, layout.side(k)): k + 1 for k, pin in enumerate(layout.pins)}
     partners = [number[pin, -layout.side(k)] for k, pin in enumerate(layout.pins)]

@@ -28,7 +28,10 @@ MAX_WINDOWS = 6_000
 
 
 def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
-    """Return all firing windows of a problem, one of each set of equivalent mirror images; None if too many."""
+    """Return all firing windows (firing orders with whole turns) of a problem; None if they are too many.
+
+    Of equivalent mirror images, one is listed.
+    """
     layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     firing = firing_bounds(phasing)
     is_free = allowed.minimum <= 0.0 and allowed.maximum >= phasing.cycle.angle
@@ -79,7 +82,7 @@ def firing_bounds(phasing: Phasing) -> FiringBounds:
 
 
 def design_at(phasing: Phasing, angles: Array) -> Candidate:
-    """Return the candidate at angles of a box: throws, then open bank and split pin angles [rad]; it has no order."""
+    """Return the crank at angles of a box: throws, then open bank and split pin angles [rad]; no firing order."""
     layout = phasing.layout(*phasing.minimum_geometry)
     count = len(layout.throw_positions)
     shared = iter(angles[count:])
@@ -94,7 +97,7 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
 
 
 def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Array | None:
-    """Return the angles of a design as in boxes of a window, see `design_at`; None if it is outside the window."""
+    """Return the angles of a crank in the order of boxes (see `design_at`) [rad]; None if it is outside the window."""
     if window.order and window.order != candidate.firing_order:
         return None
     layout = phasing.layout(*phasing.minimum_geometry)
@@ -112,7 +115,7 @@ def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Ar
 
 
 def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
-    """Return True if unbalances do not depend on bank and split pin angles; on offset pins, rotating masses do."""
+    """Return True if no unbalance depends on bank and split pin angles, as rotating masses on offset pins do."""
     ends = [(pair, 0.5 * (pair[0] + pair[1])) if pair else ((None,), None) for pair in (phasing.bank, phasing.split)]
     states = [
         rotor_states(
@@ -140,7 +143,7 @@ def turns_freely(phasing: Phasing, candidate: Candidate, throw_of_rotor: dict[st
 
 
 def nearest_throws(window: FiringWindow, throws: Array | None = None) -> Array:
-    """Return throws inside a window, each as near to `throws` as the previous throws allow [rad], shape (throws,).
+    """Return throw angles inside a firing window, each as near to `throws` as the angles before it allow [rad].
 
     Without `throws`, each is in the middle of the range that the previous throws leave.
     """

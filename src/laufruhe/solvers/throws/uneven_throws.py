@@ -146,7 +146,7 @@ def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: S
 
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
-    """Return a lower bound of all designs with these limits of intervals [SI], and its source in words (S22, S24)."""
+    """Return a lower bound of the objective for these bounds of firing intervals [SI], and its source (S22, S24)."""
     families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
     if len(families) == 1 and families[0].fixed is None:
         # without limits, the bound is still valid
