@@ -158,7 +158,7 @@ def test_a_full_disk_leaves_nothing_half_written(here: Path, monkeypatch: pytest
     found = run.invoke(app, words)
     assert (found.exit_code, found.output.count("\n")) == (1, 1)
     assert re.search(r"'[^']*(schema\.json|\.toml)' cannot be written \(No space left", found.output)
-    assert found.output.endswith("; make room, or name another place\n")
+    assert found.output.endswith("; free disk space, or name another folder\n")
     assert list(here.iterdir()) == []
 
 

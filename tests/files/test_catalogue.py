@@ -89,7 +89,7 @@ def test_throws_left_open_take_those_of_the_catalogue_away(tmp_path: Path) -> No
     [
         ('engine = "bmw-b49"', "did you mean 'bmw-b48'?"),
         ('engine = "warp"', "laufruhe engines lists them"),
-        ("[engine]\ncatalogue = 5", "engine.catalogue = 5: is no engine of the catalogue"),
+        ("[engine]\ncatalogue = 5", "engine.catalogue = 5: is not a key of an engine of the catalogue"),
     ],
 )
 def test_an_engine_that_is_not_there_is_refused_in_a_line(text: str, line: str, tmp_path: Path) -> None:

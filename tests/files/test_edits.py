@@ -155,8 +155,8 @@ def test_more_freedom_is_never_worse(problem: Problem) -> None:
         ("front web.mass", "5 kg", "starts outside its bounds"),
         ("front web.mass", "5 m", "'m' is not a unit of a mass"),
         ("engine.strok", "100 mm", "is not a key here"),
-        ("counterweights.nobody.mass", "1 kg", "is no quantity of this problem"),
-        ("whatever", "1", "names no numerical value of this problem"),
+        ("counterweights.nobody.mass", "1 kg", "is not the path of a quantity of this problem"),
+        ("whatever", "1", "is not the name of a number of this problem"),
     ],
 )
 def test_what_is_wrong_is_said_as_for_a_file(problem: Problem, name: str, value: str, line: str) -> None:

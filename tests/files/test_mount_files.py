@@ -84,7 +84,7 @@ REFUSED = {
     "unknown leader": (MOUNTS.replace('mirror_of = "rear left"', 'mirror_of = "rear lef"'), BLOCK, SAG,
                        "is no mount defined before this one; did you mean 'rear left'"),
     "follows already": (MOUNTS.replace('mirror_of = "rear left"', 'mirror_of = "rear left"\nloss_factor = 0.2'), BLOCK,
-                        SAG, "is already taken from mount 'rear left'"),
+                        SAG, "already follows from mount 'rear left'"),
     "impossible inertia": (MOUNTS, BLOCK.replace("27 kg", "270 kg"), SAG, "block: .*belong to no body"),
     "massless block": (MOUNTS, BLOCK.replace("420 kg", "0 kg"), SAG, "block.mass .*must be more than 0"),
     "minimum of a peak": (MOUNTS, BLOCK, SAG + '[[constraints]]\nlimit = "maximum mount travel"\nmin = "1 mm"\n',
@@ -97,7 +97,7 @@ REFUSED = {
     "axis without frequency": (MOUNTS, BLOCK, SAG.replace("static sag", "torque-roll residual"),
                                "frequency: is missing"),
     "more than all energy": (MOUNTS, BLOCK, SAG + '[[constraints]]\nlimit = "kinetic-energy decoupling"\nmin = "1.2"\n',
-                             "more than the whole energy"),
+                             "a share of energy above 1"),
     "unknown point": (MOUNTS, BLOCK, SAG + '[[constraints]]\nlimit = "transmissibility"\nmax = "1"\n'
                       'operating_points = ["idel"]\n', "did you mean 'idle'"),
     "range without steps": (MOUNTS, BLOCK, SAG, "steps: is missing"),

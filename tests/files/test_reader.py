@@ -89,7 +89,7 @@ BAD = [
     bad("a firing order of no cylinder", "[1, 3, 4, 2]", "[]",
         "engine.firing_order = []: names no cylinder; name every cylinder once"),
     bad("a crank of no throw", "throws = [0, 180, 180, 0]", "throws = []",
-        "engine.throws = []: names no throw; give the angle of each throw"),
+        "engine.throws = []: names no throw; give the angle of each throw, as in [0, 180, 180, 0]"),
     bad("misspelt table", "[objective]", "[objektive]",
         """objektive = {"minimise": "mean mount force"}: is not a key here; did you mean 'objective'?"""),
     bad("misspelt key of a tagged table", "imep =", "imp =",
@@ -99,7 +99,7 @@ BAD = [
     bad("unknown key", "\"1.25 kg\"\n", "\"1.25 kg\"\nzylinder = 4\n",
         "engine.zylinder = 4: is not a key here; did you mean 'cylinders'?"),
     bad("motored and fired", "[gas]", 'motored = true\nimep = "5 bar"\n[gas]',
-        "operating_points[1].imep: is given for a motored point, which has no combustion; leave imep or motored out"),
+        "operating_points[1].imep: is given for a motored point, which has no combustion; remove imep or motored"),
     bad("missing key", "stroke = \"120 mm\"\n", "",
         "engine.stroke: is missing; add it"),
     bad("missing unit", '"120 mm"', "120",
@@ -172,33 +172,33 @@ BAD = [
     bad("names of some mounts", "[mounts]", "[mounts]\nnames = [\"a\"]",
         'mounts.names = ["a"]: names 1 of 4 mounts; name each once'),
     bad("mounts of no stiffness", "[mounts]", "[mounts]\nrelative_stiffness = [0, 0, 0]",
-        "mounts.relative_stiffness = [0.0, 0.0, 0.0]: is zero in every direction; "
-        "give one direction a value above zero"),
+        "mounts.relative_stiffness = [0.0, 0.0, 0.0]: is a stiffness of zero in every direction; "
+        "give at least one direction a value above zero, such as 1"),
     bad("coupled to nobody", 'to = "left"', 'to = "lefty"',
-        'balancer_shafts[2].unbalances[1].coupled.to = "lefty": is no unbalance defined before this '
-        "one; did you mean 'left'?"),
+        'balancer_shafts[2].unbalances[1].coupled.to = "lefty": is not the name of an unbalance that stands '
+        "before this one in the file; did you mean 'left'?"),
     bad("coupled to itself", 'to = "left"', 'to = "right"',
-        'balancer_shafts[2].unbalances[1].coupled.to = "right": is no unbalance'),
+        'balancer_shafts[2].unbalances[1].coupled.to = "right": is not the name of an unbalance'),
     bad("coupled to a counterweight", 'to = "left"', 'to = "web"',
-        'balancer_shafts[2].unbalances[1].coupled.to = "web": is no unbalance'),
+        'balancer_shafts[2].unbalances[1].coupled.to = "web": is not the name of an unbalance'),
     bad("coupled in no known way", 'as = "mirrored"', 'as = "mirored"',
         """balancer_shafts[2].unbalances[1].coupled.as = "mirored": is not allowed; did you mean 'mirrored'?"""),
     bad("coupled with an angle", 'as = "mirrored" }', "as = \"mirrored\" }\nangle = 90",
         'balancer_shafts[2].unbalances[1].coupled = "left": cannot stand beside a size or an angle of its own; leave'),
     bad("two shafts of one name", 'name = "right"', 'name = "left"',
-        'balancer_shafts[2].name = "left": is the name of another shaft; give'),
+        'balancer_shafts[2].name = "left": is already the name of another shaft; give'),
     bad("a second crankshaft", 'name = "right"', 'name = "crankshaft"',
-        'balancer_shafts[2].name = "crankshaft": is the name of another'),
+        'balancer_shafts[2].name = "crankshaft": is already the name of another'),
     bad("a shaft at rest", "ratio = -2", "ratio = 0",
         "balancer_shafts[2].ratio = 0: is almost a standing shaft"),
     bad("a shaft that does not return", "ratio = -2", "ratio = 0.3",
         "engine: shaft 'right' with ratio 0.3 does not return within the cycle"),
     bad("opposite no throw", "opposite_throw = 1", "opposite_throw = 7",
-        "counterweights[1].opposite_throw = 7: is no throw, the crankshaft has 4; count them from the front"),
+        "counterweights[1].opposite_throw = 7: is no throw, the crankshaft has 4; count throws from 1 at the front"),
     bad("counterweight nowhere", "opposite_throw = 1\n", "",
-        "counterweights[1].x: is missing; give its place, or opposite_throw"),
+        "counterweights[1].x: is missing; give the counterweight a position, or opposite_throw"),
     bad("mass without radius", "radius = \"80 mm\"\n", "",
-        "counterweights[1].radius: is missing, and a mass needs one; add it"),
+        "counterweights[1].radius: is missing, but an unbalance given by its mass needs it; add it"),
     bad("two sizes", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nunbalance = \"1 kg m\"",
         "counterweights[1].unbalance: is given twice, also as mass; give unbalance or mass"),
     bad("no size", "mass = { between = [\"0 kg\", \"3 kg\"] }\n", "",
@@ -206,12 +206,12 @@ BAD = [
     bad("fraction and size", '["0 kg", "3 kg"] }', "[\"0 kg\", \"3 kg\"] }\nbalance_factor = 0.5",
         "counterweights[1].opposite_throw: cannot stand beside balance_factor; leave one of them out"),
     bad("throws of a single weight", "opposite_throw = 1", "opposite_throw = 1\nthrows = [1]",
-        "counterweights[1].throws: is for balance_factor"),
+        "counterweights[1].throws: is only for counterweights with balance_factor"),
     bad("no convex sector", "[0, 360]", "[0, 270]",
         'counterweights[1].angle = "0 to 270 deg": spans more than 180 deg but no full turn; open '
         "it by at most 180 deg, or by 360 deg"),
     bad("a ring is not convex", '["0 kg", "3 kg"]', '["1 kg", "3 kg"]',
-        'counterweights[1].mass = "1 kg": is a smallest size above zero while'),
+        'counterweights[1].mass = "1 kg": is a lower bound above zero, but'),
     bad("unknown objective", '"mean mount force"', '"mean mount forces"',
         """objective.minimise = "mean mount forces": is no quantity; did you mean 'mean mount force'?"""),
     bad("unknown limit", '"balancer mass"', '"balancing mass"',
@@ -289,11 +289,11 @@ def test_one_line_for_one_mistake(old: str, new: str, said: str, tmp_path: Path)
     ("old", "new", "said"),
     [
         bad("a second crankshaft", '"second", ratio', '"crankshaft", ratio',
-            'engine.shafts[1].name = "crankshaft": is the name of another'),
+            'engine.shafts[1].name = "crankshaft": is already the name of another'),
         bad("unknown shaft", 'shaft = "second"', 'shaft = "secnd"',
-            """engine.slider_cranks[2].shaft = "secnd": is no shaft of this engine; did you mean 'second'?"""),
+            """engine.slider_cranks[2].shaft = "secnd": is not the name of a shaft of this engine; did you"""),
         bad("two cylinders in one place", 'x = "0 mm", shaft = "second", throw = 180, bank_angle = 180', 'x = "0 mm"',
-            "engine: cylinder 2 stands in the place of cylinder 1; move one of them"),
+            "engine: cylinder 2 has the same position as cylinder 1; move one of them"),
         bad("a crank at rest", "ratio = -1", "ratio = 0",
             "engine.shafts[1].ratio = 0: is almost a standing shaft"),
         bad("firing beside the dead centre", "throw = 180", "throw = 180, firing_angle = 10",
@@ -312,7 +312,7 @@ def test_two_cylinders_in_one_place_on_two_shafts(tmp_path: Path) -> None:
     """A second shaft on the same axis leaves no more room."""
     second = changed(PARTS, 'ratio = -1, position = ["0 mm", "460 mm"]', 'ratio = 1, position = ["0 mm", "0 mm"]')
     alike = changed(second, ", throw = 180, bank_angle = 180", "")
-    assert "stands in the place of cylinder 1" in complaint_about(written(tmp_path, alike))
+    assert "has the same position as cylinder 1" in complaint_about(written(tmp_path, alike))
 
 
 class TestFiles:
@@ -325,7 +325,7 @@ class TestFiles:
     def test_a_folder(self, tmp_path: Path) -> None:
         path = tmp_path / "folder.toml"
         path.mkdir()
-        assert complaint_about(path) == "file: is a folder; name a problem file in it"
+        assert complaint_about(path) == "file: is a folder; name a problem file inside this folder"
 
     def test_no_text(self, tmp_path: Path) -> None:
         path = tmp_path / "scene.toml"

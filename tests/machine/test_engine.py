@@ -46,11 +46,11 @@ class TestRefusals:
             ),
             (
                 lambda: engine(PART, replace(OTHER, x=0.0)),
-                r"cylinder 2 stands in the place of cylinder 1; move one of them",
+                r"cylinder 2 has the same position as cylinder 1; move one of them",
             ),
             (
                 lambda: engine(PART, replace(OTHER, x=0.0, bank=math.tau, throw=0.0)),
-                r"cylinder 2 stands in the place of cylinder 1",
+                r"cylinder 2 has the same position as cylinder 1",
             ),
             (
                 lambda: engine(PART, rotors=(Rotor("w", 0.0, 1.0, Shaft("s", 0.3)),)),
@@ -65,9 +65,18 @@ class TestRefusals:
                 r"cylinder 1 fires at 5\.7\d* deg, 5\.7\d* deg from its dead centre",
             ),
             (lambda: Shaft("still", 0.0), r"shaft 'still' has ratio 0"),
-            (lambda: FluidTrack(2, 0.0, 2e5), r"a fluid track needs a mass and a bulge stiffness above zero"),
-            (lambda: FluidTrack(2, 30.0, 0.0), r"a fluid track needs a mass and a bulge stiffness above zero"),
-            (lambda: FluidTrack(2, 30.0, 2e5, damping=-1.0), r"a fluid track has no negative stiffness or damping"),
+            (
+                lambda: FluidTrack(2, 0.0, 2e5),
+                r"the fluid track of a hydraulic mount needs a mass and a bulge stiffness above zero",
+            ),
+            (
+                lambda: FluidTrack(2, 30.0, 0.0),
+                r"the fluid track of a hydraulic mount needs a mass and a bulge stiffness above zero",
+            ),
+            (
+                lambda: FluidTrack(2, 30.0, 2e5, damping=-1.0),
+                r"the fluid track of a hydraulic mount has a negative stiffness or damping; give zero or more",
+            ),
         ],
         ids=range(12),
     )
@@ -78,7 +87,7 @@ class TestRefusals:
     def test_cylinders_in_one_place_on_geared_cranks(self) -> None:
         """Shafts of two names on one axis do not make room for two cylinders."""
         second = replace(OTHER, x=0.0, shaft=Shaft("crank 2", 1.0))
-        with pytest.raises(ModelError, match="stands in the place of"):
+        with pytest.raises(ModelError, match="has the same position as"):
             engine(PART, second)
 
     @pytest.mark.parametrize("ratio", [0.5, 1.5, -2.0, 4.0])

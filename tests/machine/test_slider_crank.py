@@ -104,7 +104,10 @@ class TestRefusals:
             ({"rod_length": math.nan}, "rod length nan m must be positive"),
             ({"reciprocating_mass": -1.0}, "masses must not be negative"),
             ({"rotating_mass": -1e-9}, "masses must not be negative"),
-            ({"rod_length": math.inf, "offset": 0.01}, "an offset means nothing with an infinite rod"),
+            (
+                {"rod_length": math.inf, "offset": 0.01},
+                "an offset has no effect with an infinite rod",
+            ),
             ({"rod_length": 0.06}, r"the crank cannot turn, \(r \+ \|e\|\) / l = 1 must be under 1"),
             ({"offset": 0.14}, r"the crank cannot turn, \(r \+ \|e\|\) / l = 1 must be under 1"),
             ({"offset": -0.15}, r"the crank cannot turn, .* = 1\.05"),

@@ -88,7 +88,13 @@ def test_a_failure_names_the_limit_of_time_that_ended_it(tmp_path):
             engines.COUPLE,
             "engine.firing_order.*no permutation of 1 to 4",
         ),
-        (4, 'throws = [0, 90, 180]\nfiring_order = "open"', "", engines.COUPLE, "engine.throws: has 3 of 4 throws"),
+        (
+            4,
+            'throws = [0, 90, 180]\nfiring_order = "open"',
+            "",
+            engines.COUPLE,
+            "engine.throws: has angles for 3 of 4 throws",
+        ),
         (4, OPEN, "intervals = { }", engines.COUPLE, "phasing.intervals: is empty"),
         (
             4,
@@ -131,7 +137,9 @@ def test_cylinders_are_asked_for(tmp_path):
     engines.problem(tmp_path, 4, engine='throws = "open"')
     path = tmp_path / "none.toml"
     path.write_text((tmp_path / "scene.toml").read_text().replace("cylinders = 4\n", ""), encoding="utf-8")
-    with pytest.raises(InputError, match=r"engine\.cylinders: is missing, and open throws do not give the number"):
+    with pytest.raises(
+        InputError, match=r"engine\.cylinders: is missing, and open throws do not determine the number of cylinders"
+    ):
         load(path)
 
 

@@ -188,7 +188,7 @@ def test_loads_at_the_brake_from_a_file_and_told(tmp_path: Path) -> None:
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\ndeviation = "1 bar"', "follows from the file"),
         (ROWS, 'file = "fuel.csv"', 'file = "fuel.csv"\nload_unit = "kg"', "load_unit"),
         (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nbmep = "9 bar"', "given beside"),
-        (ROWS, 'brake_torque = "250 N m"', "", "is used by no operating point"),
+        (ROWS, 'brake_torque = "250 N m"', "", "is given, but no operating point uses it"),
         (ROWS, 'brake_torque = "250 N m"', 'brake_torque = "250 N m"\nmotored = true', "needs combustion"),
         (ROWS, '[friction]\nfile = "fuel.csv"', "", "needs [friction]"),
         (ROWS, 'bore = "85 mm"', "", "bore"),

@@ -195,7 +195,11 @@ steam = { admission = "9 bar", cut_off = 0.3, back_pressure = "1.2 bar" }
         ('rod = "7.5 cm"', 'rod = "45 cm"', "the chamber vanishes"),
         ('end = "head"', 'end = "head"\ncylinders = [2]', "is not among 1 cylinder"),
         ('end = "head"', 'end = "top"', "gas.chambers[1].end"),
-        ("steam =", 'pump = { suction = "1 bar", delivery = "5 bar" }\nsteam =', "give one of steam, pump and trace"),
+        (
+            "steam =",
+            'pump = { suction = "1 bar", delivery = "5 bar" }\nsteam =',
+            "give the chambers one of the keys steam, pump and trace",
+        ),
         ('cycle = "two-stroke"', 'cycle = "four-stroke"', "chambers, which work once a turn"),
         ('speed = "50 rpm"', 'speed = "50 rpm"\nimep = "4 bar"', "needs [gas] with model seiliger or wiebe"),
         ('layout = "inline"', 'layout = "opposed-piston"\ncrank_distance = "6 m"', "share a chamber"),

@@ -197,7 +197,7 @@ def test_a_weight_that_bearings_feel_is_placed_along_the_crank(tmp_path: Path) -
         (('diameter = "70 mm"', "friction = 0.01"), r"main_bearings\[1\].friction = .*: needs the diameter"),
         (('mean main-bearing force"', 'maximum friction power"'), "is no quantity"),
         (('x = "62 mm"', 'shaft = "left"\nx = "62 mm"'), "is no shaft with cranks"),
-        (('x = "62 mm"', 'name = "1"\nx = "62 mm"'), "is the name of another bearing"),
+        (('x = "62 mm"', 'name = "1"\nx = "62 mm"'), "is already the name of another bearing"),
         (('mean main-bearing force"', 'mean main-bearing force"\nbearings = ["7"]'), "is no main bearing here"),
         (('mean main-bearing force"', 'mean main-bearing force"\nmounts = ["a"]'), "means nothing for a main-b"),
         (('"mean main-bearing force"', '"mean shaking force"\nbearings = ["1"]'), "means nothing for a shaking force"),

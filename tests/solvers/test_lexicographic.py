@@ -167,7 +167,7 @@ def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"added mass"', '"added mass"\nwithin = 0.1', "objective[2].within = 0.1: is for all objectives but the last"),
+        ('"added mass"', '"added mass"\nwithin = 0.1', "objective[2].within = 0.1: is for all objectives except"),
         ('minimise = "rms shaking force"', 'terms = [{ quantity = "rms shaking force" }, { quantity = "added mass" }]',
          "objective[1].terms: is a weighted sum, which only the last"),
         ('"added mass"', '"added moss"', "objective[2].minimise"),

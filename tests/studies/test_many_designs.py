@@ -193,7 +193,11 @@ def test_a_full_disk_is_one_line_and_the_study_goes_on(tmp_path: Path, monkeypat
         (DESIGNS + "draws = 5", "vee-six-open.toml", "differ in unbalances alone"),
         (SCENES + "draws = 5\nvary = []", FOUR, "vary"),
         (f"{SCENES}draws = 5\nvary = [{SPEED.replace('6 m/s', '13 m/s')}]", FOUR, "does not lie below to"),
-        (f"{SCENES}draws = 5\nvary = [{RATIO.replace('rod', 'road')}]", FOUR, "engine.road_ratio: is no quantity"),
+        (
+            f"{SCENES}draws = 5\nvary = [{RATIO.replace('rod', 'road')}]",
+            FOUR,
+            "engine.road_ratio: is not the path of a quantity",
+        ),
     ],
 )
 def test_what_is_wrong_is_one_line(tmp_path: Path, keys: str, problem: str, said: str) -> None:

@@ -137,7 +137,7 @@ BAD = [
         "do not ascend; write the lower speed as from and the higher as to",
     ),
     ('from = "1000 rpm", to = "3000 rpm"', "", "either points or step"),
-    ('from = "1000 rpm", to = "3000 rpm", step = "5000 rpm"', "", "does not fit between their ends"),
+    ('from = "1000 rpm", to = "3000 rpm", step = "5000 rpm"', "", "is above their range"),
     ('from = "1 m", to = "3000 rpm", points = 3', "", "is not a unit of a speed of rotation"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'operating_point = "idle"', "has no 'idle'"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "mean force" }]', "mean mount force"),

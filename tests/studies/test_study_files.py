@@ -102,8 +102,8 @@ BAD = [
      "study.common.nummbers"),
     (REPLICA.replace("{m} kg", "{m} mm"), "'mm' is not a unit of a mass"),
     (REPLICA.replace("within", "witin"), "did you mean 'within'?"),
-    (REPLICA.replace('within = "5 %"', ""), "needs `is` and `within` together; give both"),
-    (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "judged by `is` and `within`, or by `holds`"),
+    (REPLICA.replace('within = "5 %"', ""), "is a statement that needs `is` and `within` together; give both"),
+    (REPLICA.replace("is = 1", 'holds = "value > 1"\nis = 1'), "is a statement with `is` and `within`"),
     (REPLICA.replace('problem = "one"', 'problem = "two"'), "does not exist"),
     (REPLICA.replace('problem = "one"', 'problem = "one", sweep = { m = { from = 1 } }'), "is no grid; give values"),
     (study(sweep=swept(FRACTION, 'from = 0\nto = 1\npoints = 3\nspacing = "cubic"')), "use one of: linear, log"),
@@ -112,8 +112,8 @@ BAD = [
     (study(sweep=swept(FRACTION, f"from = 0\nto = 1{400 * '0'}\npoints = 3")), "more than 64 bits"),
     (study(sweep=swept("title", "values = [1, 2]")), "title = 1: must be text"),
     (study(sweep=swept("engine", 'values = ["a", "b"]')), "engine = \"a\""),
-    (study(sweep=swept("engine.throws.9", "values = [0, 1]")), "engine.throws.9: is no quantity of this problem"),
-    (study(sweep=swept("operating_points..speed", "values = [0, 1]")), "is no quantity of this problem"),
+    (study(sweep=swept("engine.throws.9", "values = [0, 1]")), "is not the path of a quantity of this problem"),
+    (study(sweep=swept("operating_points..speed", "values = [0, 1]")), "is not the path of a quantity of this problem"),
     (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]") + swept(BY_PLACE, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{BY_PLACE}" = 0.5 }}', "is swept, and set by"),
@@ -128,15 +128,15 @@ BAD = [
      'k = { values = [1, 2] } }'), "makes 200000 points"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
-    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this problem"),
+    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is not the path of a quantity of this problem"),
     (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
     (study(problem="tractor-four-lanchester"), "has no open balance factor"),
-    (study("balancer sizing"), "nothing to size"),
+    (study("balancer sizing"), "no balancer shaft to size"),
     (study("layout comparison", problem="nowhere"), "file: is named by the study and does not exist; paths begin in"),
     (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "write it into the problem file first"),
     (study(sweep=swept("stroke", 'values = ["100 mm", "110 mm"]')), "write the whole path, engine.stroke"),
     (study(sweep=swept("operating_points.mean_piston_speed", 'from = "6 m/s"\nto = "8 m/s"\npoints = 3')),
-     "is no number of a problem file; write its whole path, such as operating_points.1.speed"),
+     "is not the path of a number in the problem file; write its whole path, such as operating_points.1.speed"),
     (study(sweep=swept(FRACTION, 'from = "0,1"\nto = 1\npoints = 3')), 'decimals follow a point; write 0.1'),
     (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\nunit = "x"')), "write the unit with its number"),
     (study("layout comparison", problem="tractor-study"), "makes this a study file"),
@@ -150,7 +150,7 @@ BAD = [
     ('title = "t"\n[study]\n', "study.parts: is missing; add"),
     (REPLICA.replace("common = { numbers = { m = 2 } }", "common = 1.5"), "study.common = 1.5: "),
     (study(sweep=swept("counterweights.wb.mass", "values = [0, 1]")) + 'set = { "counterweights.web.name" = 1.5 }',
-     "counterweights.wb: is no quantity of this problem; use one of: 1"),
+     "counterweights.wb: is not the path of a quantity of this problem; use one of: 1"),
 ]  # fmt: skip
 
 
@@ -201,7 +201,7 @@ def test_equal_power_needs_one_cylinder(tmp_path: Path) -> None:
     banks = CaseTable(name="banks", problem="banks.toml", equal_power_to=4)
     assert ProblemFiles(tmp_path).problem(Point(banks.model_copy(update={"equal_power_to": None})))
     with pytest.raises(
-        InputError, match=r"equal_power_to = \"banks\": cylinders differ in bore or stroke.*; make them equal"
+        InputError, match=r"equal_power_to = \"banks\": cylinders differ in bore or stroke.*; give all the same size"
     ):
         ProblemFiles(tmp_path).problem(Point(banks))
 
@@ -302,7 +302,7 @@ def test_every_bad_expression_is_told_by_its_place(tmp_path: Path) -> None:
         load_study(path)
     assert [str(one) for one in found.value.complaints] == [
         "study.parts[1].statements[1].is = \"2 * mm\": 'mm' is no name here; did you mean 'm'?",
-        "study.parts[1].picture.panels[1].title = \"{m:d}\": 'd' is no format of a number; "
+        "study.parts[1].picture.panels[1].title = \"{m:d}\": 'd' is no format for a number; "
         "write for example .1f, .3g or .0f",
         "study.parts[1].picture.panels[1].curves[1].y = \"mean['givn'] / m\": 'givn' is no case here; "
         "did you mean 'given'?",
@@ -321,7 +321,7 @@ def test_a_limit_has_the_name_that_results_show() -> None:
     assert keys_of(tables, "constraints.webs.max") == ("constraints", 3, "max")
     assert keys_of(tables, "constraints.2.max") == ("constraints", 1, "max")
     # two limits of one name are told apart by their numbers alone
-    with pytest.raises(Refused, match="is no quantity of this problem"):
+    with pytest.raises(Refused, match="is not the path of a quantity of this problem"):
         keys_of(tables, "constraints.balancer mass.max")
 
 

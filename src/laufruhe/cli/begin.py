@@ -44,7 +44,10 @@ def _someone_answers() -> bool:
 def _requested_source(file: Path) -> str | None:
     # an engine that the user describes has no source
     if not _someone_answers():
-        rule, remedy = "asks questions, and nobody is there to answer", "add --from with an engine or a ready problem"
+        rule, remedy = (
+            "asks questions, but the input is no terminal that could answer them",
+            "add --from with an engine or a ready problem",
+        )
         raise refused("init", "", rule, remedy)
     if file.exists():
         raise refused("file", str(file), *_TAKEN)

@@ -154,6 +154,9 @@ def _page(path: Path, trade_result: Trade, picture: str | None = None) -> Docume
 def _with_objective(path: Path) -> Problem:
     problem = load(path)
     if not problem.objective:
-        rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"
+        rule, remedy = (
+            "is missing, and the accuracy of a fidelity is that of the objective",
+            "add [objective] or mounts",
+        )
         raise refused("objective", "", rule, remedy, path)
     return problem

@@ -160,7 +160,9 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         complain("\n" * isinstance(end, typer.Abort) + f"laufruhe: {interrupted}")
         raise typer.Exit(INTERRUPTED) from None
     except MemoryError:
-        complain(f"{printed(str(path))}: needs more memory than there is; ask for less at once")
+        complain(
+            f"{printed(str(path))}: needs more memory than this machine has; use fewer samples, draws or processes"
+        )
         raise typer.Exit(FAILED) from None
     except BrokenPipeError:
         # the reader of the output has gone; click ends quietly
@@ -168,7 +170,7 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
     except OSError as error:
         # output without a file name goes to the screen, or where that is redirected
         what = f"'{printed(str(error.filename))}'" if error.filename else "the output"
-        remedy = "make room, or name another place" if error.errno in _FULL else "name another place"
+        remedy = "free disk space, or name another folder" if error.errno in _FULL else "name another place"
         complain(f"laufruhe: {what} cannot be written ({error.strerror or error}); {remedy}")
         raise typer.Exit(FAILED) from None
 

@@ -58,8 +58,8 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     _, status = os.waitpid(child, 0)
     if not os.WIFEXITED(status):
         number = os.WTERMSIG(status)
-        for_want = "most likely for want of memory; ask for less at once"
-        why = for_want if number == signal.SIGKILL else "which is a defect; report it"
+        for_want = "most likely because memory ran out; use fewer samples, draws or processes"
+        why = for_want if number == signal.SIGKILL else "which is a defect of laufruhe; report it"
         sudden = f"laufruhe: the computation was ended by signal {number}, {why}\n"
         sys.stderr.write("laufruhe: interrupted\n" if ended_here else sudden)
     os._exit(os.WEXITSTATUS(status) if os.WIFEXITED(status) else INTERRUPTED if ended_here else FAILED)

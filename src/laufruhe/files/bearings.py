@@ -42,10 +42,15 @@ def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw])
             single.append(table)
             continue
         if table.name is not None:
-            raise Refused(f"{where}.name", table.name, "would name several bearings", "leave it out")
+            raise Refused(f"{where}.name", table.name, "would be the name of several bearings", "leave it out")
         for key in ("diameter", "width"):
             if isinstance(getattr(table, key), Open):
-                raise Refused(f"{where}.{key}", None, "is open for several bearings", "list them one by one, by x")
+                raise Refused(
+                    f"{where}.{key}",
+                    None,
+                    "is open, but stands for several bearings",
+                    "list the bearings one by one, each with its x",
+                )
         pins = sorted({throw.x for throw in throws if throw.shaft.name == table.shaft}, reverse=True)
         if not pins:
             raise Refused(f"{where}.shaft", table.shaft, "has no throws", "name a shaft with cranks")
@@ -70,7 +75,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
         bearing = Bearing(name, table.x or 0.0, size[0], size[1], table.friction, shafts[table.shaft])
         for placed in bearings:
             if name == placed.name:
-                raise Refused(f"{where}.name", name, "is the name of another bearing", "give each its own name")
+                raise Refused(f"{where}.name", name, "is already the name of another bearing", "give each its own name")
             reach = 0.5 * ((bearing.width or 0.0) + (placed.width or 0.0))
             if bearing.shaft == placed.shaft and abs(bearing.x - placed.x) <= reach:
                 rule, remedy = (
@@ -91,7 +96,7 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
     # throws must lie between bearings, except a single overhung throw and the two end cranks of an axle
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
-        raise Refused("main_bearings", None, rule, "give the shaft two bearings at least")
+        raise Refused("main_bearings", None, rule, "give the shaft at least two bearings")
     places, first, last = sorted({part.x for part in parts}), min(bearings), max(bearings)
     is_axle = len(bearings) == len(places) == 2 and places[0] < first and last < places[1]
     for part in parts if len(places) > 1 and not is_axle else ():

@@ -49,7 +49,7 @@ def engine_named(name: object, where: str) -> CatalogueEngine:
     engine = engines().get(name) if isinstance(name, str) else None
     if engine is None:
         remedy = nearest(str(name), list(engines()), "laufruhe engines lists them")
-        raise Refused(where, name, "is no engine of the catalogue", remedy)
+        raise Refused(where, name, "is not a key of an engine of the catalogue", remedy)
     return engine
 
 

@@ -67,7 +67,7 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
         return lacking
     first = list(complaints.values())[:MAX_COMPLAINTS]
     further = error.error_count() - len(errors) + len(complaints) - len(first)
-    summary = [Complaint("file", "", f"has {further} more such faults", "correct these first")] if further else []
+    summary = [Complaint("file", "", f"has {further} more keys with faults", "correct these first")] if further else []
     return (*first, *summary)
 
 

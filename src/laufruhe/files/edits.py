@@ -116,7 +116,7 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
         throws, k = tables.get("engine", {}).get("throws"), int(throw[1]) - 1
         if not isinstance(throws, list) or not 0 <= k < len(throws):
             remedy = "give values for all throws, or write them into the problem file first"
-            raise Refused(name, None, "names no numerical value of this problem", remedy)
+            raise Refused(name, None, "is not the name of a number of this problem", remedy)
         return "engine", "throws", k
     labelled = list(_named(tables))
     # names in results come before names of tables
@@ -140,7 +140,7 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
         for key, value in at(tables, keys).items()
         if key not in ("name", "mirror_of") and type(value) in (int, float, str, dict)
     ]
-    raise Refused(name, None, "names no numerical value of this problem", nearest(name, names or ["engine.stroke"]))
+    raise Refused(name, None, "is not the name of a number of this problem", nearest(name, names or ["engine.stroke"]))
 
 
 def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:

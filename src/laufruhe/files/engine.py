@@ -211,7 +211,7 @@ def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: boo
         for previous in parts[:k]:
             if part.faces(previous) and minimum_room(part, previous) <= 0.0:
                 rule = f"leaves no chamber between {part.name} and {previous.name}, because their pins meet"
-                raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
+                raise Refused("engine", None, rule, "move the cranks further apart, or shorten the rods")
     with errors_at_key("engine"):
         return with_shared_chambers(parts, cycle_of(table).angle) if gas else tuple(parts)
 
@@ -262,7 +262,7 @@ def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
     if order == []:
         raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
     if throws == []:
-        raise Refused("engine.throws", [], "names no throw", "give the angle of each throw")
+        raise Refused("engine.throws", [], "names no throw", "give the angle of each throw, as in [0, 180, 180, 0]")
     counts += [("firing_order", len(order))] if order is not None else []
     return counts + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
@@ -300,7 +300,9 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
         with errors_at_key("engine.rod"):
             rod = rod_of("rod", table.rod.model_dump(), rod_length, "crank pin")
         if table.rod_inertia_deficit != 0.0:
-            raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
+            raise Refused(
+                "engine.rod_inertia_deficit", None, "is given here and also follows from [engine.rod]", "keep one"
+            )
     plain = Mechanism(
         crank_radius=radius,
         rod_length=rod_length,
@@ -350,7 +352,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
     for k, shaft in enumerate(table.shafts):
         where = f"engine.shafts[{k + 1}]"
         if shaft.name in shafts:
-            raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
+            raise Refused(f"{where}.name", shaft.name, "is already the name of another shaft", "give each its own name")
         with errors_at_key(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
     # slider-cranks on one throw share the rotating mass of the throw
@@ -359,7 +361,12 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
     for k, part in enumerate(table.slider_cranks, 1):
         where = f"engine.slider_cranks[{k}]"
         if part.shaft not in shafts:
-            raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
+            raise Refused(
+                f"{where}.shaft",
+                part.shaft,
+                "is not the name of a shaft of this engine",
+                nearest(part.shaft, list(shafts)),
+            )
         overrides = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
         if part.rod_ratio is not None or part.rod_length is not None:
             overrides |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}

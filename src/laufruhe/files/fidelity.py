@@ -54,7 +54,9 @@ def with_fidelity(problem: Problem, table: FidelityTable) -> Problem:
         if value is None or value == "auto":
             continue
         if is_auto and option.is_decided:
-            raise Refused(f"fidelity.{option.key}", value, 'is chosen by kinematics = "auto"', "leave it out")
+            raise Refused(
+                f"fidelity.{option.key}", value, 'is chosen automatically if kinematics = "auto"', "leave it out"
+            )
         refused = option.refusal(problem, value)
         if refused is not None:
             raise Refused(f"fidelity.{option.key}", value, *refused)

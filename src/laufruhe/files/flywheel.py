@@ -86,7 +86,7 @@ def _rim(table: RimTable) -> Rim:
     hole = diameter.lower - height.upper
     if hole <= 0.0:
         text, remedy = units.quantity_text(height.upper, "m"), "make it less than the diameter"
-        raise Refused("flywheel.rim.height", text, "leaves no hole in the rim", remedy)
+        raise Refused("flywheel.rim.height", text, "leaves no hole in the rim of the flywheel", remedy)
     arms = None
     if table.arms is not None:
         if table.arms.hub_diameter >= hole:
@@ -115,5 +115,5 @@ def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia
     maximum = sum(Open.from_value(table.share).upper for table in tables)
     if maximum > 1.0 + _ROUNDING:
         rule = f"have shares with the sum {maximum:g}, more than the whole inertia"
-        raise Refused("geared_inertias", None, rule, "let shares and upper bounds of open shares sum to 1 at most")
+        raise Refused("geared_inertias", None, rule, "give shares of the geared inertias that add up to at most 1")
     return tuple(inertias), decisions

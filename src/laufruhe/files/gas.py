@@ -163,10 +163,14 @@ def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[
         rule = "does not suit gas chambers, which work once a turn"
         raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
     if any(not part.has_rod for part in parts):
-        raise Refused("gas.model", "chambers", "needs pistons, and a rotor has none", "use seiliger, wiebe or trace")
+        raise Refused(
+            "gas.model", "chambers", "needs pistons, but a rotary engine has none", "use seiliger, wiebe or trace"
+        )
     if any(part.faces(other_part) for part in parts for other_part in parts):
         rule = "has pistons that share a chamber, and each chamber of [gas] needs a cylinder head"
-        raise Refused("engine.layout", None, rule, "give each piston its own cylinder, or leave gas out")
+        raise Refused(
+            "engine.layout", None, rule, "give each piston its own cylinder, or use another gas model such as seiliger"
+        )
     chambers = tuple(_chamber(chamber_table, k, folder, parts) for k, chamber_table in enumerate(table.chambers, 1))
     require_distinct([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
     return chambers
@@ -177,7 +181,7 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
     diagrams = {key: table_of for key in ("steam", "pump", "trace") if (table_of := getattr(table, key)) is not None}
     if len(diagrams) != 1:
         rule = "has no pressure" if not diagrams else f"has several pressures: {' and '.join(diagrams)}"
-        raise Refused(where, None, rule, "give one of steam, pump and trace")
+        raise Refused(where, None, rule, "give the chambers one of the keys steam, pump and trace")
     ((key, diagram),) = diagrams.items()
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     for number in numbers:

@@ -160,7 +160,7 @@ class MeasureContext:
             shafts = shafts_of(self.engine)
             _check_known(names, shafts, f"{key}.of", "shaft")
             if not shafts:
-                raise Refused(key, name, "needs balancer shafts, and there are none", "add one, or leave it out")
+                raise Refused(key, name, "needs balancer shafts, and this engine has none", "add one, or leave it out")
         return measure
 
     def _check_keys(self, channel: Channel, table: QuantityTable, where: str) -> None:
@@ -168,7 +168,7 @@ class MeasureContext:
         for key in (*QuantityTable.model_fields, "of"):
             value = getattr(table, key, None)
             if value == []:
-                raise Refused(f"{where}.{key}", [], "is empty", "leave it out to count all")
+                raise Refused(f"{where}.{key}", [], "is empty", "remove this key to count all")
             if value is not None and key not in channel.keys:
                 wrong_value = value if key == "of" else None
                 raise Refused(f"{where}.{key}", wrong_value, _why_stray(key, channel), "leave it out")
@@ -181,7 +181,9 @@ class MeasureContext:
                 raise Refused(f"{where}.frequency", None, "is missing", remedy)
             if isinstance(table.frequency, Open):
                 rule = f"is open, and {channel} needs one frequency"
-                raise Refused(f"{where}.frequency", None, rule, f"{remedy}, or use the raw torque-roll residual")
+                raise Refused(
+                    f"{where}.frequency", None, rule, f"{remedy}, or use the measure raw torque-roll residual"
+                )
         base = self.engine.cycle.base_order
         for order in table.orders or ():
             # loads repeat with the cycle (C6)
@@ -202,8 +204,8 @@ class MeasureContext:
             raise Refused(
                 where,
                 measure.name,
-                "counts no part of this engine",
-                "add a counterweight or balancer shaft that it counts, or leave it out",
+                "counts the mass of no part of this engine",
+                "add a counterweight or balancer shaft to the engine, or remove this measure",
             )
         for rotor in counted:
             try:
@@ -249,19 +251,19 @@ def objectives_of(
     if tables is None:
         return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if context.engine.mounts else ()
     if not tables:
-        raise Refused("objective", [], "is empty", "leave it out, or add minimise")
+        raise Refused("objective", [], "is empty", 'remove it, or add minimise = "mount force"')
     if len(tables) > 1 and single:
         rule = f"needs a single objective, and there are {len(tables)}"
-        raise Refused(single[0], None, rule, "leave it out, or keep the first objective")
+        raise Refused(single[0], None, rule, "remove this key, or keep the first objective alone")
     ranks = []
     for k, table in enumerate(tables, 1):
         where, is_last = f"objective[{k}]" if len(tables) > 1 else "objective", k == len(tables)
         terms = _terms(table, context, where)
         if is_last and table.within is not None:
-            raise Refused(f"{where}.within", table.within, "is for all objectives but the last", "leave it out")
+            raise Refused(f"{where}.within", table.within, "is for all objectives except the last", "leave it out")
         if not is_last and len(terms) > 1:
             rule = "is a weighted sum, which only the last objective may be"
-            raise Refused(f"{where}.terms", None, rule, "put it last, or rank its parts")
+            raise Refused(f"{where}.terms", None, rule, "make this objective the last, or split it into several")
         if not is_last and "max" not in terms[0].measure.channel.sides:
             rule = "cannot be limited from above, so only the last objective may minimise it"
             raise Refused(f"{where}.minimise", terms[0].measure.name, rule, "put it last")
@@ -321,7 +323,7 @@ def _limit(table: ConstraintTable, where: str, context: MeasureContext) -> Limit
         for key in ("min", "max")
     )
     if not norm and "max" not in sides and low is not None and low > 1.0:
-        raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
+        raise Refused(f"{where}.min", table.min, "is a share of energy above 1", "give a share under 1")
     band = None
     if table.outside is not None:
         first, last = (_bound(text, measure, f"{where}.outside") for text in table.outside)

@@ -172,7 +172,9 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
     """
     if table is None or table.kind == "rigid":
         if block is not None:
-            raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
+            raise Refused(
+                "block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or remove [block]'
+            )
         return MountsInput(_rigid(table)) if table else MountsInput()
     if block is None:
         rule = "is missing, but elastic mounts need the mass and inertia of the block"
@@ -187,7 +189,7 @@ def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path)
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
     if bool(table.positions) == bool(table.places):
         state = "is missing" if not table.positions else "is given twice, as positions and as places"
-        raise Refused("mounts.positions", None, state, "give positions or [[mounts.places]], one of them")
+        raise Refused("mounts.positions", None, state, "give either positions or [[mounts.places]]")
     places = list(table.places) or [MountTable.model_construct(position=list(p)) for p in table.positions]
     names = table.names or [place.name or f"mount {k + 1}" for k, place in enumerate(places)]
     if len(names) != len(places):
@@ -209,8 +211,8 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
             raise Refused(
                 f"mounts.{prefix}relative_stiffness",
                 stiffness,
-                "is zero in every direction",
-                "give one direction a value above zero",
+                "is a stiffness of zero in every direction",
+                "give at least one direction a value above zero, such as 1",
             )
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
@@ -262,7 +264,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
     with errors_at_key("mounts"):
         loose = free_motion(elastic_mounting(block, mounts).modes)
     if loose:
-        remedy = "add a mount or a stiffness there; an open stiffness may need a start above zero"
+        remedy = "add a mount or a stiffness in this direction; an open stiffness may need a start above zero"
         raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
     return MountsInput(mounts, block, tuple(map(tuple, numbers.rows)), tuple(numbers.decisions))
 
@@ -272,7 +274,9 @@ def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
     laws: list[Dynamic] = []
     if (track := place.fluid_track) is not None:
         if track.bulge_stiffness == 0.0:
-            raise Refused(f"{where}.fluid_track.bulge_stiffness", None, "is zero, so no fluid moves", "give a value")
+            raise Refused(
+                f"{where}.fluid_track.bulge_stiffness", None, "is zero, so no fluid moves in the track", "give a value"
+            )
         axis = _AXES.index(track.axis)
         laws.append(FluidTrack(axis, track.mass, track.bulge_stiffness, track.chamber_stiffness, track.damping))
     if place.dynamic_stiffness is not None:
@@ -292,7 +296,9 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
     for k, (_, amount, second) in enumerate(rows, 1):
         if by_angle and not 0.0 <= second < 180.0:
             rule = f"has a loss angle of {second:g} deg in row {k}"
-            raise Refused(f"{where}.file", table.file, rule, "give loss angles from 0 to 180 deg, or set columns")
+            raise Refused(
+                f"{where}.file", table.file, rule, "give loss angles from 0 to 180 deg, or set the key columns"
+            )
         value = amount * np.exp(1j * math.radians(second)) if by_angle else complex(amount, second)
         values.append(complex(unit * value))
     with errors_at_key(f"{where}.file", table.file):
@@ -303,12 +309,14 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
 
 def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | None:
     if place.like is not None and place.mirror_of is not None:
-        raise Refused(f"{where}.like", place.like, "is given together with mirror_of", "keep one")
+        raise Refused(f"{where}.like", place.like, "is given, but this mount also has mirror_of", "keep one")
     leader = place.like or place.mirror_of
     if leader is None:
         return None
     number = _number_before(leader, names[:k], f"{where}.{'like' if place.like else 'mirror_of'}")
-    refuse_keys(place, _followed(place), where, f"is already taken from mount '{leader}'", "leave one out")
+    refuse_keys(
+        place, _followed(place), where, f"already follows from mount '{leader}', by like or mirror_of", "leave one out"
+    )
     return number
 
 
@@ -327,8 +335,10 @@ def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: st
     first = joins[_number_before(leader, names[:k], f"{where}.joined_to")]
     if names[first] != leader:
         remedy = f"name that one, '{names[first]}'"
-        raise Refused(f"{where}.joined_to", leader, "is joined to another mount itself", remedy)
-    refuse_keys(place, (_AT,), where, f"is already given by mount '{leader}'", "leave one out")
+        raise Refused(f"{where}.joined_to", leader, "is itself joined to another mount", remedy)
+    refuse_keys(
+        place, (_AT,), where, f"already follows from mount '{leader}', to which this one is joined", "leave one out"
+    )
     return first
 
 
@@ -381,10 +391,18 @@ def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple
     cases = []
     for k, table in enumerate(tables, 1):
         if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):
-            raise Refused(f"load_cases[{k}]", table.name, "has no load", "give times_weight, torque or force")
+            raise Refused(
+                f"load_cases[{k}]",
+                table.name,
+                "has no load",
+                "give the load case one of times_weight, torque and force",
+            )
         if table.place is not None and table.force is None:
             raise Refused(
-                f"load_cases[{k}].place", table.place, "has no force", "give the force, or leave out the place"
+                f"load_cases[{k}].place",
+                table.place,
+                "has no force",
+                "give the load case a force, or remove its position",
             )
         weight, force, place = (
             (three[0], three[1], three[2]) if three else (0.0, 0.0, 0.0)

@@ -39,7 +39,7 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
             raise Refused(key_path(place), node, f"cannot be left open: it {reason}", "give a number")
         if number is None:
             rule = "cannot be left open: it is a count, a name or a choice, not a physical number"
-            raise Refused(key_path(place), node, rule, "give a value, and compare others in a study")
+            raise Refused(key_path(place), node, rule, "give a fixed value, and compare other values in a study")
         open_number = read_number(replace(number, openable=True), place, node)
         assert isinstance(open_number, f.Open)
         drive = AddressDrive(place, number.unit)

@@ -130,7 +130,7 @@ class Brake:
             if len(readings) < FEWEST:
                 speed_text = units.quantity_text(speed, "rad/s")
                 rule = f"has {len(readings)} rows at {speed_text}, the speed of {where}, and a fit needs {FEWEST}"
-                raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")
+                raise Refused("friction.file", self.table.file, rule, "measure more loads at this speed")
             return willans_friction([row[1] for row in readings], [row[2] for row in readings])
 
 
@@ -156,7 +156,7 @@ def operating_points(
                 points.append(OperatingPoint(f"{name}{suffix}", speed, load, share))
     if len(points) > MAX_POINTS:
         rule = f"makes {len(points)} operating points, more than {MAX_POINTS}"
-        raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
+        raise Refused("operating_points", None, rule, "use fewer steps, or sweep the speed in a study")
     require_distinct([p.name for p in points], "operating_points", "operating points have one name")
     return tuple(points)
 
@@ -165,17 +165,24 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
     """Return the speeds of a table [rad/s]: one, or equal steps over a range."""
     require_one_of(table, where, "speed", "mean_piston_speed")
     if table.speed is None and stroke is None:
-        raise Refused(f"{where}.mean_piston_speed", None, "means nothing without pistons", "give the speed")
+        raise Refused(
+            f"{where}.mean_piston_speed",
+            None,
+            "is a mean piston speed, and this engine has no pistons",
+            "give the speed",
+        )
     # c_m = 2 s n (Roetscher eq. 290)
     first = math.pi * (table.mean_piston_speed or 0.0) / (stroke or 1.0) if table.speed is None else table.speed
     if table.up_to is None and table.steps is None:
         return (first,)
     if table.up_to is None or table.steps is None:
         missing = "up_to" if table.up_to is None else "steps"
-        raise Refused(f"{where}.{missing}", None, "is missing", "give up_to and steps for a range, or neither")
+        raise Refused(
+            f"{where}.{missing}", None, "is missing", "give both up_to and steps for a range of speeds, or neither"
+        )
     if table.up_to <= first:
         value = units.quantity_text(table.up_to, "rad/s")
-        raise Refused(f"{where}.up_to", value, "does not lie above the first speed", "give a higher one")
+        raise Refused(f"{where}.up_to", value, "is not above the first speed of the range", "give a higher one")
     return tuple(first + (table.up_to - first) * k / (table.steps - 1) for k in range(table.steps))
 
 
@@ -192,7 +199,9 @@ def _loads(
         remedy = "add [friction], which gives the loss between gas and brake"
         raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", remedy)
     if table.motored or not table.gas:
-        raise Refused(f"{where}.{keys[0]}", None, "needs combustion at this operating point", "leave it out")
+        raise Refused(
+            f"{where}.{keys[0]}", None, "needs combustion at this operating point", "remove this load, or motored"
+        )
     bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
     lowest, middle, largest = brake.indicated(bmep, speed, name)
     if lowest == largest:
@@ -203,12 +212,17 @@ def _loads(
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:
     if table.motored and table.imep is not None:
         rule = "is given for a motored point, which has no combustion"
-        raise Refused(f"{where}.imep", None, rule, "leave imep or motored out")
+        raise Refused(f"{where}.imep", None, rule, "remove imep or motored")
     if not table.gas:
         return None
     if not table.motored and table.imep is None:
         return gas
     if not isinstance(gas, Seiliger | Wiebe):
         key = "motored" if table.motored else "imep"
-        raise Refused(f"{where}.{key}", None, "needs [gas] with model seiliger or wiebe", "give that, or leave it out")
+        raise Refused(
+            f"{where}.{key}",
+            None,
+            "needs [gas] with model seiliger or wiebe",
+            "give [gas] such a model, or remove this key",
+        )
     return motored_cycle(gas, cycle) if table.imep is None else replace(gas, imep=table.imep)

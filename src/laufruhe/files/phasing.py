@@ -87,7 +87,9 @@ def open_phasing(
     counts = [count for _, count in cylinder_counts(engine)]
     counts += [len(engine.slider_cranks)] if engine.kind.is_free else []
     if not counts:
-        raise Refused("engine.cylinders", None, "is missing, and open throws do not give the number", "add it")
+        raise Refused(
+            "engine.cylinders", None, "is missing, and open throws do not determine the number of cylinders", "add it"
+        )
     cycle, count, bounds = cycle_of(engine), counts[0], None
     if isinstance(engine.throws, list) and engine.listed_throws is None:
         bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
@@ -135,7 +137,7 @@ def open_phasing(
     if phasing.continuous and problem.fidelity.is_uneven:
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
         rule = "makes the crank speed uneven, and uneven throws are optimised at even speed only"
-        raise Refused("fidelity.crank_inertia", inertia, rule, "leave it out, or fix the throws")
+        raise Refused("fidelity.crank_inertia", inertia, rule, "remove this key, or fix the throws")
     if engine.kind.fires_evenly and problem.depends_on_firing_order:
         rule = f"cannot be open in layout '{engine.layout}' while a measure is of a load inside the crankcase"
         raise Refused("engine.throws", None, rule, "fix the throws, or measure loads on the block")
@@ -172,7 +174,7 @@ def _intervals(table: IntervalsTable | None, engine: EngineTable, cycle: Cycle, 
         return Intervals(0.0, cycle.angle) if is_free else Intervals(even - spread, even + spread)
     deviation = table.largest_deviation
     if table.min is None and table.max is None and deviation is None:
-        raise Refused("phasing.intervals", None, "is empty", "give min, max or largest_deviation")
+        raise Refused("phasing.intervals", None, "is empty", "give phasing.intervals min, max or largest_deviation")
     low = table.min if table.min is not None else 0.0
     high = table.max if table.max is not None else cycle.angle
     if deviation is not None:
@@ -205,7 +207,7 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
     for key in ("most_shafts", "most_shaft_mass"):
         if getattr(table, key) is not None and not sets:
             rule = "limits optional shafts, and there are none"
-            raise Refused(f"phasing.{key}", None, rule, "set optional = true on a shaft")
+            raise Refused(f"phasing.{key}", None, rule, "set optional = true in a [[balancer_shafts]] table")
     return ShaftChoice(
         tuple(tuple(shaft.name for shaft in group) for group in sets),
         tuple(sum(shaft.shaft_mass for shaft in group) for group in sets),
@@ -235,7 +237,9 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     # the layout refuses a count that is no multiple
     throws, remainder = divmod(count, kind.cylinders_per_throw)
     if isinstance(engine.throws, list) and not remainder and len(engine.throws) != throws:
-        raise Refused("engine.throws", None, f"has {len(engine.throws)} of {throws} throws", "make the numbers agree")
+        raise Refused(
+            "engine.throws", None, f"has angles for {len(engine.throws)} of {throws} throws", "make the numbers agree"
+        )
     check_order(phasing.firing_order, count)
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         rule = "allows even firing alone, and throws between bounds fire unevenly"

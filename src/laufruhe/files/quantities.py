@@ -96,7 +96,7 @@ def _follower(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> 
         number = None
     if number is None or isinstance(number, Mapping | list):
         rule = f"must be a number, because it follows from quantities.{name}"
-        raise Refused(key_path(place), number, rule, "give a number, or leave the quantity out")
+        raise Refused(key_path(place), number, rule, "give a number, or remove it from [quantities]")
     value = read_number(f.Number(unit), place, number)
     assert isinstance(value, float)
     return value

@@ -127,7 +127,7 @@ def display_path(path: Path) -> Path:
 def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
         rule = "need fixed throws, but engine.throws is open"
-        raise Refused("geared_inertias", None, rule, "fix the throws, or leave geared_inertias out")
+        raise Refused("geared_inertias", None, rule, "fix the throws, or remove [[geared_inertias]]")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
@@ -174,7 +174,7 @@ def tables_of(path: Path) -> dict[str, Any]:
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
     except IsADirectoryError:
-        raise refused("file", "", "is a folder", "name a problem file in it", path) from None
+        raise refused("file", "", "is a folder", "name a problem file inside this folder", path) from None
     except FileNotFoundError:
         raise refused("file", "", "does not exist", nearest_file(path, "check the path"), path) from None
     except OSError as error:
@@ -289,7 +289,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
         return None
     if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):
         remedy = "give an operating point bmep or brake_torque, or leave [friction] out"
-        raise Refused("friction", None, "is used by no operating point", remedy)
+        raise Refused("friction", None, "is given, but no operating point uses it", remedy)
     if any(part.swept.piston.bore is None for part in cylinders):
         raise Refused("engine.bore", None, "is missing, and a load at the brake needs the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
@@ -300,12 +300,14 @@ def _check_decisions(problem: Problem) -> None:
     decisions, without_effect = problem.decisions, "is open but has no effect in this engine"
     if len(decisions) > MAX_OPEN:
         remedy = "fix some numbers, or couple some to others"
-        raise Refused(decisions[MAX_OPEN].name, None, f"is open in addition to {MAX_OPEN} other numbers", remedy)
+        raise Refused(decisions[MAX_OPEN].name, None, f"is open, but at most {MAX_OPEN} numbers can be open", remedy)
     for decision in decisions:
         if not decision.has_effect:
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
     if decisions and not problem.objective:
-        raise Refused("objective", None, "is missing while numbers are open", "add [objective] with minimise")
+        raise Refused(
+            "objective", None, "is missing, but numbers of the file are open", "add [objective] with minimise"
+        )
     as_given, names = (problem.engine, problem.points, problem.mount_numbers), [point.name for point in problem.points]
     for decision in decisions:
         drawings = list[Drawing]()
@@ -316,4 +318,6 @@ def _check_decisions(problem: Problem) -> None:
             raise Refused(decision.name, None, without_effect, "fix or leave it out")
         if any([point.name for point in drawing.points] != names for drawing in drawings):
             rule = f"is open and changes the speeds that name the operating points ({', '.join(names)})"
-            raise Refused(decision.name, None, rule, "give each operating point a name, and leave up_to out")
+            raise Refused(
+                decision.name, None, rule, "list the operating points one by one, each with a name and without up_to"
+            )

@@ -96,7 +96,7 @@ class RotorList:
     def add(self, rotor: Rotor, where: str) -> None:
         """Add a rotor; raise `Refused` at the key `where` if its name is in use."""
         if any(other.name == rotor.name for other in self.rotors):
-            raise Refused(where, rotor.name, "is the name of another unbalance", "give each its own name")
+            raise Refused(where, rotor.name, "is already the name of another unbalance", "give each its own name")
         self.rotors.append(rotor)
 
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
@@ -186,18 +186,18 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
 def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
     if number > len(pins):
         name = pins[0].shaft.name if pins else CRANKSHAFT.name
-        raise Refused(where, number, f"is no throw, the {name} has {len(pins)}", "count them from the front")
+        raise Refused(where, number, f"is no throw, the {name} has {len(pins)}", "count throws from 1 at the front")
     return pins[number - 1]
 
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
     reference, x = 0.0, None if table.x is None else Open.from_value(table.x).start
-    refuse_keys(table, ("throws",), where, "is for balance_factor only", "use opposite_throw")
+    refuse_keys(table, ("throws",), where, "is only for counterweights with balance_factor", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
         reference, x = pin.angle + math.pi, pin.x if x is None else x
     if x is None:
-        raise Refused(f"{where}.x", None, "is missing", "give its place, or opposite_throw")
+        raise Refused(f"{where}.x", None, "is missing", "give the counterweight a position, or opposite_throw")
     shaft = pins[0].shaft if pins else CRANKSHAFT
     _place(Rotor(table.name, x, 0j, shaft, radius=table.radius), table, reference, where, into)
     into.move(f"{table.name}.x", [table.name], 0, table.x)
@@ -209,7 +209,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
     for k, table in enumerate(tables):
         where = f"balancer_shafts[{k + 1}]"
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
-            raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
+            raise Refused(f"{where}.name", table.name, "is already the name of another shaft", "give each its own name")
         with errors_at_key(f"{where}.ratio"):
             shaft = Shaft(table.name, table.ratio, *(Open.from_value(place).start for place in table.position))
         for j, unbalance in enumerate(table.unbalances):
@@ -238,7 +238,12 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     leaders = {rotor.name: rotor for rotor in into.rotors if rotor.role is Role.BALANCER}
     if coupled.to not in leaders:
         remedy = nearest(coupled.to, list(leaders)) if leaders else "define the other one first"
-        raise Refused(f"{where}.coupled.to", coupled.to, "is no unbalance defined before this one", remedy)
+        raise Refused(
+            f"{where}.coupled.to",
+            coupled.to,
+            "is not the name of an unbalance that stands before this one in the file",
+            remedy,
+        )
     leader = leaders[coupled.to]
     sign, mirrored = _HOW[coupled.how]
     value = sign * (leader.unbalance.conjugate() if mirrored else leader.unbalance)
@@ -256,7 +261,7 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
     key, size, gain = "unbalance", Open.from_value(table.unbalance), 1.0
     if table.mass is not None:
         if table.radius is None:
-            raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
+            raise Refused(f"{where}.radius", None, "is missing, but an unbalance given by its mass needs it", "add it")
         key, size, gain = "mass", Open.from_value(table.mass), table.radius
     angle, direction = Open.from_value(table.angle), gain * cis(as_turn(reference))
     start = size.start * cis(as_turn(angle.start))
@@ -274,7 +279,7 @@ def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
         raise Refused(f"{where}.angle", None, rule, remedy)
     if size.lower > 0.0:
         smallest, remedy = units.quantity_text(size.lower, _UNITS[key]), "let the size start at zero, or fix the angle"
-        raise Refused(f"{where}.{key}", smallest, "is a smallest size above zero while the angle is open", remedy)
+        raise Refused(f"{where}.{key}", smallest, "is a lower bound above zero, but the angle is open", remedy)
     low, high = angle.bounds
     if high - low >= math.tau * (1.0 - 1e-9):
         return Sector(size.upper, (low, low + math.tau))

@@ -100,7 +100,7 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
         options = _options(node)
         if part not in options:
             remedy = _remedy(tables, node, parts, k)
-            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this problem", remedy)
+            raise Refused(".".join(parts[: k + 1]), None, "is not the path of a quantity of this problem", remedy)
         keys.append(options[part])
         node = node[options[part]]
     return tuple(keys)
@@ -201,7 +201,7 @@ def axis_of(sweep: SweepTable) -> SweepAxis:
         values, key = tuple(sweep.values), "values"
     if len(values) < 2:
         rule = "holds one value, which is no sweep" if values else "is empty"
-        raise Refused(key, list(values), rule, "give two values or more, or leave the sweep out")
+        raise Refused(key, list(values), rule, "give at least two values, or remove the sweep")
     unit, numbers = _measured(sweep.quantity, values, key)
     # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
     if len(set(numbers if numbers is not None else map(str, values))) < len(values):
@@ -248,12 +248,12 @@ def _span(quantity: str, first: Value, last: Value, spacing: str | None) -> Span
     unit, numbers = _measured(quantity, (first, last), "from")
     if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
         remedy = "write its whole path, such as operating_points.1.speed"
-        raise Refused("quantity", quantity, "is no number of a problem file", remedy)
+        raise Refused("quantity", quantity, "is not the path of a number in the problem file", remedy)
     if numbers is None:
         raise Refused("from", first, "is no number", "list the labels under values")
     low, high = numbers
     if low >= high:
-        raise Refused("from", first, "does not lie below to", "write the smaller end first")
+        raise Refused("from", first, "does not lie below to", "write the smaller end of the range first")
     if spacing == "log" and low <= 0.0:
         raise Refused("from", first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
     is_text = isinstance(first, str) and (unit != "1" or _is_limit(quantity))
@@ -275,7 +275,9 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
     with np.errstate(all="ignore"):
         numbers = (np.geomspace if span.is_log else np.linspace)(span.low, span.high, sweep.points)
     if not np.isfinite(numbers).all():
-        raise Refused("to", sweep.last, "is too far from the other end", "narrow the sweep")
+        raise Refused(
+            "to", sweep.last, "is too far from the other end of the range for equal steps", "narrow the sweep"
+        )
     texts = [f"{number:.{_DIGITS}g}" for number in numbers]
     if not span.is_text:
         return tuple(map(float, texts))

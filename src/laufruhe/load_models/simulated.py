@@ -48,7 +48,7 @@ def simulated_measures(problem: Problem) -> tuple[Measure, ...]:
     """
     measures = [m for m in problem.measures if m.channel.simulation and m not in problem.known_rows]
     if len({measure.channel.simulation for measure in measures}) > 1:
-        raise ModelError("channels of two simulations are asked together; ask for those of one")
+        raise ModelError("objective and limits need two different simulations in time; use quantities of one of them")
     return tuple(dict.fromkeys(measures))
 
 

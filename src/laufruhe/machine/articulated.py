@@ -168,7 +168,9 @@ class ArticulatedCrank(SliderCrank):
     @property
     def big_end_area(self) -> float:
         """Projected area of the pin, which is unknown for a knuckle pin."""
-        raise ModelError(f"{self.name} works on a knuckle pin, whose area is not told; ask for the crank-pin force")
+        raise ModelError(
+            f"{self.name} works on a knuckle pin of unknown area, so its pressure is not known; use the crank-pin force"
+        )
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
         """Return the motion of piston, rod and knuckle pin, less the mass that is counted at the crank pin."""

@@ -45,7 +45,7 @@ class Block:
         small, middle, large = np.linalg.eigvalsh(tensor)
         if small <= 0.0:
             raise ModelError(
-                f"the block's inertia tensor has a principal moment of {small:.4g} kg m2, no body has that; "
+                f"the block's inertia tensor has a principal moment of {small:.4g} kg m2, which must be positive; "
                 "check the products of inertia and their sign"
             )
         if large > (small + middle) * (1.0 + _SLACK):
@@ -58,7 +58,7 @@ class Block:
         if not 0.0 <= self.turning_inertia < still * (1.0 - _SLACK):
             raise ModelError(
                 f"turning_inertia {self.turning_inertia:.4g} kg m2 must not be negative, and less than the "
-                f"{still:.4g} kg m2 with which the block resists a roll; it is a part of inertia"
+                f"{still:.4g} kg m2 with which the block resists a roll; turning_inertia is a part of inertia"
             )
 
     @property

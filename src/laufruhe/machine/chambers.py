@@ -127,7 +127,7 @@ class Chambers:
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")
         if not self.chambers:
-            raise ModelError("there is no chamber; list one at least")
+            raise ModelError("the gas model has no chamber; list at least one")
 
     def of(self, part: SliderCrank) -> tuple[Chamber, ...]:
         """Return the chambers on the rod of a slider-crank."""

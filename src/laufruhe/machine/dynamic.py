@@ -40,9 +40,11 @@ class FluidTrack:
 
     def __post_init__(self) -> None:
         if not (self.mass > 0.0 and self.bulge > 0.0):
-            raise ModelError("a fluid track needs a mass and a bulge stiffness above zero")
+            raise ModelError("the fluid track of a hydraulic mount needs a mass and a bulge stiffness above zero")
         if not (self.stiffness >= 0.0 and self.damping >= 0.0):
-            raise ModelError("a fluid track has no negative stiffness or damping")
+            raise ModelError(
+                "the fluid track of a hydraulic mount has a negative stiffness or damping; give zero or more"
+            )
 
     @property
     def static(self) -> float:
@@ -68,14 +70,16 @@ class MeasuredStiffness:
     def __post_init__(self) -> None:
         rising = all(a < b for a, b in zip(self.omegas, self.omegas[1:], strict=False))
         if not self.omegas or len(self.omegas) != len(self.values) or not rising or self.omegas[0] < 0.0:
-            raise ModelError("frequencies of a measured stiffness have to rise from zero or more")
+            raise ModelError(
+                "the frequencies of a measured mount stiffness must rise, from zero or more; sort the rows"
+            )
         for omega, value in zip(self.omegas, self.values, strict=True):
             if not (math.isfinite(value.real) and value.imag >= 0.0):
                 raise ModelError(
-                    f"at {omega / math.tau:.4g} Hz a measured stiffness gains work; its loss is under zero"
+                    f"at {omega / math.tau:.4g} Hz a measured mount stiffness has a negative loss; correct this row"
                 )
         if not self.values[0].real >= 0.0:
-            raise ModelError("a measured stiffness is negative at rest; its first row has to be zero or more")
+            raise ModelError("a measured mount stiffness is negative at rest; give its first row zero or more")
 
     @property
     def static(self) -> float:

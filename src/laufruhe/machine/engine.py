@@ -116,7 +116,7 @@ class Engine:
         for part in self.slider_cranks:
             place = (part.shaft.y, part.shaft.z, part.x, direction(part.bank))
             if place in places:
-                raise ModelError(f"{part.name} stands in the place of {places[place]}; move one of them")
+                raise ModelError(f"{part.name} has the same position as {places[place]}; move one of them")
             places[place] = part.name
         for shaft in self.shafts:
             if not _returns(shaft.ratio, self.cycle.turns):

@@ -117,7 +117,7 @@ def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tu
                         "-1; leave [gas] out"
                     )
                 if part.bore != other.bore:
-                    raise ModelError(f"{both} and have two bores; give them one")
+                    raise ModelError(f"{both} and have different bores; give both the same bore")
                 pistons[k] = replace(part, facing=Facing(other.crank_radius, other.rod_length, ahead))
     return tuple(pistons)
 

@@ -79,7 +79,9 @@ class Rim:
         The rim carries none of its own pull.
         """
         if self.arms is None:
-            raise ModelError("a flywheel without arms has no stress in them")
+            raise ModelError(
+                "the flywheel has no arms, so there is no arm stress; give flywheel.rim arms, or use the rim stress"
+            )
         arms, radius = self.arms, 0.5 * self.mean_diameter
         pull = self.mass * (speed**2 * radius / arms.count + 0.5 * GRAVITY)
         (rim_width, rim_depth), (hub_width, hub_depth) = arms.at_rim, arms.at_hub

@@ -180,4 +180,4 @@ def check_pressures(gas: object, *names: str) -> None:
 
 def _check_imep(imep: float) -> None:
     if not math.isfinite(imep):
-        raise ModelError(f"imep {imep} must be finite; give the mean pressure wanted")
+        raise ModelError(f"imep {imep} must be finite; give a mean pressure such as 9 bar")

@@ -151,9 +151,11 @@ class GearedInertia:
 
     def __post_init__(self) -> None:
         if self.ratio == 0.0:
-            raise ModelError(f"geared inertia '{self.name}' has ratio 0: it stands still, so it has no effect")
+            raise ModelError(f"geared inertia '{self.name}' has ratio 0: it stands still; give a ratio such as 2 or -1")
         if not 0.0 <= self.share <= 1.0:
-            raise ModelError(f"geared inertia '{self.name}' has a share of {self.share:g}; it lies between 0 and 1")
+            raise ModelError(
+                f"geared inertia '{self.name}' has a share of {self.share:g}; give a share between 0 and 1"
+            )
 
 
 _GRADE = re.compile(r"^\s*G\s*(\d+\.?\d*|\.\d+)\s*$")

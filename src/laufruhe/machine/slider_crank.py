@@ -132,7 +132,9 @@ class SliderCrank:
         if self.reciprocating_mass < 0.0 or self.rotating_mass < 0.0:
             raise ModelError(f"{self.name}: masses must not be negative")
         if math.isinf(self.rod_length) and self.offset != 0.0:
-            raise ModelError(f"{self.name}: an offset means nothing with an infinite rod")
+            raise ModelError(
+                f"{self.name}: an offset has no effect with an infinite rod (Scotch yoke); set the offset to 0"
+            )
         if self.rod_ratio + abs(self.offset_ratio) >= 1.0:
             raise ModelError(
                 f"{self.name}: the crank cannot turn, (r + |e|) / l = "

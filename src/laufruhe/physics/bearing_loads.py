@@ -75,7 +75,7 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
     """
     for part in engine.slider_cranks:
         if not part.has_rod:
-            raise ModelError(f"{part.name} has no rod that leans on a cylinder wall; ask for the crank-pin force")
+            raise ModelError(f"{part.name} has no rod that leans on a cylinder wall; use the crank-pin force")
     forces = _of_parts(_of_piston_pin, engine, point, fidelity)
     if (carried := _carried(engine.slider_cranks)) is None:
         return forces
@@ -98,7 +98,7 @@ def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidel
 
 def _check_even(fidelity: Fidelity) -> None:
     if fidelity.is_uneven:
-        raise ModelError("bearing loads are modelled at even crank speed; leave crank_inertia out")
+        raise ModelError("bearing loads are modelled at constant crank speed; remove fidelity.crank_inertia")
 
 
 def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -187,7 +187,7 @@ def _pin_load(
 ) -> Spectrum:
     """Return a reaction to the masses and the gas of one cylinder, shape (n, d) (B1, B2)."""
     if not part.has_pin_loads:
-        raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
+        raise ModelError(f"{part.name}: loads of its rod are not modelled; use forces on the block or the mounts")
     ratio = part.shaft.ratio
     series = _inertia_orders(part, fidelity, reaction) * (ratio * speed) ** 2
     moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
@@ -291,7 +291,7 @@ def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
     if not len(places):
         return shares
     if len(x) < 2:
-        raise ModelError("a shaft that is loaded needs two main bearings at least; add one")
+        raise ModelError("a loaded shaft needs at least two main bearings; add one in [[main_bearings]]")
     columns = np.arange(len(places))
     first = np.clip(np.searchsorted(x, places, side="right") - 1, 0, len(x) - 2)
     far = (np.asarray(places) - x[first]) / (x[first + 1] - x[first])

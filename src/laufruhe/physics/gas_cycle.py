@@ -56,7 +56,7 @@ def check_chamber(gas: GasModel, part: SliderCrank) -> None:
     if isinstance(gas, Charge) and gas.compression_ratio > part.largest_ratio:
         raise ModelError(
             f"{gas.compression_ratio:g} leaves {part.name} no chamber, whose shape allows "
-            f"{part.largest_ratio:.4g} at most; lessen it, or the eccentricity"
+            f"{part.largest_ratio:.4g} at most; reduce the compression ratio, or the eccentricity"
         )
 
 

@@ -78,7 +78,9 @@ def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
         raise ModelError("the fuel does not rise with the load; check the columns")
     friction = intercept / slope
     if friction <= 0.0:
-        raise ModelError("the line through the fuel has no friction: it meets no fuel at a driving load; check it")
+        raise ModelError(
+            "the line of fuel over load gives no friction, because it has no fuel at a load above zero; check the fuel"
+        )
     # d(a / b) = da / b - a db / b^2
     by = np.array([1.0, -friction]) / slope
     return Friction(friction, math.sqrt(max(float(by @ covariance @ by), 0.0)))
@@ -89,7 +91,9 @@ def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: flo
     intercept, slope, covariance = _line(speeds, drag, "speed")
     friction, by = intercept + slope * speed, np.array([1.0, speed])
     if friction <= 0.0:
-        raise ModelError("the line through the motoring pressures has no friction at this speed; check it")
+        raise ModelError(
+            "the line of motoring pressure over speed gives no friction at this speed; check the pressures"
+        )
     return Friction(friction, math.sqrt(max(float(by @ covariance @ by), 0.0)))
 
 

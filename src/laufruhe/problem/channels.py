@@ -490,7 +490,7 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
     def signal_of_mounts(loads: PointLoads) -> Spectrum:
         spectrum = signal(loads)
         if spectrum is None:
-            raise ValueError(f"these mounts have no {name}")
+            raise ValueError(f"the mounts of this engine have no {name}, because they are rigid or missing")
         return spectrum
 
     return LoadChannel(

@@ -181,7 +181,9 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
         If the engine stands on rigid mounts, or on none.
     """
     if any(design.engine.block is None or not design.engine.mounts for design in designs.values()):
-        raise ModelError("has no natural modes; give [block] and elastic [mounts]", "mounts")
+        raise ModelError(
+            "stands on no elastic mounts, so it has no natural modes; give [block] and elastic [mounts]", "mounts"
+        )
     modes = [mounting_in(design.engine).modes for design in designs.values()]
     motion = CurveAxis("motion", tuple(MOTIONS))
     fields = (

@@ -301,5 +301,5 @@ def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderC
 def radius_of(rotor: Rotor) -> float:
     """Return the radius of a rotor [m]; `ModelError` if it is missing."""
     if rotor.radius is None:
-        raise ModelError(f"'{rotor.name}' needs a radius, because its mass counts; add radius")
+        raise ModelError(f"'{rotor.name}' needs a radius, because a measure counts its mass; add the key radius")
     return rotor.radius

@@ -106,7 +106,7 @@ def read_result(path: str | Path) -> SavedResult:
         If the file is missing, or is not such a result.
     """
     if not isinstance(path, str | Path):
-        raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json")
+        raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json file")
     place = Path(path)
     place = place / RESULT if place.is_dir() else place
     try:

@@ -68,7 +68,9 @@ def solve_decomposed(problem: Problem, solve: Solve) -> Result:
     for part in parts.values():
         if part.decisions and not part.objective:
             name = part.decisions[0].name.split(".")[0]
-            raise ModelError(f"{name} is open, but no objective term depends on it; add one, or fix it")
+            raise ModelError(
+                f"{name} is open, but no objective term depends on this number; add such a term, or fix the number"
+            )
     by_group = {group: solve(part) for group, part in parts.items() if part.decisions or part.objective or part.limits}
     results = list(by_group.values())
     for result in results:

@@ -313,7 +313,7 @@ def refuse(problem: Problem) -> None:
     kinds = open_kinds(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError(
-            "fidelity.mounts and fidelity.modes depend on mounts, which are open; remove them from [fidelity]"
+            "fidelity.mounts and fidelity.modes depend on mounts, which are open; remove both keys from [fidelity]"
         )
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError(

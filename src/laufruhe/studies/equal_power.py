@@ -43,9 +43,11 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     """
     cylinders = problem.engine.slider_cranks
     if problem.engine.block is not None:
-        raise ModelError("the rules of equal power do not cover a block and its springs; leave equal_power_to out")
+        raise ModelError("equal_power_to cannot scale a block on elastic mounts; remove equal_power_to")
     if len({(part.crank_radius, part.bore) for part in cylinders}) > 1:
-        raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
+        raise ModelError(
+            "cylinders differ in bore or stroke, so no common scale gives equal power; give all the same size"
+        )
     scale, phasing = equal_power_scale(len(cylinders), reference_cylinders), problem.phasing
     k, m = scale.length, scale.mass
 

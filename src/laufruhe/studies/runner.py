@@ -77,7 +77,7 @@ def run(
                     where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
                     rule = f"'{todo[mark][1]}' had other files, another Laufruhe or other libraries {where}"
                     remedy = "install the same versions and files everywhere, and the same command goes on"
-                    raise SolverError(f"{rule}, so its answer is not kept; {remedy}")
+                    raise SolverError(f"{rule}, so the result of this point is not kept; {remedy}")
                 try:
                     store[mark].keep(mark, answer.seconds, answer.record)
                 except OSError as error:

@@ -52,7 +52,9 @@ class Sampled(Part):
         names = [(case, problem_files.problem(Point(case)).objective_name) for case in self.cases]
         for case, name in names:
             if not name:
-                raise problem_files.refused(case, "objective", "is missing, so there is nothing to compare", "give one")
+                raise problem_files.refused(
+                    case, "objective", "is missing, so the draws have no number to compare", "give one"
+                )
             if name != names[0][1]:
                 rule = f"is {name} in '{case.name}' and {names[0][1]} in '{names[0][0].name}'"
                 raise problem_files.refused(case, "objective", rule, "give each its own part")

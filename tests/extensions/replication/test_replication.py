@@ -270,7 +270,7 @@ def test_second_order_couple_of_five_cylinders(worth: Callable[..., Any]) -> Non
 
 
 @pytest.mark.parametrize(("panel", "said"), [
-    ({"curves": [{"y": "mean['one']"}]}, "'mean['one']' has no dimension to be drawn over; give x"),
+    ({"curves": [{"y": "mean['one']"}]}, "'mean['one']' has no dimension for the horizontal axis; give the curve an x"),
     ({"curves": [{"y": "each['one']", "x": "[1, 2, 3]"}]}, "shape mismatch"),
     ({"curves": [{"y": "'text'", "x": "1"}]}, "panel 1 cannot be drawn: could not convert"),
     ({"words": [{"x": "each['one']", "y": 0, "text": "t"}]}, "'each['one']' is no single number"),
@@ -317,5 +317,5 @@ def test_what_is_allowed_is_a_number_or_a_share(within: str) -> None:
 @pytest.mark.parametrize("like", ["a", "b", ["a"], 3])
 def test_a_problem_like_itself_is_refused_before_anything_is_computed(like: Any) -> None:
     part = _part(problems={"a": {"like": "b"}, "b": {"like": like}}, cases=[{"name": "c", "problem": "a"}])
-    with pytest.raises(ModelError, match="refers to itself by `like`, or `like` is no name; correct `like`"):
+    with pytest.raises(ModelError, match="refers to itself by `like`, or its `like` is not a name; correct `like`"):
         part.points(ProblemFiles(PROBLEMS))

@@ -112,7 +112,7 @@ def test_order_of_the_file_does_not_matter(read: Read) -> None:
 @pytest.mark.parametrize(
     ("more", "rule"),
     [
-        ("[assembly]\n", "no parts to choose among"),
+        ("[assembly]\n", "names no file of parts"),
         ('[assembly]\npistons = "none.csv"\n', "cannot be read"),
         ('[assembly]\npistons = "p.csv"\nmass_unit = "mm"\n', "not a unit of a mass"),
         ('[assembly]\nrods = "r.csv"\n', "has 2 parts for 3 cylinders"),

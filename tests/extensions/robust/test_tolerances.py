@@ -146,11 +146,11 @@ def test_grades(tmp_path: Path) -> None:
     ("words", "more", "rule"),
     [
         (" ±", "", "tolerance sign without a tolerance"),
-        (" ± two", "", "not a number of the same kind"),
-        (" ± 2 mm", "", "not a number of the same kind"),
-        (" ± 120 %", "", "whole number or more"),
-        (" ± 1.3 kg", "", "whole mass or more"),
-        (" ± 2 % normal uniform", "", "two laws"),
+        (" ± two", "", "unit does not fit the number"),
+        (" ± 2 mm", "", "unit does not fit the number"),
+        (" ± 120 %", "", "is a tolerance of 100 % or more"),
+        (" ± 1.3 kg", "", "100 % of the mass or more"),
+        (" ± 2 % normal uniform", "", "two distributions"),
         (" ± -1 %", "", "negative"),
         ("", '[robust]\nover = "worst case"\n', "has no tolerances"),
         (" ± 1 %", '[robust]\nover = "95"\n', "neither the worst case nor a share"),
@@ -184,7 +184,7 @@ def test_several_objectives_are_refused(tmp_path: Path) -> None:
 def test_without_robust_it_is_checked_and_leaves_no_trace() -> None:
     plain = load(TEXT.format(" ± 25 g") + MOUNTS)
     assert plain == load(TEXT.format("") + MOUNTS)
-    with pytest.raises(InputError, match="whole mass or more"):
+    with pytest.raises(InputError, match="100 % of the mass or more"):
         load(TEXT.format(" ± 2 kg") + MOUNTS)
 
 

@@ -285,10 +285,14 @@ class TestApexes:
         ('"105 mm"', '"45 mm"', "engine.rotor_radius = 45 mm: does not let the rotor turn"),
         ('"80 mm"', '"0 mm"', "engine.rotor_width"),
         ("compression_ratio = 9.4", "compression_ratio = 19", "gas.compression_ratio: 19 leaves rotor 1 no chamber"),
-        ('"four-stroke"  ', '"two-stroke"  ', 'engine.cycle = "two-stroke": is not that of a rotary engine'),
+        ('"four-stroke"  ', '"two-stroke"  ', 'engine.cycle = "two-stroke": does not fit a rotary engine'),
         ('eccentricity = "15 mm"', 'stroke = "30 mm"', "engine.stroke: means nothing in layout 'rotary'"),
         ('rotor_mass = "4.4 kg"', "", "engine.rotor_mass: is missing"),
-        ('speed = "6000 rpm"', 'mean_piston_speed = "10 m/s"', "mean_piston_speed: means nothing without pistons"),
+        (
+            'speed = "6000 rpm"',
+            'mean_piston_speed = "10 m/s"',
+            "mean_piston_speed: is a mean piston speed, and this engine has no pistons",
+        ),
         ("maximum crank-pin force", "maximum side force", "rotor 1 has no rod"),
     ],
 )

@@ -63,7 +63,10 @@ def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
     ("run", "rule"),
     [
         ("", "needs elastic mounts that an engine is run up on"),
-        (RUN.replace("up_to", 'operating_point = "sprint"\nup_to'), "is no operating point of this problem"),
+        (
+            RUN.replace("up_to", 'operating_point = "sprint"\nup_to'),
+            "is not the name of an operating point of this problem",
+        ),
         (RUN.replace('"0.5 s"', '"0 s"'), "must be more than"),
     ],
 )
@@ -74,7 +77,7 @@ def test_run_ups_that_say_too_little(soft, run, rule, tmp_path):
 
 def test_a_run_up_needs_springs(tmp_path):
     rigid = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match="needs elastic mounts, that have resonances"):
+    with pytest.raises(InputError, match="needs elastic mounts, because rigid mounts have no resonance"):
         loaded(tmp_path, rigid + RUN)
 
 

@@ -57,7 +57,7 @@ def test_a_port_in_use_is_said_to_be() -> None:
         other.listen()
         result = run(LANCHESTER, "--port", other.getsockname()[1])
     assert result.exit_code == 2
-    assert "is in use; name another, or leave it out" in result.stderr
+    assert "is in use; name another port, or leave --port out" in result.stderr
 
 
 def answer(address: str, path: str, body: object) -> dict[str, object]:

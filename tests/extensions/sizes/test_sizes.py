@@ -290,7 +290,7 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
         (TEXT + '[[counterweights]]\nname = "b"\nbalance_factor = 0.5\n', "counts masses that follow from sizes"),
         (changed(TEXT, "throws = [0]", 'throws = [0]\n[engine.nothing]'), "nothing"),
         (changed(TEXT, '[objective]', 'bolts = { diameter = { between = ["5 mm", "9 mm"] } }\n[objective]'),
-         "running_gear.bolts.diameter is open, but no objective or limit depends on it"),
+         "running_gear.bolts.diameter is open, but no objective or limit depends on this size"),
         (changed(TEXT, '["25 mm", "60 mm"]', '["0 mm", "60 mm"]'), "must be more than 0 m"),
         (changed(TEXT, '"0.14 m"', '{ between = ["30 mm", "200 mm"], start = "140 mm" }'),
          "does not let the crank turn"),

@@ -147,7 +147,7 @@ def test_masses_of_weights_are_limited_beside_sizes(solved: Result) -> None:
 
 
 def test_bearings_beside_an_uneven_speed_are_refused_in_a_line() -> None:
-    with pytest.raises(ModelError, match="even crank speed") as refused:
+    with pytest.raises(ModelError, match="constant crank speed") as refused:
         laufruhe.solve(changed(TOGETHER, "samples = 90", 'samples = 90\ncrank_inertia = "1 kg m^2"'))
     assert "\n" not in str(refused.value)
 

@@ -171,7 +171,7 @@ speed = "90 rpm"
     ("old", "new", "said"),
     [
         ("return_ratio = 1.6", "return_ratio = 0.9", "makes no quick return"),
-        ("return_ratio = 1.6", "return_ratio = 1e9", "leaves the pivot on the crank circle"),
+        ("return_ratio = 1.6", "return_ratio = 1e9", "puts the pivot on the crank circle"),
         ("return_ratio = 1.6", "", "engine.return_ratio: is missing"),
         ("return_ratio = 1.6", 'return_ratio = 1.6\nlever_length = "1 m"', "is given beside lever_length"),
         ("return_ratio = 1.6", 'lever_length = "150 mm"', "is too short"),

@@ -323,5 +323,5 @@ def test_a_chain_that_cannot_be() -> None:
 
 
 def test_an_uneven_speed_is_refused(five: tuple[Engine, OperatingPoint]) -> None:
-    with pytest.raises(ModelError, match="even crank speed"):
+    with pytest.raises(ModelError, match="constant crank speed"):
         twist(*five, replace(EXACT, crank_inertia=0.3))

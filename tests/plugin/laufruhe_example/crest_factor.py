@@ -25,7 +25,9 @@ class CrestFactorPart(Part):
         """Return a point for each case, whose objective has to be a load."""
         for case in self.cases:
             if not any(term.measure.is_load for term in problem_files.problem(Point(case)).objective):
-                raise problem_files.refused(case, "objective", "is no load over the cycle", "minimise one")
+                raise problem_files.refused(
+                    case, "objective", "is not a load over the cycle, such as mount force", "minimise one"
+                )
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:

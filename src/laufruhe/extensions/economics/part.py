@@ -65,7 +65,9 @@ class SourceClaim(Table):
     @model_validator(mode="after")
     def _says_something(self) -> SourceClaim:
         if self.says is None and self.falls_by is None:
-            raise f.refusal("has no claim of the source; give a judgement as says, a reduction as falls_by, or both")
+            raise f.refusal(
+                "states no claim of the source; give its judgement under says, the reduction under falls_by, or both"
+            )
         return self
 
 
@@ -85,10 +87,10 @@ class BuildTable(Table):
     def _is_not_plain(self) -> BuildTable:
         if not self.shafts and self.case is None:
             raise f.refusal(
-                "has no shafts, so it equals the plain engine, which the study always includes; name its shafts"
+                "has no shafts, so it equals the engine without shafts, which the study always includes; name shafts"
             )
         if len(set(self.shafts)) < len(self.shafts):
-            raise f.refusal("names a shaft twice; name each once")
+            raise f.refusal("names one shaft twice; name each shaft once")
         return self
 
 
@@ -111,7 +113,7 @@ class Economics(Part):
         if len(limits) < 2:
             raise f.refusal("needs two masses or more")
         if sorted(set(limits)) != limits:
-            raise f.refusal("must ascend; order the masses and name each once")
+            raise f.refusal("must rise; sort the masses and name each mass once")
         return limits
 
     @model_validator(mode="after")
@@ -129,7 +131,7 @@ class Economics(Part):
                 raise f.refusal(f"builds '{build.name}' on case '{build.case}'; use one of: {', '.join(cases)}")
         for case in (*self.cases, *self.more_cylinders):
             if case.equal_power_to is not None:
-                raise f.refusal(f"rebuilds '{case.name}' by itself; leave equal_power_to out of its cases")
+                raise f.refusal(f"scales '{case.name}' to equal power itself; remove equal_power_to from its cases")
         return self
 
     def settings(self) -> dict[str, Any]:
@@ -141,7 +143,9 @@ class Economics(Part):
         base = self.cases[0]
         reference = problem_files.problem(Point(base))
         if not shafts_of(reference):
-            raise problem_files.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
+            raise problem_files.refused(
+                base, "balancer_shafts", "is missing, so the study has no shafts to compare", "add them"
+            )
         points = [Point(base, shafts=())]
         for build in self.builds:
             case = next((case for case in self.cases if case.name == build.case), base)
@@ -162,7 +166,7 @@ class Economics(Part):
         try:
             points = front(problem, self.mass_limits)
         except SolverError as error:
-            raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
+            raise ModelError(f"{error}; open more numbers of this problem, or name larger mass limits") from None
         return {
             "objective": problem.objective_name,
             "unit": problem.objective_unit or "",
@@ -270,7 +274,7 @@ def check_comparable(problem: Problem, reference: Problem) -> None:
     if differ:
         raise ModelError(
             f"'{problem.name}' and '{reference.name}' differ in {' and '.join(differ)}, so their numbers of cylinders "
-            "do not tell their power; give both the same"
+            "do not determine their power; give both engines the same values"
         )
 
 
@@ -283,12 +287,14 @@ def _check_objectives(points: Sequence[Point], problem_files: ProblemFiles) -> N
         if not objective or any(term.measure.is_mass for term in objective):
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
-            raise problem_files.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
+            raise problem_files.refused(
+                point.case, "objective", f"{rule}, so balancer shafts have nothing to lower", remedy
+            )
         objectives.setdefault(str(objective), point)
     if len(objectives) > 1:
         first, second = list(objectives.values())[:2]
         rule = f"differs between '{first.case.name}' and '{second.case.name}'"
-        raise problem_files.refused(second.case, "objective", rule, "give all engines the same")
+        raise problem_files.refused(second.case, "objective", rule, "give all engines the same objective")
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:

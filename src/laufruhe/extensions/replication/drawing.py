@@ -121,7 +121,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
         y = value_of(curve.y, own_names)
         dims: tuple[str, ...] = getattr(y, "dims", ())
         if curve.x is None and not dims:
-            raise ExpressionError(f"'{curve.y}' has no dimension to be drawn over; give x")
+            raise ExpressionError(f"'{curve.y}' has no dimension for the horizontal axis; give the curve an x")
         x = value_of(curve.x, {**own_names, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
         xs, ys = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, y))
         xs, ys = np.broadcast_arrays(xs, ys)

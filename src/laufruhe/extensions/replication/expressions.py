@@ -119,7 +119,9 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
 def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
     """Return the allowed nodes of an expression, and its compiled code."""
     if len(text) > MAX_LETTERS:
-        raise ExpressionError(f"an expression of {len(text)} letters is too long; split it under define")
+        raise ExpressionError(
+            f"an expression of {len(text)} characters is too long; split it into named parts under define"
+        )
     try:
         # Python warns of 1[0], which has no value anyway
         with warnings.catch_warnings(action="ignore"):
@@ -130,7 +132,7 @@ def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
                     check_name(ast.unparse(node.func), FUNCTIONS, "function")
                 if not _is_allowed(node):
                     rule = f"'{ast.unparse(node)}' is not allowed here"
-                    raise ExpressionError(f"{rule}; use numbers, names and functions alone")
+                    raise ExpressionError(f"{rule}; use only numbers, names and functions, as in 2 * mass")
             return nodes, compile(ast.fix_missing_locations(_RenameCalls().visit(copy)), "", "eval")
     except ExpressionError:
         raise
@@ -164,7 +166,7 @@ def _numbers_only(function: Any) -> Any:
 
     def agreement(a: Any, b: Any) -> Any:
         if isinstance(a, str | list) or isinstance(b, str | list):
-            raise TypeError("texts and lists are no numbers")
+            raise TypeError("texts and lists cannot be used as numbers in an expression")
         return function(a, b)
 
     return agreement
@@ -214,7 +216,7 @@ def _parts(text: str) -> Iterator[tuple[str, str, str]]:
         raise ExpressionError(f"'{text}' cannot be read ({error}); check its braces") from None
     for plain, field, spec, _ in parts:
         if spec and not _SPEC.fullmatch(spec):
-            raise ExpressionError(f"'{spec}' is no format of a number; write for example .1f, .3g or .0f")
+            raise ExpressionError(f"'{spec}' is no format for a number; write for example .1f, .3g or .0f")
         yield plain, field or "", spec or ""
 
 

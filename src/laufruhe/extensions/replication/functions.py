@@ -73,7 +73,7 @@ def excursion(torques: Any, angle: float) -> float:
     """Return the range of the work of a torque about its mean, each value constant over its share of `angle` (T2)."""
     steps = np.ravel(np.asarray(torques, dtype=float))
     if not steps.size:
-        raise ValueError("the list of torques is empty")
+        raise ValueError("the list of torques of excursion() is empty")
     work = np.cumsum(steps - steps.mean()) * angle
     return float(np.ptp(np.append(work, 0.0)))
 
@@ -81,7 +81,7 @@ def excursion(torques: Any, angle: float) -> float:
 def lever_share(bearings: Sequence[float], place: float, number: int) -> float:
     """Return the share of a load that a bearing carries, the shaft cut in its bearings (B4)."""
     if len(set(bearings)) < len(bearings):
-        raise ValueError("two bearings stand in one place")
+        raise ValueError("two bearings of the shaft have the same position")
     return float(lever_shares(bearings, [place])[number - 1, 0])
 
 

@@ -73,9 +73,9 @@ class StatementTable(Table):
     @model_validator(mode="after")
     def _has_verdict(self) -> StatementTable:
         if (self.holds is None) == (self.expected is None):
-            raise f.refusal("is judged by `is` and `within`, or by `holds`; give one of the two")
+            raise f.refusal("is a statement with `is` and `within`, or with `holds`; give one of the two")
         if (self.expected is None) != (self.within is None):
-            raise f.refusal("needs `is` and `within` together; give both")
+            raise f.refusal("is a statement that needs `is` and `within` together; give both")
         return self
 
 

@@ -123,7 +123,9 @@ class Replication(Part):
 
     def _tables(self, name: Any, problem_files: ProblemFiles, *parents: Any) -> dict[str, Any]:
         if name in parents or not isinstance(name, str):
-            raise ExpressionError(f"problem '{name}' refers to itself by `like`, or `like` is no name; correct `like`")
+            raise ExpressionError(
+                f"problem '{name}' refers to itself by `like`, or its `like` is not a name; correct `like`"
+            )
         if name not in self.problems:
             return problem_files.file(name)
         tables = {key: value for key, value in self.problems[name].items() if key != "like"}
@@ -135,7 +137,7 @@ class Replication(Part):
         problem, case = problem_files.problem(point), _case(point)
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
-            raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
+            raise ModelError(f"no design meets all limits of case '{case.name}'; relax one limit")
         return {name: quantity_value(result, what)._asdict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:

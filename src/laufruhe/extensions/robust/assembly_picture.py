@@ -22,7 +22,7 @@ def figure(result: Result) -> Figure:
     """Draw the share of random assemblies below each objective; lines show the best, given and mean assembly."""
     details, objective = result.details, result.objective
     if not isinstance(details, AssemblyResult) or objective is None:
-        raise ValueError("the result has no chosen parts")
+        raise ValueError("the result has no chosen pistons or rods, so there is no picture of an assembly")
     layout = page(1, 1, (WIDE, 3.0))
     axes = layout.panels[0]
     axes.plot(details.quantiles, [100.0 * share for share in SHARES], color=SKY, linewidth=1.8)

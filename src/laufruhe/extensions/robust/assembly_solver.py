@@ -59,7 +59,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     """
     assembly = problem.extra(Assembly)
     if assembly is None:
-        raise ValueError("there are no parts to choose among")
+        raise ValueError("the problem has no [assembly] with measured pistons or rods to choose from")
     refuse(problem)
     started, spent = time.perf_counter(), time.thread_time()
     report_progress("effect of each part")
@@ -125,14 +125,18 @@ def refuse(problem: Problem) -> None:
     if problem.decisions or problem.phasing is not None:
         raise ModelError("[assembly] needs an engine without open numbers; fix them, or leave [assembly] out")
     if len(problem.extras) > 1:
-        raise ModelError("[assembly] takes measured parts, [robust] unmeasured ones; leave one of them out")
+        raise ModelError(
+            "[assembly] is for measured parts, and [robust] for parts within tolerances; remove one of the two tables"
+        )
     if problem.fidelity.is_uneven:
-        raise ModelError("[assembly] takes a crank that turns evenly; leave fidelity.crank_inertia out")
+        raise ModelError("[assembly] assumes a constant crank speed; remove fidelity.crank_inertia")
     for term in problem.objective:
         if not term.measure.is_load or not is_affine(term.measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):
-            raise ModelError(f"[assembly] minimises loads only, not {term.measure.name}; ask for a load")
+            raise ModelError(
+                f"[assembly] minimises loads only, not {term.measure.name}; minimise a load such as mount force"
+            )
     if not problem.objective:
-        raise ModelError("[assembly] minimises nothing; add [objective]")
+        raise ModelError("[assembly] has no objective to minimise; add [objective]")
 
 
 def _terms(problem: Problem) -> Terms:

@@ -112,7 +112,7 @@ class Mark:
         if self.is_share:
             share = self._parsed(self.size[:-1].strip() or "?", "") / 100.0
             if share >= 1.0:
-                raise self.refused("is a tolerance of the whole number or more", "give less than 100 %")
+                raise self.refused("is a tolerance of 100 % or more", "give less than 100 %")
             return share
         if not self.unit:
             return self._parsed(self.size, "")
@@ -134,11 +134,9 @@ class Mark:
         try:
             value = units.parse(text, dimension)
         except units.UnitError:
-            raise self.refused(
-                f"has a tolerance '{self.size}' that is not a number of the same kind", _EXAMPLE
-            ) from None
+            raise self.refused(f"has a tolerance '{self.size}' whose unit does not fit the number", _EXAMPLE) from None
         if value < 0.0:
-            raise self.refused("has a negative tolerance", "it applies in both directions; leave the sign out")
+            raise self.refused("has a negative tolerance", "write it without a sign; it applies in both directions")
         return value
 
 
@@ -173,7 +171,7 @@ def _strip_marks(node: Any, path: Path, marks: list[Mark]) -> Any:
             marks.append(_parse_mark(tolerance if any(sign in tolerance for sign in SIGNS) else f"± {tolerance}", path))
             node = {key: value for key, value in node.items() if key != "tolerance"}
             if marks[-1].number is not None:
-                raise marks[-1].refused("gives a number in addition to its bounds", 'write for example "± 2 %"')
+                raise marks[-1].refused("gives a number beside { between = ... }", 'write for example "± 2 %"')
         return {key: _strip_marks(value, (*path, key), marks) for key, value in node.items()}
     if isinstance(node, str) and any(sign in node for sign in SIGNS) and path[-1] not in ("name", "names"):
         mark = _parse_mark(node, path)
@@ -192,7 +190,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
     words = match["words"].split()
     laws, scopes = ([word for word in words if word in list(kind)] for kind in (Law, Scope))
     if len(laws) > 1 or len(scopes) > 1:
-        raise Refused(where, text, "names two laws or two scopes", "keep one of each")
+        raise Refused(where, text, "names two distributions, or both batch and part", "keep one of each")
     number = _NUMBER.match(match["number"])
     return Mark(
         path, text, float(number.group()) if number else None, units.unit_of(match["number"]), match["size"],
@@ -241,7 +239,7 @@ def _tolerance(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> Toler
 def _pistons(mark: Mark, engine: Engine) -> _Errors:
     size = mark.gain * units.parse(f"1 {mark.unit}", "kg")
     if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
-        raise mark.refused("is a tolerance of the whole mass or more", "give less")
+        raise mark.refused("is a tolerance of 100 % of the mass or more", "give less")
     return [Error(part.name, (PistonDrive(k, size),)) for k, part in enumerate(engine.slider_cranks)], size, "kg"
 
 
@@ -275,9 +273,9 @@ def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
         rule = "is open, and an open number has its tolerance in percent"
         raise mark.refused(rule, "give the tolerance in percent")
     if share >= 1.0:
-        raise mark.refused("is a tolerance of the whole number or more", "give less")
+        raise mark.refused("is a tolerance of 100 % or more", "give less")
     if not any(rotor.name == name and (rotor.unbalance != 0.0 or name in decided) for rotor in problem.engine.rotors):
-        raise mark.refused("has a tolerance, but its unbalance is zero", "leave the tolerance out")
+        raise mark.refused("has a tolerance in percent, but its unbalance is zero", "leave the tolerance out")
     return [Error(name, (ShareDrive(name, share),))], share, ""
 
 
@@ -289,7 +287,7 @@ def _file_tolerance(mark: Mark) -> Tolerance:
         )
     is_of_a_piece = any(isinstance(part, int) for part in mark.path)
     if mark.scope is Scope.PIECE and not is_of_a_piece:
-        raise mark.refused("is one number of the whole engine", "write batch, or leave the word out")
+        raise mark.refused("is one number for the whole engine, not for each part", "write batch, or no word at all")
     gain = mark.gain
     dimension = (units.dimension_of(f"1 {mark.unit}") or "") if mark.unit else ""
     size = gain * (units.parse(f"1 {mark.unit}", dimension) if mark.unit else 1.0)
@@ -319,7 +317,10 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
             raise Refused(RESIDUAL, table.residual_unbalance, rule, remedy) from None
         if table.rotor_mass is not None:
             raise Refused(
-                "tolerances.rotor_mass", None, "is for a balance grade, but an unbalance is given", "leave it out"
+                "tolerances.rotor_mass",
+                None,
+                "is for a balance grade, but residual_unbalance is an unbalance",
+                "leave it out",
             )
     elif table.rotor_mass is None:
         rule = "is missing, but a balance grade needs the mass of the rotor"
@@ -353,7 +354,7 @@ def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext)
     """Return the problem with the lots of parts from CSV files."""
     engine = problem.engine
     if context.file.geared_inertias:
-        raise Refused("geared_inertias", None, "are not supported with [assembly]", "leave one of the two out")
+        raise Refused("geared_inertias", None, "are not supported together with [assembly]", "leave one of the two out")
     unit = si_value(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
     lots = []
     for key, columns in COLUMNS.items():
@@ -363,19 +364,21 @@ def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext)
         rows = rows_of(file, context.folder / file, where, columns)
         count = len(engine.slider_cranks)
         if len(rows) < count:
-            raise Refused(where, file, f"has {len(rows)} parts for {count} cylinders", "measure one for each at least")
+            raise Refused(
+                where, file, f"has {len(rows)} parts for {count} cylinders", "measure at least one for each cylinder"
+            )
         if len(rows) > MAX_PARTS:
             raise Refused(where, file, f"has {len(rows)} parts", f"at most {MAX_PARTS} can be handled")
         if min(min(row) for row in rows) <= 0.0:
-            raise Refused(where, file, "has a mass that is not above zero", "correct it")
+            raise Refused(where, file, "has a mass that is not above zero; correct this row", "correct it")
         lots.append(Lot(key[:-1], tuple((unit * row[0], unit * row[1] if len(row) > 1 else 0.0) for row in rows)))
     if not lots:
-        raise Refused("assembly", None, "has no parts to choose among", "name a file of pistons or rods")
+        raise Refused("assembly", None, "names no file of parts to choose from", "name a file of pistons or rods")
     for part in engine.slider_cranks:
         minimum = part.reciprocating_mass + sum(float(lot.differences[:, 0].min()) for lot in lots)
         if type(part) is not SliderCrank or minimum <= 0.0:
             rule = "needs plain cylinders whose reciprocating mass is above all differences of the parts"
-            raise Refused("assembly", None, rule, "correct the masses, or leave it out")
+            raise Refused("assembly", None, rule, "correct the masses in the files, or remove [assembly]")
     return replace(problem, extras=(*problem.extras, Assembly(tuple(lots))))
 
 

@@ -129,18 +129,22 @@ def refuse(problem: Problem) -> None:
     open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
     if open_kinds:
         names = ", ".join(decision.name for decision in problem.decisions if decision.kind in open_kinds)
-        raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")
+        raise ModelError(
+            f"[robust] decides unbalances only, and {names} is open too; fix this number, or remove [robust]"
+        )
     if problem.engine.geared:
-        raise ModelError("[robust] takes all inertia on the crank; leave [[geared_inertias]] out, or [robust]")
+        raise ModelError("[robust] does not support geared inertias; remove [[geared_inertias]], or [robust]")
     if problem.fidelity.is_uneven:
-        raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
+        raise ModelError("[robust] assumes a constant crank speed; remove fidelity.crank_inertia, or [robust]")
     for measure in problem.measures:
         if measure.channel.is_number or not is_affine(measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):
-            raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
+            raise ModelError(f"[robust] is for loads only, not for {measure.name}; remove [robust], or name a load")
     if not problem.objective:
-        raise ModelError("[robust] minimises nothing; add [objective]")
+        raise ModelError("[robust] has no objective to minimise; add [objective]")
     if robust_of(problem).population.share is not None and any(limit.measure.is_load for limit in problem.limits):
-        raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
+        raise ModelError(
+            'limits on loads hold for the worst case only; set robust.over = "worst case", or remove these limits'
+        )
 
 
 def _method(problem: Problem, robust: RobustDesign) -> str:

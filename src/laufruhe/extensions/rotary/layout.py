@@ -32,7 +32,7 @@ class Rotary(Inline):
     def cycle(self, cycle: Cycle) -> Cycle:
         """Return the cycle of a rotor, one turn of the shaft; each chamber takes three turns for four strokes."""
         if cycle is not Cycle.FOUR_STROKE:
-            raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(cycle))
+            raise KeyedError("cycle", "does not fit a rotary engine, whose chambers make four strokes", str(cycle))
         return Cycle.TWO_STROKE
 
     def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:

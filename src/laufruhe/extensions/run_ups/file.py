@@ -30,17 +30,20 @@ def _read(table: RunUpTable, problem: Problem, __: ExtensionContext) -> Problem:
     engine, points = problem.engine, [point.name for point in problem.points]
     if engine.block is None:
         raise Refused(
-            "run_up", None, "needs elastic mounts, that have resonances", 'add [mounts] with kind = "elastic"'
+            "run_up",
+            None,
+            "needs elastic mounts, because rigid mounts have no resonance",
+            'add [mounts] with kind = "elastic"',
         )
     for _, spring in every_spring(engine.mounts):
         if any(not isinstance(law, FluidTrack) for law in spring.dynamic):
             rule = f"has no equation in time for mount '{spring.name}', whose stiffness was measured over frequency"
-            raise Refused("run_up", None, rule, "give it a fluid_track, or leave run_up out")
+            raise Refused("run_up", None, rule, "give the hydraulic mount a fluid_track, or remove run_up")
     if table.operating_point is not None and table.operating_point not in points:
         raise Refused(
             "run_up.operating_point",
             table.operating_point,
-            "is no operating point of this problem",
+            "is not the name of an operating point of this problem",
             nearest(table.operating_point, points),
         )
     run = Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")

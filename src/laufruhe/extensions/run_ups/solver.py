@@ -59,7 +59,9 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     other_kinds = " and ".join(kind.name.lower() for kind in sorted(kinds - _SMOOTH)) or "this"
     if terms or relaxed is None:
         name = terms[0].measure.name
-        raise ModelError(f"{name} is minimised over unbalances and mounts, not over {other_kinds}; fix it, or limit it")
+        raise ModelError(
+            f"{name} is minimised over unbalances and mounts, not over {other_kinds}; fix them, or limit it instead"
+        )
     names = quote_names(violated_limits(limits, relaxed.final))
     message = (
         f"the best design found breaks {names}: with {other_kinds} open, a run-up is only checked, not optimised; "

@@ -208,7 +208,7 @@ def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, 
     if key not in _fronts:
         measures = partners(problem)
         if across not in measures:
-            raise refused("front", across, "is no measure of this problem", "", source.path.name)
+            raise refused("front", across, "is not the name of a measure of this problem", "", source.path.name)
         _fronts.clear()
         _fronts[key] = ParetoFront(problem, measures[across])
     return _fronts[key], page_problem.simpler(_held_kinds(source, state))

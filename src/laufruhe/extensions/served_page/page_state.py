@@ -56,7 +56,7 @@ class PageState:
             raise _strange("request", "must be a table of edits, held, design, has and position")
         design, has, position = body.get("design", {}), body.get("has", ""), body.get("position", 0)
         if not isinstance(design, dict) or len(design) > MAX_EDITS or not all(map(_is_number, design.values())):
-            raise _strange("design", "is no table of names and numbers")
+            raise _strange("design", "is no table of names with numbers")
         if not isinstance(has, str) or len(has) > LONGEST:
             raise _strange("has", "is no key of a model")
         if not isinstance(position, int) or not _is_number(position):
@@ -75,7 +75,7 @@ class PageState:
         """Refuse numbers that the page was not offered: a path might lead to a file name."""
         for edit in (*self.edits, *self.fixed):
             if edit.name not in offered:
-                raise _strange(edit.name, "is not offered by this page")
+                raise _strange(edit.name, "is an edit that this page does not offer")
 
 
 def _edits(body: object, where: str) -> tuple[Edit, ...]:

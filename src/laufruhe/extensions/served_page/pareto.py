@@ -41,7 +41,9 @@ class ParetoFront:
 
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
-            raise ModelError("a live Pareto front needs affine decisions and loads as objective; fix the others")
+            raise ModelError(
+                "a live Pareto front needs loads that are affine in the open numbers; fix all but unbalances"
+            )
         self.across, self.others = across, tuple(limit for limit in problem.limits if limit.measure != across)
         self._limit = Limit(across.name, across, 1e300)
         self.problem = problem.changed(limits=(*self.others, self._limit), ranks=())
@@ -52,7 +54,7 @@ class ParetoFront:
         """Return the minimum of the other measure, and its value at the least objective."""
         minimum = self._minimum.at(self.others)
         if minimum.conflict:
-            raise ModelError(f"no design keeps {' and '.join(minimum.conflict)}")
+            raise ModelError(f"no design satisfies the limits {' and '.join(minimum.conflict)} together")
         free = self._follower.at((*self.others, self._limit))
         return minimum.value, max(free.standing[-1], minimum.value)
 

@@ -181,4 +181,4 @@ def _start_server(port: int | None, texts: dict[str, str]) -> Server:
         if port is None:
             return Server(0, texts)
         rule = "is in use" if error.errno == errno.EADDRINUSE else "is for the system's own services"
-        raise refused("--port", str(port), rule, "name another, or leave it out") from None
+        raise refused("--port", str(port), rule, "name another port, or leave --port out") from None

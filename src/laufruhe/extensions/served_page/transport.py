@@ -239,4 +239,4 @@ class HttpRequest(BaseHTTPRequestHandler):
 
 
 def _no_number(name: str) -> float:
-    raise ValueError(f"{name} is no number of JSON")
+    raise ValueError(f"{name} is not a number in JSON")

@@ -83,7 +83,7 @@ class SizeBoxes:
                 measure, sense, self._monotonicity(lambda x: np.array([sense * self.model.value(measure, x)]))
             )
         if not measure.norm.is_monotone_in_lengths or sense < 0.0:
-            raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
+            raise ValueError(f"{measure.name} has no lower bound over ranges of open sizes of the running gear")
         pieces = self.model.pieces(measure)
 
         def factors(x: Array) -> Array:
@@ -119,7 +119,7 @@ class SizeBoxes:
         corners = self.model.mass_corners
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):
-            raise ValueError("a mass of the running gear passes zero")
+            raise ValueError("a mass of the running gear passes zero within the bounds of its sizes; narrow them")
         changes = (np.diff(np.abs(corners), axis=k) for k in range(corners.ndim - 1))
         names = (f"masses are not monotonic in {decision.name}" for decision in self.model.sizes)
         return np.array([_common_sign(*pair) for pair in zip(changes, names, strict=True)])

@@ -104,7 +104,7 @@ def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequ
     if table.density is not None and any(type(p) is not SliderCrank or p.shaft != CRANKSHAFT for p in parts):
         rule = "needs plain slider-cranks on one crankshaft"
         density = units.quantity_text(table.density, "kg/m^3")
-        raise Refused("running_gear.density", density, rule, "give the masses in [engine]")
+        raise Refused("running_gear.density", density, rule, "give the masses in [engine] in place of a density")
     if any(part.master_bank is not None for part in parts):
         rule = "needs rods on the crank pin, and these are hinged to a master rod"
         raise Refused("running_gear", None, rule, "leave it out")
@@ -167,7 +167,7 @@ def _decisions(
     for name, size, value in _sizes_in_file(table, engine, bearings):
         decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
-        raise Refused("engine.rod_length", None, "is open, and [engine.rod] has a fixed length", "fix it")
+        raise Refused("engine.rod_length", None, "is open, but [engine.rod] has a fixed length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in decisions):
         shortest = Open.from_value(engine.rod_length or math.inf).lower
         if engine.kind.is_free or engine.offset:

@@ -344,7 +344,9 @@ def _without_moving_kinks(signals: Sequence[Spectrum], angles: Array, margin: fl
     period = signals[0].period
     kinks = [np.zeros(0) if signal.kinks is None else signal.kinks.angles for signal in signals]
     if len({len(signal) for signal in kinks}) > 1:
-        raise ValueError("the number of kinks of a load differs between rod lengths")
+        raise ValueError(
+            "the number of kinks (jumps of the slope) of a load over the crank angle differs between rod lengths"
+        )
     # a kink at zero may also appear at the period
     positions = np.array([np.sort(np.mod(signal + SAME, period)) - SAME for signal in kinks])
     low, high = positions.min(axis=0, initial=period), positions.max(axis=0, initial=-period)

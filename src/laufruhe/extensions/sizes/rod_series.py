@@ -147,7 +147,9 @@ def _with_remainder(series_at: RodSeries, lengths: Sequence[float], exact: Seque
             )
             remainder = max(remainder, size(pairs[0] - pairs[1]))
         if SAFETY * remainder > CONVERGED * max(map(size, series)):
-            raise ValueError("a kink of a load moves with the rod length")
+            raise ValueError(
+                "a kink (jump of the slope) of a load moves with the rod length, so its series does not converge"
+            )
         remainders.append(SAFETY * remainder)
     return replace(series_at, remainder=np.array(remainders))
 

@@ -167,14 +167,16 @@ def check_acts(model: SizeModel) -> None:
         middle = 0.5 * (model.lower + model.upper)
         ends = [np.where(np.arange(len(middle)) == k, edge, middle) for edge in (model.lower, model.upper)]
         if all(model.value(measure, ends[0]) == model.value(measure, ends[1]) for measure in measures):
-            raise ModelError(f"{decision.name} is open, but no objective or limit depends on it; fix it, or limit it")
+            raise ModelError(
+                f"{decision.name} is open, but no objective or limit depends on this size; fix it, or limit a stress"
+            )
 
 
 def solve_star_sizes(problem: Problem) -> Result:
     """Return the best star with its optimal sizes and unbalances; the best value so far bounds the next search."""
     phasing = problem.phasing
     if phasing is None:
-        raise ValueError("the problem has no open phasing")
+        raise ValueError("neither throws nor firing order of the problem are open")
     started = time.perf_counter()
     if phasing.continuous or phasing.throw_bounds is not None:
         rule = "open sizes of the running gear need even firing or fixed throws"

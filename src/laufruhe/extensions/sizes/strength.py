@@ -148,7 +148,7 @@ def gear_of(engine: Engine) -> RunningGear:
     """Return the running gear of an engine; raise ModelError if the engine has none."""
     gear = engine.extra(RunningGear)
     if gear is None:
-        raise ModelError("a measure needs sizes of the running gear; add [running_gear]")
+        raise ModelError("a stress or clearance needs sizes of the running gear; add [running_gear]")
     return gear
 
 

@@ -46,7 +46,9 @@ class SwingingYokeDrive(DriveKind):
         share = math.cos(math.pi / (1.0 + ratio)) if ratio is not None else 0.5 * sizes.stroke / length
         if share >= 1.0:
             if ratio is not None:
-                raise KeyedError("return_ratio", "leaves the pivot on the crank circle; give less", f"{ratio:g}")
+                raise KeyedError(
+                    "return_ratio", "puts the pivot on the crank circle; give a smaller ratio", f"{ratio:g}"
+                )
             rule = "is too short, no crank inside its swing makes this stroke; make it longer"
             raise KeyedError("lever_length", rule, f"{1e3 * length:g} mm")
         return float(pivot * share)
@@ -56,7 +58,10 @@ class SwingingYokeDrive(DriveKind):
         numbers, pivot = sizes.options, sizes.options["pivot_distance"]
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
         if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:
-            raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
+            raise KeyedError(
+                "lever_weight_radius",
+                "is missing, but lever_weight is given; add the distance of the weight from the pivot",
+            )
         lever_numbers: dict[str, Any] = {
             "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
             "lever_weight": numbers["lever_weight"] or 0.0,

@@ -60,10 +60,10 @@ class SwingingYoke(SliderCrank):
         if not self.crank_radius < self.pivot:
             raise ModelError(
                 f"{self.name}: the lever cannot swing, its pivot at {1e3 * self.pivot:g} mm lies within the crank "
-                f"circle of {1e3 * self.crank_radius:g} mm; move it out"
+                f"circle of {1e3 * self.crank_radius:g} mm; move the pivot out of the circle"
             )
         if not self.lever_length > 0.0:
-            raise ModelError(f"{self.name}: the lever needs a length")
+            raise ModelError(f"{self.name}: the lever needs a length above zero")
         if min(self.lever_mass, self.lever_inertia, self.lever_weight, self.lever_weight_radius) < 0.0:
             raise ModelError(f"{self.name}: masses, inertia and radius of the lever must not be negative")
 

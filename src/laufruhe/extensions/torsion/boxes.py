@@ -76,7 +76,7 @@ class _InertiaBound:
 
     def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
         if measure.channel.flywheel_value is None:
-            raise TypeError(f"{measure.name} is no measure of the flywheel")
+            raise TypeError(f"{measure.name} is not a measure of the flywheel or the torsional chain")
         self._number = measure.channel.flywheel_value(measure, evaluation)
         self._rises = not falls_with_flywheel(measure.channel)
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity

@@ -133,7 +133,7 @@ def _chain(
             raise Refused("torsion", None, rule, "leave it out")
     if len(table.discs) > MAX_DISCS:
         rule = f"has {len(table.discs)} discs, and at most {MAX_DISCS} may be given beside the throws"
-        raise Refused("torsion.discs", None, rule, "join discs that turn together")
+        raise Refused("torsion.discs", None, rule, "combine neighbouring discs into one")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     open_numbers, discs_of_throws = _OpenNumbers(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
@@ -159,7 +159,9 @@ def _chain(
     if table.output is not None and table.output not in names:
         raise Refused("torsion.output", table.output, "is no disc", nearest(table.output, names))
     if table.speeds is not None and not table.speeds[0] < table.speeds[1]:
-        raise Refused("torsion.speeds", None, "has its ends reversed", "write the lower speed first")
+        raise Refused(
+            "torsion.speeds", None, "has its ends reversed", 'write the lower first, as in ["800 rpm", "1200 rpm"]'
+        )
     absorbers = [
         _absorber(a, names, f"torsion.absorbers[{k + 1}]", open_numbers) for k, a in enumerate(table.absorbers)
     ]
@@ -221,7 +223,9 @@ def _section(
         if length is not None:
             open_numbers.number(shaft.pieces[0].diameter, "diameter", "m", name, links)
         elif any(isinstance(piece.diameter, Open) for piece in shaft.pieces):
-            raise Refused(f"{where}.diameter", None, "is given beside an open diameter in pieces", "leave it out")
+            raise Refused(
+                f"{where}.diameter", None, "is given, but a piece has an open diameter", "remove this diameter"
+            )
     loss = table.loss_factor if shaft.loss_factor is None else shaft.loss_factor
     with errors_at_key(where):
         return [
@@ -234,7 +238,7 @@ def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, flo
     diameter = Open.from_value(piece.diameter)
     if diameter.is_open and count > 1:
         rule = "is open, but its shaft has several pieces"
-        raise Refused(f"{where}.diameter", None, rule, "fix the diameter, or give a single piece")
+        raise Refused(f"{where}.diameter", None, rule, "fix the diameter, or describe the shaft as a single piece")
     if piece.bore >= diameter.lower:
         bore = units.quantity_text(piece.bore, "m")
         raise Refused(f"{where}.bore", bore, "is not smaller than the diameter of its shaft", "make it smaller")
@@ -248,13 +252,13 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbe
         raise Refused(
             f"{where}.order",
             None,
-            "is for a pendulum, but stiffness is for a rubber absorber",
+            "is for a pendulum absorber, but stiffness is for a rubber absorber",
             "keep one of the two keys",
         )
     holds = Open.from_value(table.stiffness).lower or Open.from_value(table.damping).lower or table.order
     if not holds:
         rule = "may be zero, and then nothing holds the ring"
-        raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")
+        raise Refused(f"{where}.damping", None, rule, "give the absorber a stiffness, damping or order above zero")
     inertia, stiffness, damping = (
         open_numbers.number(value, key, unit, table.name, [table.name])
         for key, unit, value in (
@@ -272,7 +276,7 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, open_numbe
 
 def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]:
     if len(values) not in (1, count):
-        raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one number, or one for each")
+        raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one for all, or one for each")
     return list(values) * count if len(values) == 1 else list(values)
 
 
@@ -288,7 +292,7 @@ def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> P
     for decision in result.decisions:
         if decision.kind is Kind.FLYWHEEL:
             rule = "is open, but the discs of [torsion] give the inertia of all rotating parts"
-            raise Refused(decision.name, None, rule, "leave [flywheel] out, and open a disc")
+            raise Refused(decision.name, None, rule, "remove [flywheel], and leave the inertia of a disc open")
         if any(key in discs for key in decision.keys(TORSION)):
             rule = f"gives an inertia that follows from {decision.name}, which is open"
             raise Refused(where, None, rule, "leave it out")

@@ -46,7 +46,7 @@ class Disc:
         if not self.inertia > 0.0:
             raise ModelError(f"disc '{self.name}' has an inertia of {self.inertia:g} kg m2; it must be positive")
         if self.damping < 0.0:
-            raise ModelError(f"disc '{self.name}' has a negative damping")
+            raise ModelError(f"disc '{self.name}' has a negative damping; give zero or more")
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class ShaftSection:
         if not self.stiffness > 0.0:
             raise ModelError(f"shaft '{self.name}' has a stiffness of {self.stiffness:g} N m/rad; it must be positive")
         if self.damping < 0.0 or self.loss_factor < 0.0:
-            raise ModelError(f"shaft '{self.name}' has a negative damping")
+            raise ModelError(f"shaft '{self.name}' has a negative damping; give zero or more")
         if self.diameter is not None and not 0.0 <= self.bore < self.diameter:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
 
@@ -132,11 +132,11 @@ class Absorber:
 
     def __post_init__(self) -> None:
         if not self.inertia > 0.0:
-            raise ModelError(f"absorber '{self.name}' has no inertia, so it absorbs nothing; give its ring one")
+            raise ModelError(f"absorber '{self.name}' has no inertia, so it absorbs nothing; give its ring an inertia")
         if min(self.stiffness, self.loss_factor, self.damping, self.order, self.damping_ratio) < 0.0:
             raise ModelError(f"absorber '{self.name}' has a negative stiffness, damping or order")
         if not (self.stiffness or self.damping or self.order):
-            raise ModelError(f"nothing holds the ring of absorber '{self.name}'; give stiffness, damping or order")
+            raise ModelError(f"nothing holds the ring of absorber '{self.name}'; give it a stiffness, damping or order")
 
     def stiffness_at(self, speed: float) -> float:
         """Return the stiffness of rubber and of the pull of rotation [N m/rad]."""

@@ -200,10 +200,12 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     An uneven crank speed, or a cylinder on another shaft, raises `ModelError`.
     """
     if fidelity.is_uneven:
-        raise ModelError("twist is modelled about an even crank speed; leave crank_inertia out")
+        raise ModelError("twist of the crankshaft is modelled at a constant crank speed; remove fidelity.crank_inertia")
     for part in engine.slider_cranks:
         if part.shaft != CRANKSHAFT:
-            raise ModelError(f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled of one crankshaft")
+            raise ModelError(
+                f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled for one crankshaft only"
+            )
     driven = tuple(disc.cylinders for disc in chain_of(engine).discs)
     return _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
 

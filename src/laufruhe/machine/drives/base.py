@@ -65,7 +65,7 @@ class DriveKind:
         if square <= 0.0:
             raise ModelError(
                 f"no crank makes a stroke of {stroke * 1e3:.6g} mm with an offset of {offset * 1e3:.6g} mm on this "
-                "rod; lengthen the rod or lessen the offset"
+                "rod; lengthen the rod, or reduce the offset"
             )
         return math.sqrt(square)
 

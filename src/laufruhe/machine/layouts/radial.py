@@ -77,7 +77,7 @@ def _check(inputs: LayoutInput) -> None:
     if math.isinf(inputs.mechanism.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
     if master > count:
-        raise KeyedError("master_cylinder", f"is none of {count} cylinders; count them from 1", str(master))
+        raise KeyedError("master_cylinder", f"is not one of the {count} cylinders; count cylinders from 1", str(master))
     if inputs.rod is not None and options["articulated_rod"] is None:
         raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
     if knuckle_angles is not None and len(knuckle_angles) != count - 1:

@@ -149,7 +149,9 @@ class SharedGasBoxes:
         self._model = PhaseLeadModel(motored)
         self._names = self._model.names
         if not all(point.gas is None or isinstance(point.gas, Seiliger) for point in problem.points):
-            raise ModelError("an open lead between two cranks that share chambers needs a seiliger cycle")
+            raise ModelError(
+                "an open lead angle between two cranks that share gas chambers needs the gas model seiliger"
+            )
         self._fixed = self._fixed_pistons(problem.engine)
         self._masses = {m: [self._slope(m, s) for s in range(len(self._names))] for m in self._measures}
         self._gains = {m: [self._gain(m, point) for point in problem.points] for m in self._measures}
@@ -167,7 +169,9 @@ class SharedGasBoxes:
                     have_leads = part.shaft.name in self._names, other.shaft.name in self._names
                     if have_leads == (True, True):
                         names = f"{part.shaft.name} and {other.shaft.name}"
-                        raise ModelError(f"{names} share a chamber, and the leads of both are open; fix one lead")
+                        raise ModelError(
+                            f"{names} share a gas chamber, and the lead angles of both cranks are open; fix one of them"
+                        )
                     if have_leads[1]:
                         fixed.append(part.name)
         parts_with_leads = (part for part in engine.slider_cranks if part.shaft.name in self._names)

@@ -106,7 +106,7 @@ class _Coordinates:
 
         def monotone(measure: Measure) -> Monotone:
             if measure.channel.flywheel_value is None:
-                raise TypeError(f"{measure.name} does not measure the flywheel")
+                raise TypeError(f"{measure.name} is not a measure of the flywheel")
             flywheel_value = measure.channel.flywheel_value(measure, initial)
             sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
             return Monotone(lambda x: flywheel_value(self.wheel(x)), np.full(len(lower), sign))

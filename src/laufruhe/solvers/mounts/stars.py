@@ -102,7 +102,7 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MAX_LISTED:
         raise ModelError(
-            f"more than {MAX_LISTED} crank stars cannot be open together with mounts; fix the firing order"
+            f"open throws have over {MAX_LISTED} crank stars, too many with open mounts; fix the firing order"
         )
     on_initial = replace(phasing, problem_of=lambda candidate: _on_initial_mounts(phasing.problem_of(candidate)))
     lists_all = phasing.method is Method.ENUMERATION

@@ -112,7 +112,7 @@ def refuse_long(problem: Problem) -> None:
     """Raise `ModelError` if the open even stars of a problem are too many to enumerate."""
     if is_long(problem):
         rule, remedy = missing_extension("long_cranks")
-        raise ModelError(f"a crank of more than {MAX_LISTED} even stars {rule}; {remedy}")
+        raise ModelError(f"a problem with more than {MAX_LISTED} evenly firing crank stars {rule}; {remedy}")
 
 
 def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:

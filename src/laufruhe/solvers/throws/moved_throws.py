@@ -49,7 +49,7 @@ class _MovedCrank:
         """Return the drawn engine with changed numbers; raise `ModelError` if a firing interval leaves its bounds."""
         candidate = self.at(changes)
         if candidate.firing_order and not self.phasing.intervals.holds(firing_intervals(self.phasing, candidate)):
-            raise ModelError(f"these throws violate the firing intervals allowed, {self.phasing.intervals.text}")
+            raise ModelError(f"the throws violate the allowed firing intervals, {self.phasing.intervals.text}")
         star_problem = self.phasing.problem_of(candidate)
         other_changes = {path: value for path, value in changes.items() if path[0] != CRANK}
         if other_changes:

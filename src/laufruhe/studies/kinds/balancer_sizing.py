@@ -50,12 +50,12 @@ class BalancerSizing(SweptPart):
             groups = shaft_groups(problem)
             if not groups:
                 raise problem_files.refused(
-                    case, "balancer_shafts", "is missing, so there is nothing to size", "add a shaft"
+                    case, "balancer_shafts", "is missing, so the study has no balancer shaft to size", "add a shaft"
                 )
             problem_files.refuse_open_phasing(problem, case)
             if len(groups) > MAX_GROUPS:
                 rule = f"makes {len(groups)} independent shafts, {2 ** len(groups)} sets of them"
-                raise problem_files.refused(case, "balancer_shafts", rule, f"study {MAX_GROUPS} or fewer")
+                raise problem_files.refused(case, "balancer_shafts", rule, f"use at most {MAX_GROUPS} groups of shafts")
             count = 2 ** len(groups) * self.size()
             if count > MAX_POINTS:
                 rule = f"makes {count} points; a study takes {MAX_POINTS}"

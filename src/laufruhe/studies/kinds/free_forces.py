@@ -64,7 +64,9 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     """
     shapes = {(p.crank_radius, p.rod_length, p.offset, p.reciprocating_mass) for p in engine.slider_cranks}
     if len(shapes) > 1:
-        raise ModelError(f"the cylinders of '{engine.name}' differ, so free forces have no unit; make them equal")
+        raise ModelError(
+            f"the cylinders of '{engine.name}' differ, so free forces have no common unit; give all the same size"
+        )
     part = engine.slider_cranks[0]
     if type(part) is not SliderCrank:
         raise ModelError(f"free forces are counted in those of a slider-crank, which '{part.name}' is not")

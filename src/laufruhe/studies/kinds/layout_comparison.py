@@ -55,7 +55,7 @@ class LayoutComparison(SweptPart):
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
         if odd is not None:
             rule = f"differs between cases '{self.cases[0].name}' and '{odd.name}'"
-            raise problem_files.refused(odd, "equal_power_to", rule, "give all cases the same, or none")
+            raise problem_files.refused(odd, "equal_power_to", rule, "give all cases the same equal_power_to, or none")
         self._check_cylinders(problem_files)
         at = self.combinations()[0]
         measures_by_case = [
@@ -108,7 +108,7 @@ class LayoutComparison(SweptPart):
         for case, size in zip(self.cases, sizes, strict=True):
             if len(size) > 1:
                 rule = "has cylinders of different bore or stroke"
-                raise problem_files.refused(case, "engine", rule, "give all cylinders one size")
+                raise problem_files.refused(case, "engine", rule, "give all cylinders the same size")
         bore_1, radius_1 = next(iter(sizes[0]))
         for case, ((bore, radius),) in zip(self.cases, sizes, strict=True):
             if abs(radius - radius_1) > _SAME * radius_1 or abs(bore - bore_1) > _SAME:

@@ -54,7 +54,7 @@ class SpeedsTable(f.Table):
         if (self.points is None) == (self.step is None):
             raise f.refusal("need either points or step; give one of them")
         if self.step is not None and not 1.0 <= (self.last - self.first) / self.step < MAX_SPEEDS:
-            raise f.refusal("have a step that does not fit between their ends; give another")
+            raise f.refusal("have a step that is above their range or far below it; give another step")
         return self
 
     def with_point(self, point: OperatingPoint) -> Array:
@@ -92,7 +92,7 @@ class SpeedMapStudy(Part):
             measures = list(self._measures(problem, case, problem_files))
             if not measures:
                 rule = "has no measure that depends on speed"
-                raise problem_files.refused(case, "objective", rule, "name measures in the part")
+                raise problem_files.refused(case, "objective", rule, "name measures in this part of the study")
             if self.by_order and not measures[0].is_load:
                 rule = f"has no orders of its first measure, {measures[0].name}"
                 raise problem_files.refused(case, "objective", rule, "name a force, couple, moment or travel first")
