@@ -139,7 +139,7 @@ class Economics(Part):
         return {"kind": self.kind, "mass_limits": self.mass_limits, "alternating": self.alternating}
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return the plain engine, every build, and every engine with more cylinders at equal power."""
+        """Return the points to compute: the engine without shafts, with each set of shafts, and with more cylinders."""
         base = self.cases[0]
         reference = problem_files.problem(Point(base))
         if not shafts_of(reference):
@@ -160,7 +160,7 @@ class Economics(Part):
         return points
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return the front of one engine."""
+        """Return the trade-off of one engine: its least objective under each limit on the shaft mass."""
         problem = problem_files.problem(point)
         problem = with_loads(problem, alternating=True) if self.alternating else problem
         try:
@@ -176,7 +176,7 @@ class Economics(Part):
         }
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
-        """Return fronts side by side, the plain engine first, with the claims about each."""
+        """Return the trade-offs of all engines as one dataset, with the source's claims about each."""
         following = [case.name for case in self.more_cylinders]
         names = [PLAIN, *(build.name for build in self.builds), *following]
         claims = [NO_CLAIM, *(build.claim or NO_CLAIM for build in self.builds), *(NO_CLAIM for _ in following)]
@@ -205,7 +205,7 @@ class Economics(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return every engine at its optimum, the judgements, the source's statements and the front."""
+        """Return the tables of the report: engines at their optimum, verdicts, statements of the source, trade-offs."""
         evaluate_design = {worth.build: worth for worth in worths(data)}
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
@@ -227,7 +227,7 @@ class Economics(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw a front for every set of shafts, and the engines without shafts."""
+        """Draw least objective over shaft mass for every set of shafts, and the engines without shafts."""
         built = _with_shafts(data)
         colours = dict(zip(built, _SERIES * (1 + len(built) // len(_SERIES)), strict=False))
         ends = (1.3 * float(data["optimum_mass"].max()) or 1.0, 1.06 * float(data["optimum"].max()))
@@ -328,7 +328,7 @@ def _front_rows(data: xr.Dataset) -> list[Text]:
 
 
 def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
-    """Return the fronts as lines of decreasing width, so that overlapping ones stay visible."""
+    """Return the trade-offs as lines of decreasing width, so that overlapping lines stay visible."""
     limits = data["mass_limit"].values
     marks: list[p.Mark] = []
     for k, (name, colour) in enumerate(colours.items()):
@@ -345,7 +345,7 @@ def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
 
 
 def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
-    """Return engines without shafts as levels: grey, dashed with more cylinders."""
+    """Return horizontal lines at the objectives of engines without shafts: grey, dashed with more cylinders."""
     dashes = iter(p.DASHES * 4)
     top, marks = math.inf, list[p.Mark]()
     engines = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)

@@ -72,7 +72,7 @@ class FrontPoint(NamedTuple):
 
 
 def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
-    """Return the proven optimum under a limit on the balancer mass [kg]; `SolverError` without a design."""
+    """Return the proven least objective under a limit on the balancer mass [kg]; `SolverError` without a design."""
     is_limited = shafts_of(problem) and math.isfinite(mass_limit)
     limits = (*problem.limits, Limit(LIMIT_NAME, MASS_ON_SHAFTS, mass_limit)) if is_limited else problem.limits
     result = solve(replace(problem, limits=limits))
@@ -167,7 +167,7 @@ def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
 
 
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
-    """Return the verdicts on the source's claims, by build."""
+    """Return the verdicts on the source's claims about the benefit of shafts, by name of the engine with shafts."""
     by_build: dict[str, tuple[Verdict, ...]] = {}
     engines = _engines(data)
     for name in engines:

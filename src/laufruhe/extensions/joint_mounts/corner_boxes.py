@@ -70,9 +70,10 @@ class Corner:
 
 
 def mixes_corners(problem: Problem) -> bool:
-    """Return True if vertices can bound a problem: several decisions, few mounts, and loads alone in the objective.
+    """Return True if bounds from the vertices of boxes of mounts apply to a problem.
 
-    One open number, or stiffness alone, needs no vertices.
+    They need several decisions, few open numbers of mounts, and loads alone in the objective. One open number, or
+    stiffness alone, needs no vertices.
     """
     if len(problem.decisions) < 2 or len(problem.mount_decisions) > MAX_OPEN or is_stiffness_problem(problem):
         return False
@@ -114,7 +115,7 @@ class DesignBoxes:
 
     @property
     def max_boxes(self) -> int:
-        """Box budget: as requested, or for some tens of seconds."""
+        """Largest number of boxes: as the file requests, or enough for some tens of seconds."""
         count = len(self.lower)
         # fixed loads and unbalances, in three directions
         columns = 3 * (1 + sum(domain.width for domain in self.loads.domains))
@@ -134,7 +135,10 @@ class DesignBoxes:
         return np.array([bound for bound, _ in pairs]), np.array([side for _, side in pairs], dtype=np.intp)
 
     def corner(self, mounts: Array) -> Corner:
-        """Return unbalances and multipliers at mounts of shape (n,); each vertex is computed once."""
+        """Return optimal unbalances and multipliers for the mounts at a vertex, shape (n,).
+
+        Each vertex is computed once.
+        """
         key = tuple(mounts.tolist())
         if key not in self._corners:
             self._corners[key] = self._new_corner(mounts)
@@ -182,7 +186,7 @@ class DesignBoxes:
         return (bound, side) if rough_result is None or bound >= rough_result[0] else (rough_result[0], side)
 
     def _mixed(self, loop: _BalancedLoop, violations: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
-        """Return the bound by multipliers of all vertices, and the index of the side to halve."""
+        """Return the lower bound of a box by multipliers of all its vertices, and the index of the side to halve."""
         centre = np.mean([corner.columns for corner in corners], axis=0)
         loaded_loop = self.loaded(loop, centre)
         ends = np.array([domain.ends for domain in self.loads.domains for _ in range(domain.width)]).reshape(-1, 2)
@@ -212,9 +216,10 @@ class DesignBoxes:
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
     def expanded(self, pairing: Pairing | None, loaded_loop: _LoadedLoop, centre: Array) -> tuple[Array, Array]:
-        """Return the bound by multipliers of a vertex, about unbalances `centre`, and its remainder.
+        """Return a lower bound as a quadratic in the open numbers, by the multipliers of a vertex, and its remainder.
 
-        The bound has coefficients of (1, s, s s') for 1 and each column of unbalances, shape (1 + columns, p).
+        It is expanded about unbalances `centre`. The bound has coefficients of (1, s, s s') for 1 and each column of
+        unbalances, shape (1 + columns, p).
 
         The remainder has the shape (w, 1 + columns).
         """
@@ -320,7 +325,10 @@ def _concavity(values: Array) -> Array:
 
 
 def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | None = None) -> BoxResult:
-    """Return the bound of a problem that `mixes_corners`, by boxes until the gap tolerance or the budget is reached."""
+    """Return the lower bound of the objective by boxes of mounts, for a problem that `mixes_corners`.
+
+    The search ends at the gap tolerance or at the largest number of boxes.
+    """
 
     class Branching(BatchBisection):
         """Branch and bound with designs at vertices as incumbents."""
@@ -340,7 +348,7 @@ def designed_bound(boxes: DesignBoxes, gap_tolerance: float, witness: Witness | 
 
 
 def priced(values: Array, violations: list[Array]) -> Array:
-    """Return coefficients of a bound plus limits at prices that raise the least coefficient, shape (v,).
+    """Return a lower bound with limits at the best prices, as Bernstein coefficients over a box, shape (v,).
 
     `values` and each violation are Bernstein coefficients over a box. The result is infinite if a limit is violated.
     """

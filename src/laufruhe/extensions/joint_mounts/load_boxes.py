@@ -67,7 +67,7 @@ FORCE = Measure(channels.MOUNT_FORCE, NORMS["rms"])
 
 
 def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
-    """Return True if boxes cover all open numbers: a few unbalances, throws and numbers of mounts."""
+    """Return True if bounds over boxes apply: only a few unbalances, throws and numbers of mounts are open."""
     if problem.engine.block is None or problem.known_rows or not problem.decisions:
         return False
     is_all_affine = all(decision.is_affine for decision in problem.decisions)
@@ -83,7 +83,9 @@ def load_bounds(
     problem: Problem, value: float, gap_tolerance: float, shares: Sequence[float], witness: Witness | None = None,
     throws: OpenThrows | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
-    """Yield bounds by boxes, until no design is better than `value` by more than `gap_tolerance` [SI].
+    """Yield lower bounds of the objective by branch and bound over boxes of mounts, unbalances and throws.
+
+    The search ends when no design is better than `value` by more than `gap_tolerance` [SI].
 
     Parameters
     ----------
@@ -140,7 +142,10 @@ class LoadBoxes:
         self._left_out = self._drop_small_orders(left_out)
 
     def _drop_small_orders(self, budget: float) -> dict[Measure, float]:
-        """Omit orders that add up to less than a budget, and return their largest effect on each measure (E41)."""
+        """Leave out small orders of load, and return their largest effect on each measure (E41).
+
+        Their effects on the objective add up to less than `budget`, and on a limit to its tolerance.
+        """
         budgets = {measure: budget / weight for weight, measure in self._terms if measure.on_mounts}
         budgets |= {measure: SLACK * maximum for maximum, measure in self._limits if measure.on_mounts}
         if not budgets or self._ratios:
@@ -180,7 +185,10 @@ class LoadBoxes:
 
     @np.errstate(invalid="ignore", over="ignore", divide="ignore")
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Return lower bounds of boxes of shape (boxes, n), infinite without a feasible design, and sides to halve."""
+        """Return the lower bound of the objective on each box, shape (boxes, n), and the index of the side to halve.
+
+        The bound is infinite if a box has no feasible design.
+        """
         box = _Boxes(self.loads, self._orders, self._numbers, lower, upper)
         points = self._nearest(box)
         lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
@@ -212,7 +220,7 @@ class LoadBoxes:
         return violated
 
     def _nearest(self, box: _Boxes) -> Array:
-        """Return the minimum of the objective's sum of squares in each box, shape (boxes, numbers)."""
+        """Return the point of each box at which the objective's sum of squares is least, shape (boxes, numbers)."""
         gram, gradient = np.zeros((len(box.lower), box.count, box.count)), np.zeros((len(box.lower), box.count))
         for weight, measure in self._terms:
             if _is_affine(measure, self.problem):
@@ -229,7 +237,7 @@ class LoadBoxes:
         return _least_squares(gram, gradient)
 
     def _under(self, box: _Boxes, measure: Measure, points: Array, averaged: bool) -> LinearBound:
-        """Return the tangent of a measure at a point of each box, shape (boxes, numbers), as a lower bound."""
+        """Return a linear lower bound of a measure on each box: its tangent at a point, shape (boxes, numbers)."""
         if _is_affine(measure, self.problem):
             return box.affine_under(measure, points, averaged and measure.norm.averages)
         if is_ratio(measure):
@@ -291,7 +299,7 @@ class _Boxes:
         return self._expanded(np.zeros_like(self._omegas))
 
     def _expanded(self, omegas: Array) -> tuple[list[Loop], list[Expansion]]:
-        """Return the loops of all boxes, and one expansion for the fixed loads and for each column."""
+        """Return the feedback loops of all boxes, and the motion as a series for the fixed loads and each unbalance."""
         boxes = zip(self.lower[:, : self._numbers], self.upper[:, : self._numbers], strict=True)
         loops = [mount_loop(self._loads.problem, omegas, *box) for box in boxes]
         gain, inputs = np.array([loop.gain for loop in loops]), np.array([loop.inputs for loop in loops])
@@ -312,7 +320,10 @@ class _Boxes:
         return loops, expansions
 
     def response(self, measure: Measure, at_rest: bool = False) -> LinearResponse:
-        """Return forces or travel of a measure times its direction weights; static forces if `at_rest`."""
+        """Return mount forces or travel of a measure as linear functions over the boxes, times its direction weights.
+
+        If `at_rest`, loads have zero frequency, as on rigid mounts.
+        """
         rows, factors = counted_rows(self._loads.problem, measure)
         key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), at_rest)
         if key not in self._cache:
@@ -345,7 +356,7 @@ class _Boxes:
         return LinearResponse(value, slopes, fixed.remainder + rests.sum(axis=0), bends)
 
     def scores(self, bound: LinearBound) -> Array:
-        """Return branching scores of the sides of each box, shape (boxes, open numbers)."""
+        """Return branching scores: the part of each open number in a bound's error, shape (boxes, open numbers)."""
         products = np.abs(bound.slopes[:, self._numbers + self.columns :]).reshape(
             len(self.lower), self.columns, self._numbers
         )
@@ -353,7 +364,7 @@ class _Boxes:
         return np.asarray(np.nan_to_num(bound.scores, posinf=1e300) + 0.5 * shared)
 
     def affine_under(self, measure: Measure, points: Array, averaged: bool) -> LinearBound:
-        """Return the tangent of a norm that does not depend on mounts, as a lower bound."""
+        """Return a linear lower bound of a measure that does not depend on mounts: its tangent at the points."""
         norm = self._loads.norm_without_mounts(measure, averaged)
         columns = slice(self._numbers, self._numbers + self._unbalances)
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]

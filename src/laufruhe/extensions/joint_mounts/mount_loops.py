@@ -72,7 +72,10 @@ class _Signals:
         return signal
 
     def channel(self, signal: ComplexArray, number: int, self_feedback: Array | None = None) -> ComplexArray:
-        """Return the product of an open number and a signal; `self_feedback`, shape (r, r), adds the product itself."""
+        """Return a new signal: the product of an open number and a signal (a feedback channel).
+
+        `self_feedback`, shape (r, r), feeds the product back into its own input.
+        """
         first, count = 6 + len(self.owners), signal.shape[1]
         self.owners += [number] * count
         self._inputs.append(signal.copy())
@@ -97,10 +100,10 @@ class _Signals:
 def open_stiffness(
     problem: Problem, lower: Array, upper: Array
 ) -> tuple[Array, Callable[[Array], tuple[Array, float]]]:
-    """Return the static stiffness A at the middle of a box, shape (6, 6), and a function of y for y' A y in the box.
+    """Return the static stiffness A at the middle of a box of mounts, (6, 6), and a function for y' A y in the box.
 
-    The function returns coefficients by (1, s, s s') of n open numbers, shape (1 + n + n^2,), and a bound of the
-    remainder. Over the box A = middle + outputs S (1 - feedback S)^-1 inputs.
+    The function takes a motion y. It returns coefficients by (1, s, s s') of n open numbers, shape (1 + n + n^2,), and
+    a bound of the remainder. Over the box A = middle + outputs S (1 - feedback S)^-1 inputs.
     """
     equations = _BlockOnMounts(problem, np.zeros(1), lower, upper)
     middle, outputs = np.split(equations.body[0].real, [6], axis=1)
@@ -123,7 +126,10 @@ def open_stiffness(
 
 
 def mount_loop(problem: Problem, omegas: Array, lower: Array, upper: Array) -> Loop:
-    """Return the feedback loop at w frequencies [rad/s] over a box of open numbers of mounts, shape (n,)."""
+    """Return the equations of a block over a box of open numbers of mounts as a feedback loop, at w frequencies.
+
+    `omegas` are the angular frequencies [rad/s]; `lower` and `upper` have the shape (n,).
+    """
     equations = _BlockOnMounts(problem, omegas, lower, upper)
     inverse = inverses(equations.body[..., :6])
     back = inverse @ equations.body[..., 6:]
@@ -172,7 +178,7 @@ class _BlockOnMounts:
 
 
 def is_looped(problem: Problem) -> bool:
-    """Return True if the loop has all open numbers: those affine in loads, and numbers of mounts."""
+    """Return True if a feedback loop can represent all open numbers: mounts, and numbers in which loads are affine."""
     mounts = problem.mount_decisions
     if not mounts or any(d not in mounts and not d.is_affine for d in problem.decisions):
         return False
@@ -223,14 +229,14 @@ class _Spring:
         return np.asarray(point_motion(NUMBERS, (self._numbers[POSITION] - centre).tolist()))
 
     def travel(self, signals: _Signals, root: Array, centre: Array) -> ComplexArray:
-        """Return the travel of the mount, shape (w, 3, 6 + channels)."""
+        """Return the travel of the mount by motion and feedback channels, shape (w, 3, 6 + channels)."""
         travel = signals.motion(self._motion(centre) @ root.T)
         for j, axes_across, arms in self._across():
             travel = travel + arms.T @ signals.channel(signals.motion(axes_across @ root.T[3:]), j)
         return travel
 
     def force(self, signals: _Signals, travel: ComplexArray) -> ComplexArray:
-        """Return the force of the spring, shape (w, 3, 6 + channels)."""
+        """Return the force of the spring by motion and feedback channels, shape (w, 3, 6 + channels)."""
         own_travel = self._turned(signals, travel, -1.0)
         moving, omegas = (self._omegas > 0.0)[:, None, None], self._omegas[:, None, None]
         elastic = self._numbers[STIFFNESS, None] * own_travel
@@ -264,7 +270,7 @@ class _Spring:
         return vectors
 
     def wrench_on_body(self, signals: _Signals, force: ComplexArray, root: Array, centre: Array) -> ComplexArray:
-        """Return the wrench of a force in coordinates with unit mass, shape (w, 6, 6 + channels)."""
+        """Return the wrench of a mount force on the block in coordinates with unit mass, shape (w, 6, 6 + channels)."""
         moment = self._motion(centre)[:, 3:].T @ force
         for j, axes_across, arms in self._across():
             moment = moment + axes_across.T @ signals.channel(arms @ force, j)

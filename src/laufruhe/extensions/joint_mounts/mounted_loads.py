@@ -96,7 +96,7 @@ class MountedLoads:
 
     @property
     def rows(self) -> int:
-        """Count of sampled rows of all measures on mounts."""
+        """Number of sampled force or travel vectors (rows) of all measures on mounts."""
         problem = self.problem
         measures = [*(t.measure for t in problem.load_terms), *(limit.measure for limit in problem.load_limits)]
         places = [mount.name for mount in problem.engine.mounts]
@@ -105,7 +105,10 @@ class MountedLoads:
         return self.samples * sum(counts)
 
     def at(self, mounts: Array) -> AffineProblem:
-        """Return norms as functions of the unbalances, for mounts of shape (n,); infinite on an undamped resonance."""
+        """Return the problem of the unbalances on mounts with these numbers, shape (n,).
+
+        Its numbers are infinite on an undamped resonance.
+        """
         loop, orders = mount_loop(self.problem, self.orders.omegas, mounts, mounts), self.orders
         responses = [
             np.einsum("wri,wci->cwr", maps[0], orders.loads, optimize=True) for maps in (loop.forces, loop.travels)
@@ -146,7 +149,7 @@ class MountedLoads:
         return signals
 
     def pairing(self, problem: AffineProblem, multipliers: Multipliers) -> Pairing:
-        """Return the lower bound for any mounts, by multipliers of the problem `at` some mounts."""
+        """Return a lower bound of the objective that holds for any mounts, by multipliers from one set of mounts."""
         scaled = minorant(problem, multipliers).multipliers
         terms = zip(self.problem.load_terms, problem.terms, scaled.terms, strict=True)
         limits = zip(self.problem.load_limits, problem.limits, scaled.limits, strict=True)
@@ -165,7 +168,10 @@ class MountedLoads:
         return Pairing(sums[0], sums[1], constant, slopes)
 
     def _sums(self, measure: Measure, z: Array, averaged: bool) -> ComplexArray:
-        """Return Z of all orders, shape (w, 3 mounts), from multipliers z of samples: <z, rows> = Re sum conj(Z) f."""
+        """Return multipliers Z of mount forces f by order, shape (w, 3 mounts), from multipliers z of samples.
+
+        They give the same sum: <z, rows> = Re sum conj(Z) f.
+        """
         problem, orders = self.problem, self.orders
         chosen, shares = measure.places([mount.name for mount in problem.engine.mounts]), measure.shares(problem.points)
         points = [p for p in range(len(problem.points)) if shares[p] > 0.0]
@@ -186,7 +192,7 @@ class MountedLoads:
 
 
 def coarser(problem: AffineProblem, factor: int) -> AffineProblem:
-    """Return a program whose norms have every `factor`-th sample."""
+    """Return a coarser program, whose norms have every `factor`-th sample only."""
 
     def coarser_norm(norm: AffineNorm) -> AffineNorm:
         # masses have no samples

@@ -25,7 +25,7 @@ NEAR, ROUNDS = 0.98, 3
 
 
 def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
-    """Return optimal unbalances, shape (columns,), and multipliers; limits that contradict each other are widened."""
+    """Return optimal unbalances, shape (columns,), and multipliers; contradicting limits are relaxed."""
     x, best = _solve(problem)
     if x is not None:
         return x, best.multipliers
@@ -47,7 +47,7 @@ def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
 
 
 def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
-    """Return optimal unbalances, or None if the limits contradict each other, and a bound with its multipliers."""
+    """Return optimal unbalances and a lower bound with its multipliers; None if the limits contradict each other."""
     zero = (tuple(np.zeros_like(norm.constant) for _, norm in parts) for parts in (problem.terms, problem.limits))
     x, best = None, lower_bound(problem, Multipliers(*zero))
     for factor in _times(problem):
@@ -90,7 +90,7 @@ def _times(problem: AffineProblem) -> list[int]:
 
 
 def _solve_by_peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:
-    """Improve the unbalances and bound of a coarse program with all samples, by rows near peaks alone (P10)."""
+    """Return better unbalances and their bound for all samples, by programs of the samples near peaks (P10)."""
     selected = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
     for _ in range(ROUNDS):
         selected = [

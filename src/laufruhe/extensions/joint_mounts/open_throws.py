@@ -51,7 +51,7 @@ class OpenThrows:
         return self.lower[self.open], self.upper[self.open]
 
     def wrenches(self, point: int) -> list[Spectrum]:
-        """Return the wrench of each open throw at an angle of zero, at an operating point."""
+        """Return the wrench on the block from each open throw at an angle of zero, at an operating point."""
 
         def turned(part: MovingPart) -> Spectrum:
             wrench = part.evaluations[0].loads[point].wrench.series
@@ -62,8 +62,9 @@ class OpenThrows:
 
 
 def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenThrows | None:
-    """Return the throws of a design, turned as a whole towards their bounds, or None if boxes cannot cover them.
+    """Return the open throws of a crank for bounds over boxes; None if boxes cannot represent them.
 
+    The crank is turned as a whole, so that its throws are closest to their bounds.
     Gas loads are nonlinear in the throws, and open bank angles, pins or shafts are not throws.
     """
     is_unsupported = (
@@ -82,7 +83,10 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
 
 
 def along_arcs(halves: Array) -> tuple[Array, Array, Array]:
-    """Return middle, slope along i, and remainder of e^{i a t} over t from -1 to 1, shape of `halves` each (E72)."""
+    """Return the linear approximation of e^{i a t} over t from -1 to 1, with its error, for half angles a (E72).
+
+    The arrays have the shape of `halves`: the real middle value, the slope along i, and a bound of the error.
+    """
     remainder = np.hypot(0.5 * (1.0 - np.cos(halves)), halves**3 / (9.0 * math.sqrt(3.0)))
     is_expanded = (halves <= math.pi) & (remainder < 1.0)
     middle, slope = np.where(is_expanded, 0.5 * (1.0 + np.cos(halves)), 0.0), np.where(is_expanded, np.sin(halves), 0.0)

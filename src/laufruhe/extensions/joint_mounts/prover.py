@@ -25,7 +25,10 @@ EARLY = 0.1
 
 
 def corner_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one bound by vertices of boxes of mounts; a better design at a vertex lowers `question.value`."""
+    """Yield one lower bound of the objective from vertices of boxes of mounts.
+
+    A better design at a vertex lowers the objective of the incumbent, `question.value`.
+    """
     problem = question.problem
     if question.in_batch or question.value == math.inf:
         return
@@ -43,7 +46,7 @@ def corner_answers(question: Question) -> Iterator[BoxResult]:
 
 
 def load_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield bounds by boxes of mounts and unbalances; stop early if another prover has the better bound."""
+    """Yield lower bounds of the objective by boxes of mounts and unbalances; stop if another prover's is better."""
     if question.in_batch:
         return
     problem, witness = question.problem, _witness(question)
@@ -56,7 +59,7 @@ def load_answers(question: Question) -> Iterator[BoxResult]:
 
 
 def throw_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one bound by boxes of throws, mounts and unbalances, for any firing order (E72)."""
+    """Yield one lower bound of the objective by boxes of throws, mounts and unbalances, for any firing order (E72)."""
     throws = None if question.open_throws is None else throws_at(question.problem, *question.open_throws)
     if throws is not None:
         witness = _witness(question)

@@ -51,9 +51,9 @@ def corners_of(count: int) -> Array:
 
 @lru_cache(maxsize=8)
 def mixed(count: int) -> Array:
-    """Return the map from quadratics in `count` numbers s, one at each vertex, to their multilinear mixture.
+    """Return the matrix that mixes quadratic functions, one for each vertex of a box, into one polynomial.
 
-    A quadratic has coefficients of (1, s, s s').
+    The quadratics are functions of `count` numbers s, with coefficients of (1, s, s s'). The mixture is multilinear.
     The mixture has Bernstein coefficients. The map has the shape (4^n, 2^n, 1 + n + n^2).
     """
     unit = np.eye(count, dtype=int)
@@ -88,7 +88,10 @@ class RestLimits:
         self._stiffness_slopes = np.array([sum(decision_gains) for decision_gains in gains], dtype=float)
 
     def over(self, lower: Array, upper: Array) -> list[Array]:
-        """Return Bernstein coefficients of lower bounds of the relative violation of each limit, shape (4^n,) each."""
+        """Return a lower bound of the relative violation of each limit at rest over a box, such as sag.
+
+        Each bound is a polynomial with Bernstein coefficients of shape (4^n,).
+        """
         if not self._limits:
             return []
         box = lower, upper, *open_stiffness(self._problem, lower, upper)

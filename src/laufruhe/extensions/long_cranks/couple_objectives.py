@@ -60,7 +60,10 @@ class StarAmplitudes(AmplitudeObjective):
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of couples of the dominant order for crank stars below a value; None if none is (S5)."""
+        """Return a range of couples outside which a crank star's objective is not below `value`.
+
+        The result is None if it is empty (S5).
+        """
         shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
         place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
         if room < 0.0:
@@ -95,7 +98,10 @@ class CoupleTerm:
     unit_norms: Array
 
     def values(self, couples: Array) -> Array:
-        """Return values of the term [SI], shape (n,), from real and imaginary couples by order, shape (n, 2 orders)."""
+        """Return the objective term of n crank stars [SI], shape (n,), from their couples by order.
+
+        `couples` has real and imaginary parts, shape (n, 2 orders).
+        """
         size, values = self.constant.size, np.empty(len(couples))
         flat, step = self.couples.reshape(len(self.couples), -1), max(1, _AT_ONCE // size)
         for start in range(0, len(couples), step):
@@ -129,7 +135,7 @@ class CoupleNorms:
     terms: tuple[CoupleTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
-        """Return values of many crank stars, shape (n,); above `maximum` a lower bound instead of the value."""
+        """Return the objectives of many crank stars [SI], shape (n,); only lower bounds for those above `maximum`."""
         couples = star_sums(stars, space.phases, space.places, self.orders)[:, :, 1]
         parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
         if maximum == math.inf:
@@ -142,7 +148,7 @@ class CoupleNorms:
 
     @cached_property
     def _planes(self) -> tuple[Array, Array]:
-        """Constants and slopes of linear lower bounds of the objective (P2)."""
+        """Constants and slopes of linear lower bounds of the objective as a function of the couples (P2)."""
         shares = np.asarray(sum(term.shares for term in self.terms))
         turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
         heavy = np.argsort(-shares, kind="stable")[:2]
@@ -167,7 +173,10 @@ class CoupleNorms:
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return the window of couples of the dominant order for crank stars below a value; None if none is (S48)."""
+        """Return a range of couples outside which a crank star's objective is not below `value`.
+
+        The result is None if empty (S48).
+        """
         del pattern
         minimum = self.lower_bound(space)
         if value < minimum:
@@ -184,9 +193,10 @@ class CoupleNorms:
         return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
 
     def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
-        """Return the largest couple, in the order with index `place`, of a crank star with at most a value (S48).
+        """Return an upper bound of the couple of any crank star with an objective up to `value` (S48).
 
-        Half of this couple must not exceed the value at any phase. `maximum` is a known bound of the couple.
+        The couple is that of the order with index `place`. Half of it must not exceed the value at any phase.
+        `maximum` is a known bound of the couple.
         """
         order, levers = self.orders[place], float(np.abs(space.places).sum())
         aliased = [
@@ -208,7 +218,7 @@ class CoupleNorms:
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
-    """Return the objective of even crank stars as a function of their couples; None if it depends on more.
+    """Return the objective of evenly firing crank stars as a function of their couples; None if it depends on more.
 
     Nothing but the phasing of the problem may be open. `stars` are the problems of `three_stars`.
     """
@@ -224,7 +234,10 @@ def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -
 
 
 def three_stars(space: StarSpace) -> Stars:
-    """Return a crank star, one with two neighbouring steps exchanged, and one that checks the model of couples."""
+    """Return three crank stars to build and check the model of couples.
+
+    The second has two neighbouring steps of the first exchanged; the third checks the model.
+    """
     first = np.array(space.first, dtype=np.uint8)
     second, third = first.copy(), first.copy()
     throw = int(np.flatnonzero(first == 1)[-1])
@@ -251,7 +264,10 @@ class _Spread:
 
     @classmethod
     def from_stars(cls, problem: Problem, space: StarSpace, designs: Sequence[Evaluation]) -> _Spread | None:
-        """Return the separated loads of three crank stars; None if the stars differ in more than couples."""
+        """Return loads of crank stars as a fixed part and a part by couple.
+
+        The result is None if stars differ in more than couples.
+        """
         base = designs[0].engine.cycle.base_order
         channels = {term.measure.load for term in problem.objective}
         signals = {
@@ -293,7 +309,10 @@ class _Spread:
         return cls(problem, designs[0], selected, rest, {c: [u[used] for u in values] for c, values in units.items()})
 
     def term(self, weight: float, measure: Measure) -> CoupleTerm:
-        """Return one term of the objective with rows sampled as in results; means are averaged (P7)."""
+        """Return a measure of the objective as a function of couples, with rows sampled as in results.
+
+        Means are averages over each step (P7).
+        """
         rest, norm = self.rest[measure.load], measure.norm
         bends = kinks_of(measure, rest, self.design.engine)
         constant, grid = self._rows(measure, rest, bends)

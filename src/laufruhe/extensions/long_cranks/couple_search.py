@@ -49,7 +49,7 @@ def search_stars(
     space: StarSpace, objective: CoupleObjective, count: int = 1, time_limit: float = math.inf,
     known: Stars | None = None,
 ) -> StarSearchResult:  # fmt: skip
-    """Return the best crank stars, proven if the arrangements of their halves can be enumerated (S5).
+    """Return the best crank stars of a long crank, proven if the arrangements of its halves can be enumerated (S5).
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known:
 
 
 def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars) -> tuple[int, bool]:
-    """Search all stars in rounds, and improve the best; return the number of arrangements, and True if all are done.
+    """Search all crank stars in rounds, and store the best; return the number of arrangements, and True if complete.
 
     Each piece of the search, some divisions of a pattern, starts from the best stars of earlier rounds.
     Pieces and rounds do not depend on the workers, so the result does not either.
@@ -118,7 +118,7 @@ def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars
 def _search_piece(
     piece: tuple[tuple[int, ...], Counts], space: StarSpace, objective: CoupleObjective, known: BestStars
 ) -> tuple[BestStars, int, bool]:
-    """Return the best stars of a pattern's divisions, the count of arrangements and stars, and True if complete."""
+    """Return the best crank stars of one part of the search, the number of arrangements, and True if complete."""
     (pattern, shares), looked_at = piece, 0
     free, best = Free.from_pattern(pattern), BestStars(known.count, space.throws)
     best.offer(known.stars, known.values)
@@ -170,7 +170,7 @@ def _improve_by_swaps(space: StarSpace, objective: CoupleObjective, star: Stars)
 
 
 def swaps(star: Stars) -> Stars:
-    """Return all stars with two steps swapped, shape (n, throws); the first throw keeps its step."""
+    """Return all crank stars that differ from one by a swap of two throws' steps, (n, throws); throw 1 stays."""
     pairs = np.array(list(itertools.combinations(range(1, len(star)), 2)) or [(0, 0)])
     neighbours, rows = np.repeat(star[None], len(pairs), axis=0), np.arange(len(pairs))
     neighbours[rows, pairs[:, 0]], neighbours[rows, pairs[:, 1]] = star[pairs[:, 1]], star[pairs[:, 0]]
@@ -178,7 +178,10 @@ def swaps(star: Stars) -> Stars:
 
 
 def _rearrange(space: StarSpace, objective: CoupleObjective, star: Stars, throws: Sequence[int]) -> Stars:
-    """Return the best star over all arrangements of the steps of `throws`, by halves that meet (S5)."""
+    """Return the best crank star over all arrangements of the steps of some throws (S5).
+
+    Arrangements of the front and rear half are combined if their couples together are small.
+    """
     free, value = Free.from_throws(star, throws), float(objective.values(space, star[None])[0])
     pattern = tuple(map(int, np.bincount(star, minlength=space.phases)))
     for share in until_time_limit(shares_of(space, free)):
@@ -217,7 +220,7 @@ def _block_stars(
 
 
 def _blocks(phases: int, rng: np.random.Generator) -> Indices:
-    """Return the throw on each step for a star of even groups (S47).
+    """Return a start star for a search: the throw on each step, if throws stand in evenly spaced groups (S47).
 
     Blocks of q neighbours stand evenly. The throw of a block on step p of P depends on p modulo P / q' alone. So only
     orders that q or q' divides have a couple. Orders that q divides have it only if the star of the blocks has it.

@@ -48,7 +48,10 @@ def solve_long_cranks(problem: Problem) -> Result:
 
 
 def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best designs of all even crank stars, by the method for this objective and crank length (S18)."""
+    """Return the best designs over all evenly firing crank stars of a long crank (S18).
+
+    The objective and the number of throws select the method.
+    """
     if can_list(problem, families):
         return search_even(problem, phasing, families)
     simple = [(family, objective) for family in families if (objective := _amplitudes(phasing, family)) is not None]
@@ -72,9 +75,10 @@ def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
 
 
 def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult | None:
-    """Evaluate crank stars with small couples, then search all crank stars that may be better (S46, S48).
+    """Return the best crank stars, if stars differ by their couples alone (S46, S48).
 
-    None if crank stars differ by more than their couples, or if unbalances or shafts are open.
+    Stars with small couples are evaluated first, then all that may be better. The result is None if crank stars
+    differ by more than their couples, or if unbalances or shafts are open.
     """
     if len(families) > 1 or problem.decisions or phasing.shafts.optional:
         return None
@@ -102,7 +106,10 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
 def _evaluate_stars(
     problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
 ) -> EvenStarResult:  # fmt: skip
-    """Return crank stars with their values; complete if the best one meets the bound over all even stars (S40)."""
+    """Return the exact objectives of crank stars.
+
+    Complete if the best one meets the bound over all even stars (S40).
+    """
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
         star_problem = phasing.problem_of(family.candidate(phasing, steps))
@@ -130,7 +137,7 @@ def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
 
 
 def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
-    """Return the best crank star reached by exchanges of throws, with a bound from its dual rows (S44, S14)."""
+    """Return the best crank star that exchanges of throws reach, with a bound from its dual rows (S44, S14)."""
     zero_level = numerical_zero(problem)
     answers = []
     for family in families:
@@ -156,7 +163,10 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
 
 
 def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the best crank star reached by exchanges, with all other decisions optimal at few samples (S44)."""
+    """Return the best crank star that exchanges of throws reach from `star` (S44).
+
+    The other decisions of each star are optimal at few samples.
+    """
     value = coarse_value(model, star, built)
     while not is_time_over():
         neighbours = ((coarse_value(model, x, built), x) for x in until_time_limit(exchanges(star)))

@@ -66,7 +66,9 @@ class Free:
 
 
 def shares_of(space: StarSpace, free: Free) -> Counts:
-    """Return all divisions of the steps between the halves: front throws on each step, shape (n, phases).
+    """Return all ways to divide throws between the front and the rear half of a crank.
+
+    A row has the number of front throws on each step, shape (n, phases).
 
     Divisions of mirror images are left out (S2).
     """
@@ -89,7 +91,7 @@ def shares_of(space: StarSpace, free: Free) -> Counts:
 
 
 def work_of(space: StarSpace) -> int:
-    """Return the number of arrangements of halves over all crank stars of a space."""
+    """Return the work of a complete search: the number of arrangements of both halves over all crank stars."""
     total = 0
     for pattern in space.patterns:
         free = Free.from_pattern(pattern)
@@ -102,7 +104,7 @@ def work_of(space: StarSpace) -> int:
 
 
 def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iterator[Stars]:
-    """Yield blocks of crank stars whose couple lies in the window, shape (n, throws); some repeat.
+    """Yield crank stars whose couple lies in a window, in blocks of shape (n, throws); some repeat.
 
     The division `share` has the number of throws of the front on every step, shape (phases,).
     """

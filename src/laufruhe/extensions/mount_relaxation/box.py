@@ -85,7 +85,7 @@ class BoxRelaxation:
         )
 
     def bound(self, variables: Sequence[EpigraphVariable], root_bounds: Array) -> tuple[float, Array]:
-        """Return a lower bound of the norm on the box, and branching scores, shape (n,).
+        """Return a lower bound of the objective's norm over all designs of the box, and branching scores, shape (n,).
 
         Several epigraph variables are bounded one by one. The chords of their roots between lower and upper bounds are
         then bounded together (E54). `root_bounds`, shape (variables,), are lower bounds of the roots on the root box;

@@ -149,7 +149,7 @@ class ConeProgram:
         return np.arange(self.ends[order], self.ends[order + 1])
 
     def _add_linear(self) -> None:
-        """Add the rows of ranges of s, sets of unbalances, linear limits, bounds of variables, and traces of blocks."""
+        """Add the linear constraints: ranges of numbers s, sets of unbalances, limits, bounds, block traces."""
         program, numbers = self.program, self.program.numbers
         for sign in (1.0, -1.0):
             self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, right=np.ones(numbers))
@@ -191,7 +191,7 @@ class ConeProgram:
         self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX, "quadratics")
 
     def _add_root(self, number: int, root: RootTerm) -> None:
-        """Add the rows of a root, which is above its chord and above the sum of its length variables (E58).
+        """Add the constraints of a root: it is above its chord and above the sum of its length variables (E58).
 
         Each length variable is above the length of its vector.
         """
@@ -219,7 +219,10 @@ class ConeProgram:
         self._add(block, columns, MATRIX, "constraints", column(constraint.constant))
 
     def minimum(self, objective: Array | int) -> tuple[float, Array]:
-        """Return the proven minimum of an objective, or of the root with this number, and s and w at the optimum."""
+        """Return the proven minimum of an objective, and the numbers s and mode coordinates w at the optimum.
+
+        An integer `objective` is the number of the root to minimise.
+        """
         if isinstance(objective, int):
             assert self.program.limit is not None
             program = replace(self.program, limit=replace(self.program.limit, root=objective))
@@ -286,7 +289,7 @@ class ConeProgram:
 
     @cached_property
     def _solver(self) -> ConeSolver:
-        """Solver for all objectives under these constraints."""
+        """Clarabel solver that minimises any objective under these constraints."""
         import clarabel
 
         kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
@@ -339,7 +342,7 @@ class Objectives:
         return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
 
     def all_bounds(self, objectives: Sequence[Array | int]) -> list[float]:
-        """Return the bound of each objective; later ones are computed ahead."""
+        """Return the proven minimum of each objective; workers compute later ones ahead."""
         bounds = []
         for k, objective in enumerate(objectives):
             self.prefetch(islice(enumerate(objectives), k, None))
@@ -347,7 +350,7 @@ class Objectives:
         return bounds
 
     def prefetch(self, objectives: Iterable[tuple[Hashable, Array | int]]) -> None:
-        """Start to bound objectives ahead that are likely next, the most likely first."""
+        """Start to bound objectives that are likely to be needed next, the most likely first."""
         if self._ahead is not None:
             self._ahead.prefetch(
                 ((self._name, key), (self._name, self._program, objective)) for key, objective in objectives

@@ -98,7 +98,7 @@ class ConeSolver:
         self._solver: Any = None
 
     def solve(self, cost: Array) -> tuple[Array, Array]:
-        """Return the primal point x and the multipliers z, whatever the solver's status."""
+        """Return the solver's point x and multipliers z for a cost, whatever its status; certificates check them."""
         scaled = self._column_scales * cost
         size = float(np.abs(scaled).max(initial=0.0))
         factor = float(np.clip(1.0 / size, _MIN_SCALE, _MAX_SCALE)) if size > 0.0 else 1.0
@@ -121,7 +121,7 @@ class ConeSolver:
 
 
 def new_solver(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
-    """Return Clarabel's solver of minimum cost' x with right - rows x in the cones; it stops at the time budget."""
+    """Return a Clarabel solver of: minimise cost' x with right - rows x in the cones; it stops at the time budget."""
     import clarabel
 
     options = clarabel.DefaultSettings()
@@ -140,7 +140,10 @@ def _zero_cone(size: int) -> Any:
 
 
 def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]]) -> tuple[Array, Array]:
-    """Return scales of rows, shape (m,), and columns, shape (n,), as if each entry of a matrix X_k had a row too."""
+    """Return scales of rows, (m,), and columns, (n,), that make the program's numbers alike in size.
+
+    Each entry of a matrix X_k counts as a row too.
+    """
     count, width = rows.shape
     entries = np.concatenate([columns for columns, _ in matrices])
     row = np.append(rows.row, count + np.arange(len(entries)))
@@ -182,7 +185,7 @@ def column(matrices: Array) -> Array:
 
 
 def matrix_of(entries: Array, size: int) -> Array:
-    """Return the symmetric matrix, shape (size, size), from the entries of `column`."""
+    """Return the symmetric matrix, shape (size, size), from its entries in the order of `column`."""
     i, j, factor = triangle(size)
     matrix = np.zeros((size, size))
     matrix[i, j] = matrix[j, i] = entries / factor

@@ -51,7 +51,7 @@ class MomentConstraint:
 
 
 def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentConstraint]:
-    """Return all constraints on the moments of one order, with order index 0."""
+    """Return all constraints on the moments (products of motion and open numbers) of one order, with order index 0."""
     numbers, constraints = mounts.numbers, list[MomentConstraint]()
     for spring, (deflection, force) in zip(mounts.springs, response.springs, strict=True):
         constraints += _spring_constraints(numbers, spring, deflection, force)
@@ -75,9 +75,9 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
 def _spring_constraints(
     numbers: int, spring: SpringTerm, deflection: ComplexArray, force: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return the constraints that an open stiffness, and its product with deflection, lie between bounds (E53).
+    """Return the constraints on an open spring: its stiffness and its force lie between bounds (E53).
 
-    Deflection u and force t are coefficients of (1, v), shape (b, d) each (E42).
+    Deflection u and force t, the product of stiffness and u, have coefficients of (1, v), shape (b, d) each (E42).
     """
     slopes = spring.slopes(numbers) / spring.size
     constraints = [
@@ -111,7 +111,9 @@ def _of_moments(numbers: int, moments: Array, scale: float) -> MomentConstraint:
 
 
 def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: ComplexArray) -> MomentConstraint:
-    """Return constraint E43 for the matrix P = constant + sum s_j slopes_j.
+    """Return the constraint E43 on a motion and its product with a positive semidefinite matrix P.
+
+    P = constant + sum s_j slopes_j in the open numbers s.
 
     Parameters
     ----------
@@ -137,7 +139,7 @@ def product_constraint(constant: Array, slopes: Array, y: ComplexArray, image: C
 def _place_constraints(
     numbers: int, place: PlaceTerm, loads: ComplexArray, shifted: ComplexArray
 ) -> list[MomentConstraint]:
-    """Return the constraints that the number s of an open place lies between -1 and 1 (E52).
+    """Return the constraints on an open mount position: its number s lies between -1 and 1 (E52).
 
     The turns and moments `loads`, which s multiplies, border 1 + s and 1 - s; `shifted` are their products with s.
     """

@@ -72,7 +72,10 @@ class Limits:
         return [order.loads[1:] for order in orders]
 
     def in_basis(self, basis: Array, parts: Sequence[OpenMounts]) -> Limits:
-        """Return the limits in another basis of the unbalances, `basis` of shape (fewer, columns)."""
+        """Return the same limits as functions of fewer unbalance coordinates.
+
+        `basis` has the shape (fewer, columns).
+        """
         norms = []
         for limit in self.norms:
             query = limit.query.in_basis(basis)
@@ -87,7 +90,7 @@ def limits_of(
     problem: Problem, evaluation: Evaluation,
     orders_of: Callable[[Measure, Sequence[OpenMounts]], MeasureOrders], parts: Sequence[OpenMounts],
 ) -> Limits:  # fmt: skip
-    """Return the limits that the best design comes near.
+    """Return the limits to include in the relaxation: those that the best design nearly reaches.
 
     Transmissibility is limited in all motions together, without a split by symmetry (E57).
 

@@ -47,9 +47,9 @@ class ModeConstraints:
 
 
 def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
-    """Return the basis V of modes of each motion with a limit of decoupling, shape (6, 6) each.
+    """Return, for each motion with a limit of decoupling, the basis V of its possible modes, shape (6, 6) each.
 
-    If places of mounts are open, return ().
+    The result is () if positions of mounts are open.
     """
     if mounts.places:
         return ()
@@ -62,7 +62,9 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
 
 
 def mode_basis(root: Array, motion: int, share: float) -> Array:
-    """Return the basis V, shape (6, 6), of the ball |v - a / 2 s| <= |a| / 2 s, b' v = 1 of modes v.
+    """Return a basis V, shape (6, 6), of the modes v with at least a share s of their energy in one motion.
+
+    These modes form the ball |v - a / 2 s| <= |a| / 2 s, b' v = 1.
 
     Parameters
     ----------
@@ -84,7 +86,7 @@ def mode_basis(root: Array, motion: int, share: float) -> Array:
 
 
 def mode_constraints(mounts: OpenMounts, basis: Array, lower: Array, upper: Array) -> ModeConstraints:
-    """Return the constraints of a mode V (1, w) on a box of mounts, for `lower` <= w <= `upper`, shape (5,) each."""
+    """Return the constraints that a mode V (1, w) fits the mounts of a box, for `lower` <= w <= `upper`, (5,) each."""
     inverse, count, d = np.linalg.inv(basis), mounts.numbers, 6
     unit = float(np.linalg.norm(mounts.middle, 2))
     stiffness = inverse @ (np.array([mounts.middle, *mounts.slopes]) / unit) @ basis

@@ -42,7 +42,7 @@ class LinearUpperBound:
     at_reference: float = 0.0
 
     def __add__(self, other: LinearUpperBound) -> LinearUpperBound:
-        """Return the bound of the sum of two numbers."""
+        """Return an upper bound of the sum of two bounded numbers."""
         return LinearUpperBound(
             self.constant + other.constant,
             self.slopes + other.slopes,
@@ -129,7 +129,7 @@ class HighOrder:
 
     @cached_property
     def chords(self) -> list[Chord]:
-        """Components of the spring forces that the motion of a free mass causes, along its deflections and across."""
+        """Components of the spring forces from the motion of a free mass, along its deflections and across."""
         load = self.load * np.exp(-0.5j * float(np.angle(np.sum(self.load * self.load))))
         chords = []
         for m in range(len(self.mounts.motions)):
@@ -165,7 +165,10 @@ class Chord:
     slopes: Array
 
     def bound(self, reference: Array) -> LinearUpperBound:
-        """Return the chord; `reference` are the numbers s of a design, shape (numbers,)."""
+        """Return the linear upper bound of the force component.
+
+        `reference` are the numbers s of a design, (numbers,).
+        """
         reach = float(np.abs(self.slopes).sum())
         low, high = self.constant - reach, self.constant + reach
         factor = (abs(high) - abs(low)) / (high - low) if high > low else 0.0
@@ -240,7 +243,7 @@ def mean_bound(
     variables: Sequence[EpigraphVariable], multiples: Sequence[Sequence[LinearUpperBound]], lower: Array, norm: float,
     numbers: int,
 ) -> MeanBound:  # fmt: skip
-    """Return the bound of a mean over the designs in which it is at most `norm`.
+    """Return a lower bound of a mean of mount forces over the designs in which this mean is at most `norm`.
 
     Parameters
     ----------

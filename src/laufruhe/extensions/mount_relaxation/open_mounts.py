@@ -181,7 +181,10 @@ class OpenMounts:
 
 
 def is_lifted(problem: Problem) -> bool:
-    """Return True if all open numbers are affine in loads, or stiffness, places or inclinations of mounts."""
+    """Return True if the relaxation can represent all open numbers of a problem.
+
+    These are unbalances, in which loads are affine, and stiffness, positions or inclinations of mounts.
+    """
     mounts = problem.mount_decisions
     unsupported = [decision for decision in problem.decisions if decision not in mounts and not decision.is_affine]
     if not mounts or unsupported:

@@ -118,7 +118,7 @@ class MeasureOrders:
         return 2 * max((order.index for order in self.orders), default=0) < self.samples
 
     def bound(self, order: Order, variable: EpigraphVariable, norm: float) -> ResponseBound:
-        """Return the bound of the amplitudes of an order over designs with a norm up to `norm`."""
+        """Return an upper bound of force or travel amplitudes in an order, over designs with a norm up to `norm`."""
         if self.measure.norm.is_euclidean:
             reach = norm / math.sqrt(0.5 * self.shares[order.point] / len(self.mounts))
         else:
@@ -145,7 +145,7 @@ def measure_orders(
     problem: Problem, measure: Measure, model: AffineModel, reference: Evaluation, basis: UnbalanceBasis,
     parts: Sequence[OpenMounts],
 ) -> MeasureOrders:  # fmt: skip
-    """Return the orders of a measure, sorted by their size in the best design.
+    """Return the orders of load of a measure with their wrenches, sorted by their size in the best design.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def _in_parts(
     chosen: Sequence[int],
     adds_squares: bool,
 ) -> list[Order]:
-    """Return the orders of all points, with their loads in the motions of a part (E57).
+    """Return the orders of all operating points, with loads split into symmetric and antisymmetric motions (E57).
 
     Parameters
     ----------
@@ -275,7 +275,10 @@ class EpigraphVariable:
     def quadratic_bounds(
         self, number: int, query: MeasureOrders, responses: Sequence[Response], order_numbers: Sequence[int]
     ) -> list[QuadraticBound]:
-        """Return the bounds of epigraph variable `number` by the responses of its orders, numbered `order_numbers`."""
+        """Return the constraints that keep an epigraph variable above squares of the responses of its orders.
+
+        `number` is the index of the variable; `order_numbers` are those of the orders.
+        """
         norm, mounts = query.measure.norm, len(query.mounts)
         signals = [query.signal(response) * (self.factor / self.unit) for response in responses]
         if norm.is_euclidean:
@@ -301,7 +304,7 @@ class EpigraphVariable:
     def lengths(
         self, query: MeasureOrders, responses: Sequence[Response], order_numbers: Sequence[int]
     ) -> tuple[tuple[int, Array], ...]:
-        """Return vectors with lengths that add up to the root of a mean in its unit, by order number (E58)."""
+        """Return, by order number, vectors whose lengths add up to at most the root of a mean, in its unit (E58)."""
         vectors = []
         for k, response in zip(order_numbers, responses, strict=True):
             signal = query.signal(response) * (self.factor / self.unit / len(query.mounts))
@@ -311,7 +314,7 @@ class EpigraphVariable:
 
 
 def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> list[EpigraphVariable]:
-    """Return the epigraph variables that bound a norm from below: one, or one for each operating point (E45)."""
+    """Return the variables whose minimum is a lower bound of a norm: one, or one for each operating point (E45)."""
     norm = query.measure.norm
     if not query.orders:
         return []
@@ -333,7 +336,7 @@ def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> lis
 
 
 def _strongest(query: MeasureOrders, point: int, parts: Sequence[OpenMounts]) -> EpigraphVariable:
-    """Return the epigraph variable of the strongest order of an operating point in a norm of lengths (E45, E58).
+    """Return the variable that bounds a norm of lengths by the strongest order of an operating point (E45, E58).
 
     A signed average over half periods of the order contains only its odd multiples. An average weighted with its cosine
     contains the order alone.

@@ -77,7 +77,7 @@ class SpringTerm:
     viscous: float = 0.0
 
     def slopes(self, numbers: int) -> Array:
-        """Return the matrix of each shared number s, shape (numbers, b, b)."""
+        """Return the change of the spring's stiffness by each shared number s, shape (numbers, b, b)."""
         slopes = np.zeros((numbers, *self.terms[0][1].shape))
         for j, matrix in self.terms:
             slopes[j] += matrix
@@ -181,7 +181,7 @@ class ParameterMaps:
         return np.asarray(0.5 * (self.high[m] - self.low[m]))
 
     def springs(self, m: int) -> tuple[Array, Array, list[SpringTerm]]:
-        """Return stiffness and damping of spring `m` at the middle, shape (3, 3) each, and their open terms (E66)."""
+        """Return stiffness and damping of spring `m` at the box's middle, (3, 3) each, and their open terms (E66)."""
         axes, turning = self._turning(m)
         fixed_axes = [i for i in range(3) if i not in turning]
         stiffness, fixed_terms = self._along(m, axes, fixed_axes)
@@ -215,7 +215,10 @@ class ParameterMaps:
         return axes, [i for i in range(3) if i not in fixed_axes]
 
     def _damping_line(self, m: int, turning: Sequence[int]) -> tuple[float, float] | None:
-        """Return intercept a and slope b of dampers over stiffness (E66), or None if the dampers do not follow it."""
+        """Return a and b of damping = a + b stiffness for spring `m` (E66).
+
+        The result is None if its damping does not follow stiffness.
+        """
         dampers = self.low[m, DAMPING][turning]
         if np.ptp(dampers) == 0.0:
             return float(dampers[0]), 0.0
@@ -250,7 +253,7 @@ class ParameterMaps:
         return total, springs
 
     def _in_plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
-        """Return stiffness or damping in the plane of two axes that turn, and its terms, in fixed axes (E52, E63)."""
+        """Return stiffness or damping in the plane in which a spring turns, and its open terms (E52, E63)."""
         key, plane, sign = self._plane(m, axes, pair, kind)
         box = plane.full_box if self._boxes is None else self._boxes[key]
         first_number = 3 * self.planes.setdefault(key, (len(self.planes), plane))[0]
@@ -287,7 +290,7 @@ class ParameterMaps:
         return np.asarray(axes[pair].T @ centre @ axes[pair]), [spring]
 
     def _plane(self, m: int, axes: Array, pair: list[int], kind: slice) -> tuple[Any, PlaneStiffness, float]:
-        """Return the key of the plane in which spring `m` turns, its stiffness, and the sign of K12 in these axes."""
+        """Return the key of the plane in which spring `m` turns, its plane stiffness, and the sign of the entry K12."""
         number = kind.start + np.array(pair)
         turns = [(k, j, gain) for k in range(TURNED.start, TURNED.stop) for j, gain in self.drives[m].get(k, [])]
         axis, _, gain = turns[0]
@@ -331,7 +334,7 @@ class ParameterMaps:
         return np.asarray(axes.T @ np.diag(low) @ axes), np.asarray(axes.T @ np.diag(high) @ axes)
 
     def places(self) -> tuple[PlaceTerm, ...]:
-        """Return the open places, grouped by decision, axis, loss factor and lag."""
+        """Return the open mount positions, grouped by decision, axis, loss factor and lag."""
         groups: dict[tuple[int, int, float, float], list[tuple[int, float]]] = {}
         for m, drives in enumerate(self.drives):
             for k in range(POSITION.start, POSITION.stop):
@@ -373,7 +376,7 @@ class PlaneStiffness:
 
     @property
     def full_box(self) -> Array:
-        """Smallest and largest K11, K22 and K12, shape (3, 2)."""
+        """Smallest and largest entries K11, K22 and K12 of the plane stiffness matrix [N/m], shape (3, 2)."""
         (low1, low2), (high1, high2) = self.low, self.high
         doubled = 2.0 * self.angles[0], 2.0 * self.angles[1]
         cosines = _sine_range(doubled[0] + 0.5 * math.pi, doubled[1] + 0.5 * math.pi)
@@ -406,7 +409,10 @@ class PlaneStiffness:
         return (float(along_range[0]), float(along_range[1])), (float(across_range[0]), float(across_range[1])), slope
 
     def contracted(self, box: Array) -> Array | None:
-        """Return the part of a box, shape (3, 2), that holds all possible matrices of the box; None without one."""
+        """Return a smaller box of entries K11, K22, K12 with all possible matrices of a box, (3, 2).
+
+        The result is None without any.
+        """
         part, rounding = box.copy(), ROUNDING * float(self.high.max())
         for _ in range(ROUNDS):
             along_range, across_range, slope = self._polar(part)
@@ -427,7 +433,7 @@ class PlaneStiffness:
 
 
 def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
-    """Contract a box, shape (3, 2), to matrices K with eigenvalues between low and high."""
+    """Return a smaller box of matrix entries, (3, 2), with all matrices K whose eigenvalues are in [low, high]."""
     part = box.copy()
     off_diagonal = max(box[2, 0], -box[2, 1], 0.0)
     above_low, below_high = box[:2, 1] - low, high - box[:2, 0]

@@ -304,7 +304,7 @@ def _mode_remainder(mode: ModeConstraints, multipliers: ModeMultipliers) -> Arra
 
 
 def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, moments: Array) -> tuple[Array, Array]:
-    """Return branching scores by the numbers s, shape (numbers,), and by w of the mode, shape (5,).
+    """Return branching scores of the numbers s, shape (numbers,), and of the mode coordinates w, shape (5,).
 
     A score is the violation of products at the optimum, times its multipliers.
     """
@@ -345,7 +345,7 @@ def _least_quadratic(matrix: Array, reaches: Array) -> float:
 
 
 def _least_with_shift(matrix: Array, reach: float) -> float:
-    """Return the largest lower bound of (1, v)' matrix (1, v) over |v|^2 <= reach by diagonal shifts."""
+    """Return a lower bound of the quadratic (1, v)' matrix (1, v) over |v|^2 <= reach, by the best diagonal shift."""
     symmetric = _symmetric(matrix)
     if len(symmetric) == 1:
         # no open entry

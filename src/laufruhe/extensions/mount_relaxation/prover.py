@@ -61,7 +61,10 @@ def is_bounded(problem: Problem) -> bool:
 
 
 def bounds(question: Question) -> Iterator[BoxResult]:
-    """Yield lower bounds of the objective; if stiffness alone is open, the bound of the root box comes first."""
+    """Yield lower bounds of the objective by semidefinite relaxation of open mounts.
+
+    If stiffness alone is open, the bound of the root box comes first.
+    """
     stiffness_alone = is_stiffness_problem(question.problem)
     for root_only in (True, False) if stiffness_alone else (False,):
         result = spring_bound(
@@ -85,7 +88,9 @@ def spring_bound(
     problem: Problem, value: float, gap_tolerance: float, reference: Sequence[Value], in_batch: bool = False,
     root_only: bool = False, witness: Witness | None = None,
 ) -> BoxResult:  # fmt: skip
-    """Return the bound of branch and bound, stopped at the gap tolerance or at the budget of relaxations.
+    """Return a lower bound of the objective by branch and bound with semidefinite relaxations.
+
+    The search ends at the gap tolerance or at the largest number of relaxations.
 
     Parameters
     ----------
@@ -128,7 +133,7 @@ def spring_bound(
 def _prove_levels(
     relaxation: SdpRelaxation, gap_tolerance: float, shares: Sequence[float], maximum: int, witness: Witness | None
 ) -> BoxResult:
-    """Prove lower bounds of the objective that rise level by level towards the best design (E59).
+    """Return the highest lower bound proven, by levels that rise towards the best design's objective (E59).
 
     `shares` are the relative gaps to prove one after the other; `maximum` is the most relaxations.
     """
@@ -213,7 +218,7 @@ class _Narrowing(BoxBisection):
         return has_all_modes and super().contains_witness(Box(box.lower[mount_sides], box.upper[mount_sides], 0))
 
     def narrow(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | FathomedPart:
-        """Return the bound and the narrowed box, or `FathomedPart` if it has no better design.
+        """Return the bound and the narrowed box, or `FathomedPart` if no design of the box is better.
 
         With `narrows` False the box is bounded once, and not narrowed.
         """

@@ -80,7 +80,7 @@ class ResponseBound:
     is_travel: bool
 
     def deflections(self, mounts: OpenMounts) -> Array:
-        """Return upper bounds of spring deflections, from force and softest direction, shape (springs,)."""
+        """Return upper bounds of spring deflections [m], from force and softest direction, shape (springs,)."""
         bounds = np.full(mounts.mounts, math.inf)
         softest = np.bincount(mounts.spring_mounts, mounts.softest, mounts.mounts)
         for k, members in enumerate(mounts.members):
@@ -186,7 +186,7 @@ def _mount_forces(mounts: OpenMounts, forces: ComplexArray, omega: float, motion
 
 
 def _units(mounts: OpenMounts, motions: ComplexArray) -> Array:
-    """Return the unit of each product: its rough size at some motions, at least MIN_UNIT of the largest of its kind."""
+    """Return a unit for each product of motion and open number: its rough size, at least MIN_UNIT of the largest."""
     deflections, turns = mounts.motions @ motions, mounts.turns @ motions
     sizes = [_lengths(spring.axes.T @ deflections[spring.mount]) for spring in mounts.springs]
     minimum = MIN_UNIT * max((float(spring_sizes.max()) for spring_sizes in sizes), default=0.0)

@@ -128,7 +128,7 @@ class SdpRelaxation:
         self._last_box = self.lower, self.upper, self._roots[0]
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
-        """Return the model of the mounts in a box for all motions of the block (E57).
+        """Return the model of the mounts over a box, for all motions of the block (E57).
 
         If the mounts are symmetric, models for symmetric and for antisymmetric motions follow.
         """
@@ -142,7 +142,7 @@ class SdpRelaxation:
         return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
 
     def contracted(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """Return the box contracted to the plane stiffnesses that are possible in it; None without possible ones."""
+        """Return the box without impossible stiffness matrices of turning springs; None if none is possible."""
         lower, upper = lower.copy(), upper.copy()
         for key, sides in self._plane_sides():
             part = self._planes[key][1].contracted(np.column_stack([lower[sides], upper[sides]]))
@@ -152,7 +152,7 @@ class SdpRelaxation:
         return lower, upper
 
     def reference_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
-        """Return the shared numbers s of the design of the box nearest to the best, shape (numbers,).
+        """Return the numbers s, shape (numbers,), of that design in a box which is nearest to the best design.
 
         Numbers that are entries of matrices are zero.
         """
@@ -190,7 +190,7 @@ class SdpRelaxation:
         return self.problem.search.boxes_or(int(min(WORK / max(cost, 1), MAX_BOXES)))
 
     def bound(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Return the lower bound of a box [SI] by stiffness boxes or relaxation, and branching scores, shape (n,)."""
+        """Return a lower bound of the objective on a box [SI], and branching scores of its sides, shape (n,)."""
         stiffness_bound, contracted_box = 0.0, self.contracted(lower, upper)
         if contracted_box is None:
             return math.inf, np.zeros(len(lower))
@@ -204,7 +204,7 @@ class SdpRelaxation:
         return max(stiffness_bound, bound), scores
 
     def relax(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Return the lower bound of a box by the relaxation [SI], and branching scores, shape (n,)."""
+        """Return a lower bound of the objective on a box by the relaxation [SI], and branching scores, shape (n,)."""
         total, scores = self._constant, np.zeros(len(lower))
         for k, (weight, _) in enumerate(self._terms):
             box = self._box(k, lower, upper)
@@ -221,7 +221,7 @@ class SdpRelaxation:
         return BoxRelaxation(self, query, limits, lower, upper)
 
     def cut_off(self, lower: Array, upper: Array) -> tuple[SdpProgram, OpenMounts]:
-        """Return the program of designs in a box, and the mounts of the box.
+        """Return the semidefinite program of better designs in a box, and the model of its mounts.
 
         The first term of the objective is at most what the objective `value` leaves it.
         """
@@ -232,7 +232,7 @@ class SdpRelaxation:
         return box.cut_off(self._variables[0], roots if is_inside else self._roots[0]), box.mounts
 
     def under(self, value: float) -> SdpRelaxation:
-        """Return the relaxation of designs below a value, without orders that add little to the proof."""
+        """Return a cheaper relaxation for designs below `value`, without orders that add little to the proof."""
 
         def needed(variable: EpigraphVariable) -> tuple[Order, ...]:
             size = np.array([float(np.sum(np.abs(order.signal) ** 2)) for order in variable.orders])
@@ -251,7 +251,7 @@ class SdpRelaxation:
         return relaxation
 
     def up_to(self, value: float) -> SdpRelaxation:
-        """Return the relaxation of designs up to a value, with unchanged orders and cutoff."""
+        """Return the relaxation for designs with an objective up to `value`, with the same orders and cutoff."""
         relaxation = copy(self)
         relaxation.value = value
         relaxation._reset()

@@ -25,7 +25,7 @@ MOTION = np.diag([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
 
 
 def split_mounts(mounts: OpenMounts) -> tuple[OpenMounts, ...]:
-    """Return the mounts for symmetric and for antisymmetric motions, or () if the mounts are not symmetric.
+    """Return models of the mounts for symmetric and for antisymmetric motions; () if mounts are not symmetric.
 
     The first mount of each mirrored pair stands for both; its motions are longer by the root of two.
     """
@@ -88,7 +88,7 @@ def _is_same(first: Array, second: Array, scale: float | None = None) -> bool:
 
 
 def _part(mounts: OpenMounts, images: list[int], basis: Array) -> OpenMounts:
-    """Return the mounts for the motions that the columns of `basis` span, shape (6, k).
+    """Return the model of the mounts for the motions that the columns of `basis` span, shape (6, k).
 
     `images` are the indices of the mirror images of all springs.
     """

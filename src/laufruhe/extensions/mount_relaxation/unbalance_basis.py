@@ -44,7 +44,9 @@ class UnbalanceBasis:
         return len(self.reference)
 
     def reduced(self, loads: Sequence[ComplexArray]) -> tuple[UnbalanceBasis, Array]:
-        """Return the basis of the combinations of u that change loads, and the map to it, shape (fewer, columns).
+        """Return a smaller basis: the combinations of the unbalances u that change loads, and the map to it.
+
+        The map has the shape (fewer, columns).
 
         `loads` are the changes of the load of each order by the columns of u, shape (columns, k) each.
 
@@ -70,7 +72,7 @@ class UnbalanceBasis:
 
 
 def unbalance_basis(domains: Sequence[Domain], values: Sequence[Value]) -> UnbalanceBasis:
-    """Return the basis of all columns of the unbalance domains; `values` are the unbalances of the best design."""
+    """Return the basis of all open unbalances, relative to their bounds; `values` are those of the best design."""
     low, high = column_bounds(domains)
     middles, reaches = 0.5 * (low + high), 0.5 * (high - low)
     reference = (decision_vector(domains, values) - middles) / np.where(reaches > 0.0, reaches, 1.0)

@@ -52,7 +52,7 @@ def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Da
 
 
 def _rows(panel: Panel, width: float) -> list[Panel]:
-    """Split a panel without room for the numbers on its bars into rows of one scale."""
+    """Return a panel in several rows of one scale if its bars have no room for their numbers."""
     solid = [mark for mark in panel.marks if isinstance(mark, Bars) and not mark.hollow]
     other_marks = [mark for mark in panel.marks if not isinstance(mark, Bars | Words)]
     if not solid or panel.x.ticks is None or other_marks:
@@ -131,7 +131,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
 
 
 def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
-    """Yield filled bars, their outlines, and the numbers of both."""
+    """Yield the marks of a bar chart: filled bars, outlined bars around them, and the numbers of both."""
     series = list(_combinations(bars.loops, names))
     fills = [join(value_of(bars.filled, own_names)) for own_names in series]
     outlines = [join(value_of(bars.outline, own_names)) for own_names in series] if bars.outline else fills

@@ -56,7 +56,7 @@ def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
 
 
 def rows(data: xr.Dataset) -> list[Text]:
-    """Return the statements as a table, with our value and the verdict in every reading."""
+    """Return the statements of the publication as a table, with our value and verdict by interpretation."""
     if not data.sizes.get("statement"):
         return []
     readings = [str(name) for name in data["by_reading"].values]

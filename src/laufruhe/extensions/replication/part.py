@@ -70,7 +70,7 @@ class Replication(Part):
         return self
 
     def _checks(self) -> Iterator[tuple[Place, Any, Callable[[Any], None]]]:
-        """Yield place, value and check of everything that is looked up."""
+        """Yield address, value and check of every name and expression in the part, for messages about wrong ones."""
         for reading, numbers in self.readings.items():
             for name in numbers:
                 yield ("readings", reading), name, partial(check_name, known=self.numbers, what="number")
@@ -104,7 +104,7 @@ class Replication(Part):
         return ("nc", "png") if self.picture_ else ("nc",)
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return every case at every combination of swept numbers, reading by reading."""
+        """Return the points to compute: every case at every combination of swept numbers, for each interpretation."""
         points = []
         for reading, case in itertools.product(self._all_readings().values(), self.cases):
             grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
@@ -141,7 +141,7 @@ class Replication(Part):
         return {name: quantity_value(result, what)._asdict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return quantities along the points, and every statement judged."""
+        """Return the computed quantities along the points as a dataset, with the verdict on every statement."""
         import xarray as xr
 
         swept, readings = list(dict.fromkeys(name for case in self.cases for name in case.sweep)), self._all_readings()
@@ -161,7 +161,10 @@ class Replication(Part):
             return data.assign_coords(judge_statements(self.statements, self.names(data)))
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
-        """Return the values of names in each reading: numbers, quantities by case, and definitions."""
+        """Return the values of all names by interpretation ("reading") of the source.
+
+        Names are numbers, quantities by case, and definitions.
+        """
         names, known = [str(name) for name in data.data_vars if "point" in data[name].dims], {}
         for reading, numbers in self._all_readings().items():
             part = data.isel(point=np.flatnonzero(data["reading"] == reading))

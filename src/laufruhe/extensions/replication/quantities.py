@@ -84,7 +84,7 @@ def _signal(result: Result, _: QuantityQuery) -> Labelled:
 
 
 def _over_cycle(measure: Measure, result: Result, _: QuantityQuery) -> Labelled:
-    """Return a load over the cycle, place by place (C2); a single place has no label."""
+    """Return a load over the cycle at each mount, bearing or other place (C2); a single place has no label."""
     channel = measure.load
     values = channel_samples(result.final, 0, channel)
     degrees = 360.0 * result.final.engine.cycle.turns

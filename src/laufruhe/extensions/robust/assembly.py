@@ -54,7 +54,10 @@ class Assembly(Extra):
 
 
 def assemble(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
-    """Return the engine with the chosen parts, each by its difference from the mean of its lot."""
+    """Return the engine assembled from chosen pistons and rods.
+
+    A lot is a batch of measured parts; a part counts by its difference from the mean mass of its lot.
+    """
     differences = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
     drawing = [
         AddedDrive(

@@ -19,7 +19,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the share of random assemblies below each objective; lines show the best, given and mean assembly."""
+    """Draw the percentage of random assemblies below each objective; lines show the best, initial and mean assembly."""
     details, objective = result.details, result.objective
     if not isinstance(details, AssemblyResult) or objective is None:
         raise ValueError("the result has no chosen pistons or rods, so there is no picture of an assembly")

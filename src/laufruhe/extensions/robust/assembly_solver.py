@@ -50,7 +50,7 @@ PER_KILOGRAM = 0.01
 
 
 def solve_assembly(problem: Problem, *_: object) -> Result:
-    """Return the best assembly with its proof.
+    """Return the assignment of measured pistons and rods to cylinders with the least objective, with its proof.
 
     Raises
     ------
@@ -95,7 +95,10 @@ def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluat
 
 
 def _walk(problem: Problem, lots: Sequence[Lot], start: Chosen, bound: float, seconds: float) -> Chosen | None:
-    """Return an assembly below `bound` that a walk by exact evaluations finds in some seconds; None without one."""
+    """Return an assembly with an exact objective below the claimed lower `bound`, or None if none is found.
+
+    A search over neighbouring assemblies (two parts exchanged) looks for it for some seconds.
+    """
     random, deadline = np.random.default_rng(walk.SEED), time.thread_time() + seconds
     best_known, best_evaluation, minimum, queue = start, _evaluated(problem, lots, start), math.inf, [start]
     for _ in range(walk.MAX_EVALUATIONS):
@@ -121,7 +124,7 @@ def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
 
 
 def refuse(problem: Problem) -> None:
-    """Raise ModelError for problems that [assembly] cannot solve."""
+    """Raise ModelError for problems with other keys than [assembly] supports."""
     if problem.decisions or problem.phasing is not None:
         raise ModelError("[assembly] needs an engine without open numbers; fix them, or leave [assembly] out")
     if len(problem.extras) > 1:
@@ -140,7 +143,7 @@ def refuse(problem: Problem) -> None:
 
 
 def _terms(problem: Problem) -> Terms:
-    """Return norms as functions of the added reciprocating mass, then rotating mass, of each cylinder [kg]."""
+    """Return the objective terms as norms of the added reciprocating, then rotating, mass of each cylinder [kg]."""
     parts = problem.engine.slider_cranks
     errors = [Error(part.name, (PistonDrive(k, PER_KILOGRAM),)) for k, part in enumerate(parts)]
     errors += [
@@ -177,7 +180,7 @@ class _Search(BranchAndBound[Chosen]):
         self.order = [(lot, k) for _, lot, k in sorted(order)]
 
     def run(self) -> float:
-        """Return a lower bound of the objective over all assemblies."""
+        """Search all assemblies by branch and bound; return a lower bound of the objective over them."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
         bound = self.divide((self.bound(free), free), MAX_NODES)
         near = self.bound(self.around(self.best))
@@ -185,7 +188,7 @@ class _Search(BranchAndBound[Chosen]):
         return bound
 
     def around(self, chosen: Chosen) -> Chosen:
-        """Return the node of assemblies that differ from `chosen` in the last FREE cylinders of the order alone."""
+        """Return a small set of assemblies near `chosen`: only the last FREE cylinders of the order are free."""
         free = set(self.order[-FREE:])
         return tuple(
             tuple(-1 if (lot, k) in free else part for k, part in enumerate(parts)) for lot, parts in enumerate(chosen)
@@ -201,7 +204,10 @@ class _Search(BranchAndBound[Chosen]):
         return node.bound >= self.cutoff
 
     def branch(self, nodes: Sequence[OpenNode[Chosen]]) -> BoundedParts[Chosen]:
-        """Yield bound and child for each free part in the most influential cylinder without a part."""
+        """Yield the parts of a node with their bounds: one for each free part in the next cylinder.
+
+        The next cylinder is the most influential one without a part.
+        """
         ((bound, _, chosen),) = nodes
         lot, cylinder = next((position for position in self.order if chosen[position[0]][position[1]] < 0), (-1, -1))
         for part in range(len(self.differences[lot])) if lot >= 0 else ():
@@ -226,7 +232,10 @@ class _Search(BranchAndBound[Chosen]):
         return value
 
     def bound(self, node: Chosen) -> float:
-        """Return a lower bound over the assemblies of a node; assignments on the way are tried as assemblies."""
+        """Return a lower bound of the objective over the assemblies of a node.
+
+        Better assemblies on the way are stored.
+        """
         if all(part >= 0 for parts in node for part in parts):
             return self._try(node)
         point, best = self._middle(node), -math.inf
@@ -272,7 +281,7 @@ class _Search(BranchAndBound[Chosen]):
         return tuple(result)
 
     def result(self, chosen: Chosen, names: Sequence[str]) -> AssemblyResult:
-        """Return the parts by cylinder, with the objectives of random assemblies."""
+        """Return the parts of the best assembly by cylinder, with objectives of random assemblies to compare."""
         random = np.random.default_rng(0)
         random_assemblies = [
             tuple(

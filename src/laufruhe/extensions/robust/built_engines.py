@@ -54,7 +54,7 @@ class BuiltEngines:
         ]
 
     def norm(self, measure: Measure) -> AffineNorm:
-        """Return the norm of a measure as a function of the errors."""
+        """Return a measure as a norm of the manufacturing errors."""
         drawing, refinement = self._evaluations[0], measure.norm.refinement
         kinks = None
         if measure.is_load:
@@ -81,7 +81,7 @@ def evaluate_built(problem: Problem, values: Sequence[Value], samples: int) -> E
 
 
 def objective_values(terms: Terms, errors: Array) -> Array:
-    """Return the objective of many engines, shape (engines,), from errors of shape (engines, columns)."""
+    """Return the objective of many built engines, shape (engines,), from their errors, shape (engines, columns)."""
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
     for weight, norm in terms:
@@ -148,7 +148,9 @@ class WorstCaseAdversary:
     tolerance: float
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
-        """Return the worst engines of a design, given by the values of its decisions, by branch and bound.
+        """Return the worst engines that tolerances allow for a design, by branch and bound.
+
+        `values` are the values of its decisions.
 
         Without `proven`, the search stops after few nodes.
         """
@@ -197,7 +199,7 @@ class SampledEngines:
         return SampledEngines(self.problem, self.errors[indices], self.samples, problems)
 
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:  # noqa: ARG002
-        """Return the worst engines of a design, given by the values of its decisions, exactly."""
+        """Return the worst engines of the sample for a design, exactly; `values` are the values of its decisions."""
         objectives = self.objectives(values)
         errors, limits = [self.errors[int(np.argmax(objectives))]], []
         for limit in load_limits_of(self.problem):
@@ -211,7 +213,7 @@ class SampledEngines:
         )
 
     def objectives(self, values: Sequence[Value], limit: Limit | None = None) -> Array:
-        """Return the objective of each engine, or the value of a limit in its place, shape (engines,)."""
+        """Return the objective of each random engine, or the measure of `limit` in its place, shape (engines,)."""
         samples = self.samples if limit is None else limit_samples(limit.measure, self.samples)
         if tolerances_of(self.problem).is_affine:
             engines = BuiltEngines(self.problem, values, samples)

@@ -108,7 +108,7 @@ class Mark:
 
     @property
     def error(self) -> float:
-        """Largest error in the unit of the number, or as a share of the number."""
+        """Largest manufacturing error, in the unit of the number, or as a fraction of the number."""
         if self.is_share:
             share = self._parsed(self.size[:-1].strip() or "?", "") / 100.0
             if share >= 1.0:
@@ -199,7 +199,7 @@ def _parse_mark(text: str, path: Path) -> Mark:
 
 
 def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Population:
-    """Return the population of engines that the objective covers: the worst case, or a share."""
+    """Return which engines within tolerances the objective counts: the worst one, or a percentage of random ones."""
     if not tolerances:
         raise Refused("robust", None, "has no tolerances", 'give one to a number, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
@@ -257,7 +257,7 @@ def _pins(mark: Mark, engine: Engine) -> _Errors:
 
 
 def _rotor(mark: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
-    """Return the relative error of the size of a counterweight or a balancer."""
+    """Return the errors that a relative tolerance of a counterweight or balancer allows."""
     table = tables[str(mark.path[0])][mark.path[1]]
     if mark.path[0] == "counterweights":
         name = str(table["name"])
@@ -351,7 +351,7 @@ class AssemblyTable(Table):
 
 
 def _assembly(table: AssemblyTable, problem: Problem, context: ExtensionContext) -> Problem:
-    """Return the problem with the lots of parts from CSV files."""
+    """Return the problem with the measured pistons and rods (lots) from the CSV files of [assembly]."""
     engine = problem.engine
     if context.file.geared_inertias:
         raise Refused("geared_inertias", None, "are not supported together with [assembly]", "leave one of the two out")

@@ -23,7 +23,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the share of engines below each objective for both designs, above bars of the cost of tolerances."""
+    """Draw the percentage of built engines below each objective for both designs, and the cost of each tolerance."""
     details, unit = result.details, objective_unit(result)
     if not isinstance(details, RobustResult):
         raise ValueError("the result has no built engines")

@@ -15,7 +15,7 @@ from laufruhe.solvers.result import Result
 
 
 def _tolerance_tables(result: Result) -> list[Table]:
-    """Return a table of the two designs and a table of the tolerances."""
+    """Return a table that compares the optimum for tolerances with that of the drawing, and a table of tolerances."""
     details, unit = result.details, objective_unit(result)
     assert isinstance(details, RobustResult)
     worst = "worst case" if details.exact else "worst drawn"

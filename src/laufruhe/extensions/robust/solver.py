@@ -64,7 +64,7 @@ SHARE_ROUNDS = 12
 
 
 def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
-    """Return the optimum of unbalances for engines within tolerances; `solve` solves the drawing, or one star."""
+    """Return the unbalances that are best for engines within tolerances; `solve` solves the exact drawing."""
     refuse(problem)
     if problem.phasing is not None:
         result = solve_star_by_star(problem, solve)
@@ -95,7 +95,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
 
 
 def _minimise(problem: Problem, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, RobustDesign]:
-    """Return the adversary for the tolerances, and the best design against it."""
+    """Return the search for worst engines (adversary), and the best design against these engines."""
     tolerances, population, samples = tolerances_of(problem), robust_of(problem).population, problem.fidelity.samples
     zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(population.seed)
     if population.share is None and tolerances.is_affine:
@@ -119,7 +119,7 @@ def _minimise(problem: Problem, start: tuple[Value, ...], drawing: Result) -> tu
 
 
 def refuse(problem: Problem) -> None:
-    """Raise ModelError for problems that no method solves for built engines."""
+    """Raise ModelError for problems that [robust] does not support."""
     phasing = problem.phasing
     if phasing is not None:
         if phasing.continuous or phasing.throw_bounds is not None:
@@ -171,7 +171,10 @@ class _Program:
         self.conflict: tuple[str, ...] = ()
 
     def add(self, errors: Sequence[Array]) -> bool:
-        """Add error sets that it lacks; return True if there are any. The least active sets leave a full program."""
+        """Add new sets of errors to the program.
+
+        Return True if there are any. The least active sets leave a full program.
+        """
         added = [z for z in errors if all(np.abs(z - present).max(initial=0.0) > SAME for present in self.errors)]
         while self.errors and len(self.errors) + len(added) > MAX_SCENARIOS:
             index = int(np.argmin(self.shares)) if self.shares else 0
@@ -196,7 +199,7 @@ class _Program:
         return max(model.full_samples for model in self.models)
 
     def at(self, samples: int, averaged: bool = False) -> tuple[AffineProblem, list[tuple[int, Limit]]]:
-        """Return the program of all error sets at `samples`, and the set index and the limit of each of its limits."""
+        """Return the cone program over all error sets at `samples`, and the error set and limit of each constraint."""
         parts = [model.at(samples, averaged) for model in self.models]
         limits = [(set_index, limit, affine_limit) for set_index, part in enumerate(parts)
                   for limit, affine_limit in zip(self.problem.load_limits, part.limits, strict=True)
@@ -210,7 +213,10 @@ class _Program:
         ), [(set_index, limit) for set_index, limit, _ in limits]
 
     def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
-        """Return the optimum and a lower bound over all designs; None if no design satisfies the sampled limits."""
+        """Return the optimal decisions and a lower bound of the objective.
+
+        The result is None if no design satisfies the sampled limits.
+        """
         coarse, owners = self.at(samples)
         coarse = tighten_limits(coarse, self.margin)
         solution = solve_cones(coarse)
@@ -325,7 +331,7 @@ def _at_share(worst: WorstEngines, adversary: SampledEngines, values: Sequence[V
 def _minimise_share(
     problem: Problem, adversary: SampledEngines, start: tuple[Value, ...], share: float, zero_level: float
 ) -> RobustDesign:
-    """Return the design with the smallest objective of a share of random engines that the search finds (R9)."""
+    """Return the best design found whose objective at least a fraction of random engines does not exceed (R9)."""
     count = math.ceil(share * len(adversary.errors))
     values, best = start, None
     for _ in until_time_limit(range(SHARE_ROUNDS)):

@@ -214,7 +214,7 @@ class ToleranceStudy(Part):
         return self.model_dump(include={"kind", "tolerances", "engines", "seed"})
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return one point for each engine, at its single operating point."""
+        """Return the points to compute: one for each engine, at its single operating point."""
         for case in self.cases:
             if len(problem_files.problem(Point(case)).points) != 1:
                 rule = f"has several in '{case.name}', and tolerances are studied at one"
@@ -226,7 +226,7 @@ class ToleranceStudy(Part):
         return spread(problem_files.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return a data set of all engines with the claims of the source."""
+        """Return the free forces of all engines as a dataset, with the claims of the source."""
         names, forces = [mark.name for mark in self.marks], [mark.force for mark in self.marks]
         marks = {"mark_names": names, "mark_forces": forces} if names else {}
         values = {

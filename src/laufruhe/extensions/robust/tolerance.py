@@ -83,7 +83,7 @@ class ShareDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with the rotor, and the drives of its decisions, times the factor."""
+        """Return the engine drawing with a rotor's unbalance, and its decisions, changed by a relative error."""
         factor = 1.0 + self.share * error.real
         rotors = tuple(
             replace(rotor, unbalance=factor * rotor.unbalance) if rotor.name == self.rotor else rotor
@@ -269,7 +269,10 @@ class Tolerances:
         return np.concatenate([half, -half])
 
     def with_errors(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
-        """Return the drawing with errors, shape (columns,); `rebuild` builds it again for errors of file numbers."""
+        """Return the engine drawing with errors, shape (columns,).
+
+        `rebuild` builds it again from changed file numbers.
+        """
         moves: list[tuple[ErrorDrive, complex]] = []
         columns = iter(self.columns)
         for tolerance in self.tolerances:
@@ -293,7 +296,7 @@ class Robust(Extra):
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
-        """Return the name of the objective, with the engines that the objective covers."""
+        """Return the name of the objective for reports, with the engines that it counts, such as "worst case of"."""
         share, engines = self.population.share, self.population.engines
         if share is not None:
             return f"{name}, {100.0 * share:g} % of engines below"

@@ -67,7 +67,9 @@ def value_at(terms: Terms, errors: Array) -> float:
 
 
 def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MAX_NODES) -> WorstCase:
-    """Return the maximum of a weighted sum of norms N of rows V0 + E z over intervals and discs of the errors z.
+    """Return the largest objective over all manufacturing errors z: norms N of rows V0 + E z, weighted and added.
+
+    Each error lies in an interval or a disc.
 
     Parameters
     ----------
@@ -101,7 +103,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
 
 
 def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
-    """Report a bound of a thin node around the worst errors that is below their value."""
+    """Report an error if the bound of a thin node around the worst errors is below their objective."""
     sides = [ErrorBlock(part, THIN * np.eye(part.stop - part.start)) for part in columns]
     thin = bound_node(terms, (1.0 - THIN) * worst.errors, sides, -math.inf, [{} for _ in terms])
     # the sum is maximised, and a witness bounds a minimum
@@ -137,7 +139,7 @@ class _ErrorSearch(BranchAndBound[_Node]):
         return -node.bound <= self.best[0] * (1.0 + self._tolerance)
 
     def branch(self, nodes: Sequence[OpenNode[_Node]]) -> BoundedParts[_Node]:
-        """Yield children: one interval fixed at either end, or one circle divided into arcs."""
+        """Yield the parts of a node with their bounds: an error at either end of its interval, or on arcs."""
         ((negative_bound, _, parent),) = nodes
         other_blocks = [block for k, block in enumerate(parent.blocks) if k != parent.split]
         for centre, free in parent.blocks[parent.split].parts(parent.centre):
@@ -150,7 +152,7 @@ class _ErrorSearch(BranchAndBound[_Node]):
 
 
 def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
-    """Step to the farthest errors along the slope until the value stops rising; return value and errors."""
+    """Return a local maximum of the objective and its errors: steps go to the extreme errors along the slope."""
     value = value_at(terms, errors)
     for _ in range(CLIMBS):
         slope = np.zeros(len(errors))
@@ -193,7 +195,7 @@ class ErrorBlock:
         return self.arc is None and len(self.spans) > 1
 
     def parts(self, centre: Array) -> list[tuple[Array, ErrorBlock | None]]:
-        """Return centres and free blocks that together contain all extreme points of this block."""
+        """Return smaller blocks of errors, with centres, that together contain all extreme points of this block."""
         if len(self.spans) == 1:
             ends = [centre.copy(), centre.copy()]
             for end, sign in zip(ends, (1.0, -1.0), strict=True):
@@ -224,7 +226,7 @@ class NodeBound:
 
 
 def bound_node(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, reaches: Reaches) -> NodeBound:
-    """Return an upper bound of the sum of norms over a node (R5, R6).
+    """Return an upper bound of the objective over all errors of a node (R5, R6).
 
     Parameters
     ----------
@@ -302,7 +304,7 @@ class _TermAbout:
         self.sizes = weight * np.array([reach.size for reach in block_reaches])
 
     def separate_bound(self) -> float:
-        """Return the upper bound of the weighted norm with each row at its own worst (R5)."""
+        """Return an upper bound of the weighted norm, as if each row had its own worst errors (R5)."""
         kind, grid, rows = self.norm.norm, self.norm.grid, self.rows
         bound = self.weight * kind.value(grid, rows) + float(self.sizes.sum())
         if not kind.is_monotone_in_lengths:
@@ -327,7 +329,7 @@ class _TermAbout:
 def _over_majorants(
     parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[ErrorBlock]
 ) -> tuple[float, Array]:
-    """Return an upper bound of the quadratic majorants over all local numbers, and its maximum point, shape (n,).
+    """Return an upper bound of quadratic functions above the norms, over all errors of a node, and its point, (n,).
 
     The ends of up to MAX_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
     bounded one by one.

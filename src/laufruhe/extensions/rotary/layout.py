@@ -36,7 +36,7 @@ class Rotary(Inline):
         return Cycle.TWO_STROKE
 
     def mechanism(self, options: Mapping[str, Any], **shared: Any) -> Mechanism:
-        """Return the mechanism of rotor and eccentric."""
+        """Return the mechanism of a rotary (Wankel) engine's rotor and eccentric."""
         for key in ("eccentricity", "rotor_radius", "rotor_width", "rotor_mass"):
             if options[key] is None:
                 raise KeyedError(key, "is missing; add it")

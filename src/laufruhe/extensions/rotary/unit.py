@@ -121,7 +121,7 @@ class RotaryUnit(SliderCrank):
         return Motion(points, ((self.rotor_inertia, (0.0 * alpha + 1.0 / 3.0, 0.0 * alpha)),))
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Return the outlines of housing and rotor (Y1)."""
+        """Return the outlines of housing and rotor at an eccentric angle, for drawings (Y1)."""
         half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
         height = np.linspace(-half, half, 31)
         flank = 0.5 * self.rotor_radius + 1j * height

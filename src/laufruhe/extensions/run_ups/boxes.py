@@ -60,9 +60,9 @@ class RunBoxes:
         return tuple(runs)
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> LinearBound:
-        """Return linear lower bounds of a measure on boxes of shape (boxes, open numbers); `mask` selects some of them.
+        """Return linear lower bounds of a run-up measure on boxes of mounts, shape (boxes, open numbers).
 
-        The remainder is infinite if no bound is known.
+        `mask` selects some of the boxes. The remainder is infinite if no bound is known.
         """
         box_equations = self._equations(lower, upper)
         step = max(run.step for run in self._runs)
@@ -91,7 +91,7 @@ class RunBoxes:
 
 
 def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, without_stops: bool) -> RunPeaks:
-    """Return the peaks of measures of run-ups; `without_stops` omits bump stops, which cost most of the time."""
+    """Return a function object for the peaks of run-up measures, without bump stops if `without_stops`."""
     if without_stops:
         mounts = (
             mount.mapped(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
@@ -134,7 +134,10 @@ class _RunBounds:
         self._steps = Steps(box_equations, run.step)
 
     def under(self) -> LinearBound:
-        """Return the best bound over all times and places, with a step that ends at the peak of the middle."""
+        """Return the best lower bound over all times and places.
+
+        One time step ends at the peak of the middle design.
+        """
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
         count = min(len(long_steps.impulses) for long_steps in steps)
         moments = np.stack([long_steps.moments[..., :count].reshape(-1, count) for long_steps in steps])
@@ -144,7 +147,10 @@ class _RunBounds:
         return self._of_motion(motion_of(self._steps, moments, impulses, peak_loads))
 
     def _peaks(self) -> Indices:
-        """Return the short step with the largest signal at the middle of each box, near the largest long step."""
+        """Return the index of the short time step with the largest signal, for the middle design of each box.
+
+        It lies near the long step with the largest signal.
+        """
         box_equations, run = self._equations, self._run
         steps = run.ending_at(0)
         rows = steps.moments.reshape(-1, len(steps.impulses))
@@ -199,7 +205,7 @@ class _RunBounds:
         return self._best(size, slopes, second_terms, remainder)
 
     def _best(self, size: Array, slopes: Array, second_order: Array, remainder: Array) -> LinearBound:
-        """Return the largest bound over all places and times.
+        """Return the largest of the linear lower bounds at all places and times.
 
         `size` is the length of the signal at the middle of the box, shape (boxes, places, times). The other arrays are
         its first and second orders by open numbers, and the bound of its remainder.

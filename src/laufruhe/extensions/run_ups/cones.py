@@ -48,7 +48,10 @@ class RunRows:
 
     @classmethod
     def from_problem(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
-        """Return the rows of measures of run-ups; None if run-ups are not linear in the loads."""
+        """Return the signals of run-up measures as rows that are affine in the unbalances.
+
+        The result is None if they are not linear.
+        """
         count = sum(domain.width for domain in domains_of(problem.unbalances))
         signals = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
         if signals is None:
@@ -65,7 +68,10 @@ class RunRows:
         return float(self._lengths(measure, x).max())
 
     def near(self, measure: Measure, x: Array, height: float) -> NDArray[np.intp]:
-        """Return flat indices of the longest row in each interval and place, if above NEAR * `height` at `x`."""
+        """Return flat indices of the longest row in each interval and place, if it is above NEAR * `height`.
+
+        Rows are evaluated at the unbalances `x`.
+        """
         sizes = self._lengths(measure, x)
         interval_length = -(-len(sizes) // (2 * STRETCHES))
         places = []
@@ -89,7 +95,7 @@ class RunRows:
 def solve_run_cones(
     problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows, decide: Decide
 ) -> Result:  # fmt: skip
-    """Return the optimal unbalances with their proof.
+    """Return the optimal unbalances for run-ups, with their proof, by cone programs.
 
     `limits` and `terms` are the limits and objective terms of run-ups; `rows` are all their time steps.
     """
@@ -136,7 +142,7 @@ class _Steps:
         return model.at(min(samples, model.full_samples), averaged)
 
     def add(self, x: Array) -> None:
-        """Add the steps near the limits, and near the maximum, at unbalances `x`."""
+        """Add to the program the time steps near the limits, and near the maximum, at unbalances `x`."""
         heights = [(limit.measure, limit.maximum) for limit in self._limits]
         heights += [(term.measure, self._rows.worst(term.measure, x)) for term in self._terms]
         for measure, height in heights:
@@ -146,7 +152,10 @@ class _Steps:
                 self._places[measure] = np.union1d(places, near_steps).astype(np.intp)
 
     def has_all(self, x: Array) -> bool:
-        """Return True if a design satisfies the limits in all steps, and no step exceeds those in the program."""
+        """Return True if the program needs no more time steps at unbalances `x`.
+
+        The design then satisfies the limits in all steps, and no step exceeds those in the program.
+        """
         satisfies_limits = all(
             self._rows.worst(limit.measure, x) <= limit.maximum * (1.0 + 0.1 * FEASIBLE) for limit in self._limits
         )
@@ -158,7 +167,7 @@ class _Steps:
         return satisfies_limits
 
     def gather(self) -> bool:
-        """Add steps until a design of coarse sampling satisfies all of them; return True if there is one."""
+        """Add time steps to the program until its design satisfies all steps; return True if there is such a design."""
         x = decision_vector(domains_of(self._problem.decisions))
         for _ in until_time_limit(range(_ROUNDS)):
             self.add(x)

@@ -102,7 +102,7 @@ def pairs_of(count: int) -> list[tuple[int, int]]:
 
 
 def roots(squares: Array, slopes: Array, size: int) -> Roots:
-    """Return the inverse square roots S of the stiffness over boxes, from middles and half sides (E65).
+    """Return the inverse square roots S = A^(-1/2) of the stiffness over boxes, as series with errors (E65).
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
     slopes
         Change of the stiffness by half of each side, shape (boxes, open numbers, 6, 6), positive semidefinite.
     size
-        Count of coordinates; those after the six of the block have no S.
+        Number of coordinates; those after the six of the block, of fluid tracks, have no S.
     """
     w = np.sqrt(squares)
     a, b, c = w[:, :, None, None], w[:, None, None, :], w[:, None, :, None]
@@ -146,7 +146,7 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
 
 
 def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
-    """Return the maps from motion to a signal over boxes, in the modes of their middles.
+    """Return the matrices from motion to a signal, such as force, over boxes, in the modes of their middles.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ class RunUpTable(Table):
 
 
 def _read(table: RunUpTable, problem: Problem, __: ExtensionContext) -> Problem:
-    """Return the problem with run-up and shut-down of its engine."""
+    """Return the problem with the run-up and shut-down that the table [run_up] describes."""
     engine, points = problem.engine, [point.name for point in problem.points]
     if engine.block is None:
         raise Refused(

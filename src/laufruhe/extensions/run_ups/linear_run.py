@@ -48,7 +48,7 @@ class Sweep:
     count: int
 
     def wrenches(self, loads: Loads) -> Array:
-        """Return the wrenches at the `NODES` Gauss points of each step, shape (6 NODES, steps).
+        """Return the wrenches on the block at the `NODES` Gauss points of each time step, shape (6 NODES, steps).
 
         Rows are ordered by point, then by component. Wrenches are independent of the mounts.
         """
@@ -127,8 +127,11 @@ class LinearRun:
         shapes = self._shapes[:, upper] * np.where(rates.imag > 0.0, 2.0, 1.0)
         return rates, shapes, np.linalg.inv(self._shapes)[upper, self.model.size :]
 
-    def driven(self, wrenches: Array) -> ComplexArray:
-        """Return the excitation of the modes in each step by wrenches of `Sweep.wrenches`, shape (m, steps + 1)."""
+    def excitation(self, wrenches: Array) -> ComplexArray:
+        """Return the change of the modal states by the loads in each time step, shape (m, steps + 1).
+
+        `wrenches` are those of `Sweep.wrenches`.
+        """
         rates, _, inverse = self.modes
         points, shares = _quadrature()
         # integrals of e^{r (1 - s)} L_i(s) over a step of one, shape (modes, Gauss points)
@@ -147,15 +150,18 @@ class LinearRun:
 
     def response(self, wrenches: Array) -> RunResponse:
         """Return the motion from rest under wrenches of `Sweep.wrenches`."""
-        return self.response_of(_stepped(self.driven(wrenches), np.exp(self.modes[0] * self.sweep.step)))
+        return self.response_of(_stepped(self.excitation(wrenches), np.exp(self.modes[0] * self.sweep.step)))
 
 
-def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
-    """Return z_k = decay z_{k-1} + driven_k for each mode, shape (modes, steps), from decays of shape (modes,)."""
-    modes, count = driven.shape
+def _stepped(excitation: ComplexArray, decays: ComplexArray) -> ComplexArray:
+    """Return the modal states z_k = decay z_{k-1} + excitation_k after each time step, shape (modes, steps).
+
+    `decays` are the factors of the modes in a step, shape (modes,).
+    """
+    modes, count = excitation.shape
     blocks = -(-count // BLOCK)
     states = np.zeros((modes, blocks, BLOCK), dtype=complex)
-    states.reshape(modes, -1)[:, :count] = driven
+    states.reshape(modes, -1)[:, :count] = excitation
     accumulate(states, decays[:, None])
     carried, block_decay = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
     for k, block_end in enumerate(np.ascontiguousarray(states[:, :-1, -1].T), 1):
@@ -165,7 +171,7 @@ def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
 
 
 def accumulate(states: ComplexArray, decays: ComplexArray) -> None:
-    """Add up driven_k to z_k = decay z_{k-1} + driven_k along the last axis, in place; z is zero before the first."""
+    """Compute modal states z_k = decay z_{k-1} + excitation_k along the last axis, in place; z starts from zero."""
     reach = 1
     while reach < states.shape[-1]:
         # doubles the count of steps that each entry includes

@@ -41,7 +41,10 @@ class RunMatrices:
 
     @cached_property
     def loss_factor(self) -> float:
-        """Mean of the smallest and the largest loss factor of motions; this part of the loss drives no motion."""
+        """Mean of the smallest and the largest loss factor of the block's motions.
+
+        This common part drives no motion.
+        """
         squares, modes = np.linalg.eigh(self._model.stiffness(self._model.upper[None])[0])
         if not squares[0] > 0.0:
             return 0.0

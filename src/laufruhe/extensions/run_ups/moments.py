@@ -52,8 +52,8 @@ class RunMoments:
     def __init__(self, sweep: Sweep, wrenches: Array, load: Array, times: int) -> None:
         self.sweep, self.times = sweep, times
         self._wrenches = wrenches.reshape(NODES, 6, -1)
-        driven = np.linalg.norm(np.einsum("ni,ais->ans", load, self._wrenches), axis=1).max(axis=0)
-        self._highest = largest_share() * driven
+        lengths_of_loads = np.linalg.norm(np.einsum("ni,ais->ans", load, self._wrenches), axis=1).max(axis=0)
+        self._highest = largest_share() * lengths_of_loads
         self._known: dict[int, LongSteps] = {}
 
     @property
@@ -61,17 +61,23 @@ class RunMoments:
         """Length of a long step [s]."""
         return self.times * self.sweep.step
 
-    def ending_at(self, place: int) -> LongSteps:
-        """Return the long time steps of which one ends at short step `place`; before the start there is no load."""
-        first = place % self.times
+    def ending_at(self, short_step: int) -> LongSteps:
+        """Return long time steps of the run, placed so that one of them ends at the short step with this index.
+
+        There is no load before the start of the run.
+        """
+        first = short_step % self.times
         if first not in self._known:
             self._known[first] = self._long_steps(first)
         return self._known[first]
 
-    def short(self, places: Array) -> Array:
-        """Return moments of the short steps at `places`, zero outside the run, shape (..., moments, 6)."""
-        inside = (places >= 0) & (places < self.sweep.count)
-        wrenches = self._wrenches[..., np.where(inside, places, 0)] * inside
+    def short(self, indices: Array) -> Array:
+        """Return time moments of the wrenches in short time steps, shape (..., moments, 6).
+
+        They are zero for `indices` outside the run.
+        """
+        inside = (indices >= 0) & (indices < self.sweep.count)
+        wrenches = self._wrenches[..., np.where(inside, indices, 0)] * inside
         shares = step_moments(MOMENTS) * self.sweep.step ** np.arange(1, MOMENTS + 1)[:, None]
         return np.asarray(np.moveaxis(np.tensordot(shares, wrenches, axes=1), (0, 1), (-2, -1)))
 

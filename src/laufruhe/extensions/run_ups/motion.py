@@ -157,28 +157,31 @@ class Steps:
         return _followed(self.moves[0], (self.loads[0] @ moments)[:, None])[:, 0]
 
     def orders(self, moments: Array, middle: Array) -> tuple[Array, Array]:
-        """Return the first and second derivatives z_j and z_jk of the states by the open numbers."""
+        """Return the derivatives z_j and z_jk of the motion by the open numbers, first and second, at all times.
+
+        `moments` are those of the loads, and `middle` the motion of the middle design.
+        """
         start_motion = middle[:, None, :, :-1]
         first = _followed(self.moves[0], self.moves[1] @ start_motion + self.loads[1] @ moments[:, None])
-        driven = self.moves[2] @ start_motion + self.loads[2] @ moments[:, None]
+        sources = self.moves[2] @ start_motion + self.loads[2] @ moments[:, None]
         for number, (j, k) in enumerate(self.pairs):
-            driven[:, number] += self.moves[1][:, j] @ first[:, k, :, :-1]
+            sources[:, number] += self.moves[1][:, j] @ first[:, k, :, :-1]
             if j != k:
-                driven[:, number] += self.moves[1][:, k] @ first[:, j, :, :-1]
-        return first, _followed(self.moves[0], driven)
+                sources[:, number] += self.moves[1][:, k] @ first[:, j, :, :-1]
+        return first, _followed(self.moves[0], sources)
 
 
-def _followed(moves: Array, driven: Array) -> Array:
-    boxes, columns, m, count = driven.shape
+def _followed(moves: Array, sources: Array) -> Array:
+    boxes, columns, m, count = sources.shape
     states = np.zeros((count + 1, boxes, m, columns))
-    states[1:] = np.moveaxis(driven, (3, 0, 2, 1), (0, 1, 2, 3))
+    states[1:] = np.moveaxis(sources, (3, 0, 2, 1), (0, 1, 2, 3))
     for k in range(count):
         states[k + 1] += moves @ states[k]
     return np.ascontiguousarray(np.moveaxis(states, (0, 1, 2, 3), (3, 0, 2, 1)))
 
 
 def motion_of(steps: Steps, moments: Array, impulses: Array, peak_loads: Array) -> RunMotion:
-    """Return the motion on boxes, each under its own moments.
+    """Return the motion of a run-up over boxes of mounts, each under its own loads.
 
     Parameters
     ----------
@@ -220,7 +223,7 @@ def _between(
     impulses: Array,
     peak_loads: Array,
 ) -> Array:
-    """Return a bound of the mean of |f| over a step in excess of the mean of its ends, shape (boxes, steps).
+    """Return a bound of how much the mean of |f| over a time step exceeds that of its ends, shape (boxes, steps).
 
     A curve leaves its chord by at most an eighth of the squared step times its largest second derivative. |y'| of the
     middle, whose load jumps, differs from that of the nearer end by at most half a step times its derivative.

@@ -29,7 +29,7 @@ STARTS, STOPPED_STARTS = 6, 3
 
 
 def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
-    """Return the best local optimum of several starts, with a lower bound.
+    """Return the best mounts for run-ups, a local optimum of several starts, with a lower bound.
 
     The result without run-ups, `relaxed`, gives a start and a lower bound.
     """

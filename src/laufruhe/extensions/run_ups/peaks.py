@@ -63,7 +63,10 @@ class RunPeaks:
         return tuple(2 * STRETCHES * places[measure.channel.unit != "rad"] for measure in self.measures)
 
     def values(self, point: Array) -> Array:
-        """Return the peaks at open numbers of mounts, then columns of unbalances, shape (peaks,); NaN if steps fail."""
+        """Return the local maxima of run-up measures for a design, shape (peaks,); NaN if its time steps fail.
+
+        `point` has the open numbers of mounts, then the unbalances.
+        """
         if self.has_stops:
             # with stops the differences cost little more than one design
             return self._at(point)[1]
@@ -80,7 +83,9 @@ class RunPeaks:
         return self._at(point)[2]
 
     def rows(self, points: Sequence[Array]) -> list[dict[Measure, Array]] | None:
-        """Return the signals of measures at each step and place of both runs, for each point of open numbers.
+        """Return the signals of measures at each time step and place of both runs, for each design.
+
+        A point has the open numbers of mounts, then the unbalances.
 
         Return None if signals are not linear in the loads, as with bump stops.
         """
@@ -125,7 +130,7 @@ class RunPeaks:
         return _peaks(base, interpolates), np.column_stack([(high - low) / width for low, high, width in pairs])
 
     def _sides(self, point: Array, k: int) -> tuple[Array, Array]:
-        """Return points on both sides of `point`, which differ in open number k by a small step within its bounds."""
+        """Return two designs for a difference quotient: open number k is a small step lower and higher."""
         count = len(self._decisions)
         if k < count:
             decision = self._decisions[k]
@@ -140,7 +145,7 @@ class RunPeaks:
         return ends
 
     def _signals(self, points: Sequence[Array]) -> list[list[Array] | None]:
-        """Return the signals of measures in both runs for each point; None if steps fail."""
+        """Return the signals of measures in both runs for each design; None if its time steps fail."""
         count, runs = len(self._decisions), []
         models = [self._model(point[:count]) for point in points]
         for sweep, (base, columns) in zip(self.sweeps, self._wrenches, strict=True):
@@ -167,7 +172,7 @@ class RunPeaks:
 
     @cached_property
     def sweeps(self) -> tuple[Sweep, ...]:
-        """Steps of run-up and shut-down; () if they are too many."""
+        """Time steps of run-up and shut-down; () if they are too many."""
         run = self._problem.engine.extra(Run)
         if run is None:
             raise TypeError("the problem has no run-up")

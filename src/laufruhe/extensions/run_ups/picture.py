@@ -24,7 +24,7 @@ applies = runs_up
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the largest force, travel and roll over speed."""
+    """Draw the largest mount force, mount travel and roll angle in a run-up over crank speed."""
     layout = page(3, 1, (6.8, 1.5), gap=0.22)
     run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
     maximum, legend = [0.0] * len(_ROWS), []

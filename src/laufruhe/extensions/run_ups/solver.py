@@ -27,7 +27,7 @@ _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
-    """Return the optimum of a problem with run-ups in its objective or limits.
+    """Return the optimal design of a problem with run-ups in its objective or limits.
 
     All open numbers are of `kinds`, such as unbalances or stiffness; `decide` solves a problem without run-ups.
 

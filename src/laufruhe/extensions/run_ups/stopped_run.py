@@ -54,11 +54,14 @@ class _DesignBatch:
         stop_force *= self.stops
         return stop_force
 
-    def next(self, z: ComplexArray, driven: ComplexArray) -> ComplexArray:
-        """Return the modes after one step, shape (designs, modes); `driven` is the change by the loads."""
+    def next(self, z: ComplexArray, excitation: ComplexArray) -> ComplexArray:
+        """Return the modal states z after one time step, shape (designs, modes).
+
+        `excitation` is their change by loads.
+        """
         force = self.pressed(z)
         next_modes = self.decays * z
-        next_modes += driven
+        next_modes += excitation
         # real view of the modes as columns
         parts = next_modes.view(float)[..., None]
         parts += np.matmul(self.first, force)
@@ -71,7 +74,7 @@ class _DesignBatch:
 def responses_to(
     models: Sequence[TimeModel | None], sweep: Sweep, wrenches: Sequence[Array]
 ) -> list[RunResponse | None]:  # fmt: skip
-    """Return the motion of each design under its wrenches from `Sweep.wrenches`; None if steps fail.
+    """Return the motion of each design in a run-up under its wrenches (`Sweep.wrenches`); None if time steps fail.
 
     A design that has no time model is None in `models`.
 
@@ -87,8 +90,8 @@ def responses_to(
     if is_too_stiff or len(valid_runs) < len(runs) or len({len(run.modes[0]) for run in valid_runs}) > 1:
         return [None] * len(runs)
     batch = _batch_of(valid_runs, sweep.step)
-    driven = np.stack([run.driven(loads) for run, loads in zip(valid_runs, wrenches, strict=True)])
-    return [run.response_of(loads) for run, loads in zip(valid_runs, _followed(batch, driven), strict=True)]
+    excitation = np.stack([run.excitation(loads) for run, loads in zip(valid_runs, wrenches, strict=True)])
+    return [run.response_of(loads) for run, loads in zip(valid_runs, _followed(batch, excitation), strict=True)]
 
 
 def quickest(model: TimeModel) -> float:
@@ -126,13 +129,13 @@ def _real_rows(columns: ComplexArray) -> Array:
     return np.ascontiguousarray(np.stack([columns.real, columns.imag], axis=1).reshape(2 * len(columns), -1))
 
 
-def _followed(batch: _DesignBatch, driven: ComplexArray) -> ComplexArray:
-    """Return the modes after each step, shape (designs, modes, steps + 1), from their excitation in each step."""
-    states = np.array(driven)
+def _followed(batch: _DesignBatch, excitation: ComplexArray) -> ComplexArray:
+    """Return the modal states after each time step, shape (designs, modes, steps + 1), from their change by loads."""
+    states = np.array(excitation)
     powers = batch.decays[..., None] ** np.arange(1, BLOCK + 1)
-    count, z = driven.shape[-1], np.ascontiguousarray(driven[..., 0])
+    count, z = excitation.shape[-1], np.ascontiguousarray(excitation[..., 0])
     for start in range(1, count, BLOCK):
-        driving_block = driven[..., start : start + BLOCK]
+        driving_block = excitation[..., start : start + BLOCK]
         free = np.array(driving_block)
         accumulate(free, batch.decays)
         free += powers[..., : free.shape[-1]] * z[..., None]

@@ -81,7 +81,7 @@ def _requested(source: Source, state: PageState, with_fixed: bool) -> tuple[dict
 
 
 def _answered(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callable[Concatenate[Source, P], str]:
-    """Turn the outcome of `work`, or its error, into JSON."""
+    """Return `work` as a function that gives its result, or its error, as JSON."""
 
     @wraps(work)
     def answered(source: Source, /, *args: P.args, **kwargs: P.kwargs) -> str:
@@ -124,7 +124,7 @@ def begin(source: Source) -> dict[str, Any]:
 
 @_answered
 def follow(source: Source, state: PageState) -> dict[str, Any]:
-    """Return the optimum of the affine decisions, all others fixed, within milliseconds."""
+    """Return the optimum of the unbalances and other affine decisions, all others fixed, within milliseconds."""
     began, spent = time.perf_counter(), time.process_time()
     tables, problem = _requested(source, state, with_fixed=True)
     page_problem = page_problem_of(problem, tables, source.content)
@@ -154,7 +154,7 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
 
 @_answered
 def measure(source: Source, state: PageState) -> dict[str, Any]:
-    """Evaluate the displayed design by the exact model."""
+    """Return the exact evaluation of the design that the page displays."""
     tables, whole_problem = _requested(source, state, with_fixed=True)
     problem = replace(page_problem_of(whole_problem, tables, source.content).problem, limits=whole_problem.limits)
     values = decided(problem, state.design)
@@ -165,7 +165,7 @@ def measure(source: Source, state: PageState) -> dict[str, Any]:
 
 @_answered
 def settle(source: Source, state: PageState, seconds: float) -> dict[str, Any]:
-    """Solve and prove the whole problem as `laufruhe solve` does."""
+    """Return the proven optimum of the whole problem, as `laufruhe solve` computes it."""
     began = time.perf_counter()
     tables, problem = _requested(source, state, with_fixed=False)
     result = solve(replace(problem, sharply=True), time_limit=seconds)
@@ -216,7 +216,7 @@ def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, 
 
 @_answered
 def front(source: Source, state: PageState, across: str, k: int) -> dict[str, Any]:
-    """Return point k of the front against the measure `across`; {"done": True} after the last."""
+    """Return point k of the Pareto front against the measure `across`; {"done": True} after the last."""
     pareto, simpler = _front(source, state, across)
     maximum = next(islice(places(*pareto.ends()), k, None), None)
     if maximum is None:
@@ -248,7 +248,7 @@ def front(source: Source, state: PageState, across: str, k: int) -> dict[str, An
 
 @_answered
 def save(source: Source, state: PageState) -> dict[str, Any]:
-    """Return the state of the page as a problem file."""
+    """Return the present design and edits of the page as the text of a problem file."""
     tables, problem = _requested(source, state, with_fixed=True)
     units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
     with errors_in_file(source.path.name):

@@ -83,7 +83,7 @@ class Claim:
 
 
 def breaks_words(limits: Iterable[LimitValue]) -> str:
-    """Return the broken limits with value and edge, in words; empty if all are met."""
+    """Return the broken limits with value and bound, in words; empty if all are met."""
     broken = [limit for limit in limits if not is_met(limit)]
     words = [
         f"{limit.name} ({figure(limit.value, limit.unit)}, {limit.side} {figure(limit.limit, limit.unit)})"
@@ -96,7 +96,7 @@ def breaks_words(limits: Iterable[LimitValue]) -> str:
 def preview_claim(
     position: int, problem: Problem, value: float, simpler: Simplification, limits: Iterable[LimitValue]
 ) -> Claim:
-    """Return the claim about a design that follows a slider, from its objective [SI] and all limits of the problem."""
+    """Return what the page states about a design while a slider moves, from its objective [SI] and all limits."""
     kind = ClaimKind.SIMPLIFIED if simpler else ClaimKind.ESTIMATE
     lead = f"Estimate {figure(value, problem.objective_unit or '')}"
     words = f"{problem.objective_name}{simpler.phrase}"
@@ -104,7 +104,7 @@ def preview_claim(
 
 
 def initial_claim(position: int, problem: Problem, value: float | None, limits: Iterable[LimitValue]) -> Claim:
-    """Return the claim about the initial design, where nothing follows sliders."""
+    """Return what the page states about the initial design, if no number follows sliders."""
     if value is None or not math.isfinite(value):
         words = "No objective" if value is None else "The initial design is on a resonance"
         return Claim(ClaimKind.INITIAL, position, "", words, breaks=breaks_words(limits))
@@ -116,7 +116,7 @@ def initial_claim(position: int, problem: Problem, value: float | None, limits: 
 def conflict_claim(
     position: int, names: Sequence[str], simpler: Simplification = COMPLETE, is_last: bool = False
 ) -> Claim:
-    """Return the claim that no design meets these limits together; final if `is_last`."""
+    """Return the statement that no design meets these limits together; final if `is_last`."""
     names_text = join_phrases([f"'{name}'" for name in names])
     why = f"{names_text} contradict each other" if len(names) > 1 else f"{names_text} cannot be met within the bounds"
     lead = "No design exists:" if is_last else "No design found:"
@@ -124,7 +124,7 @@ def conflict_claim(
 
 
 def settled_claim(position: int, result: Result) -> Claim:
-    """Return the claim about the whole problem as `laufruhe solve` decides it."""
+    """Return what the page states about the proven optimum of the whole problem."""
     objective, certificate = result.objective, result.certificate
     if result.status is Status.INFEASIBLE and result.conflict:
         return conflict_claim(position, result.conflict, is_last=True)

@@ -113,7 +113,7 @@ def _of_engine(tables: Mapping[str, Any]) -> Iterator[Control]:
 
 
 def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Control]:
-    """Yield controls of decided numbers, which the page may fix."""
+    """Yield controls of open numbers, which the page may fix at a value."""
     for decision in problem.decisions:
         try:
             edits.keys_by_name(tables, decision.name)

@@ -58,7 +58,7 @@ def _part(part: SliderCrank, cycle: float) -> dict[str, Any]:
 
 
 def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
-    """Return a weight: its unbalance without decisions [kg m], and the gain of each decision (C4)."""
+    """Return a counterweight for the page: its unbalance without decisions [kg m], and the gain of each (C4)."""
     constant, drives = complex(rotor.unbalance), list[dict[str, Any]]()
     for decision in problem.decisions:
         for drive in decision.rotor_drives:

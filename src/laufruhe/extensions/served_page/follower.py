@@ -56,7 +56,7 @@ class SliderOptimum:
 
 
 def can_follow(problem: Problem) -> bool:
-    """Return True if all open numbers are affine and a norm of the loads is minimised."""
+    """Return True if the optimum can follow sliders: loads are affine in all open numbers, and a norm is minimised."""
     kinds = {decision.kind for decision in problem.decisions}
     has_norm = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     has_no_extras = not problem.extras and problem.phasing is None
@@ -83,7 +83,7 @@ class Follower:
         self._averaged = model.at(TIMES * self.samples, averaged=True)
 
     def at(self, limits: Sequence[Limit]) -> SliderOptimum:
-        """Return the optimum under the given limits."""
+        """Return the optimal values of the open numbers under these limits."""
         maximum_of = {limit.measure: limit.maximum for limit in limits if limit.maximum < np.inf}
         load_limits = self._problem.load_limits
 

@@ -48,7 +48,7 @@ class Guard:
         return f"http://{self.hosts[0]}/#o={self._ticket}"
 
     def refusal(self, method: str, headers: Mapping[str, str]) -> str:
-        """Return the reason to refuse a request; empty for a good one."""
+        """Return the reason to refuse a request by its method and headers; empty for an allowed one."""
         if headers.get("Host", "") not in self.hosts:
             return "the header Host does not name this server"
         origin = headers.get("Origin")
@@ -64,7 +64,7 @@ class Guard:
         return hmac.compare_digest((token or "").encode("utf-8", "replace"), self.token.encode())
 
     def exchanged(self, ticket: str) -> str | None:
-        """Return the token for the right ticket, once; None for any other."""
+        """Return the access token for the right one-time ticket; None for any other ticket."""
         with self._lock:
             good = bool(self._ticket) and hmac.compare_digest(ticket.encode("utf-8", "replace"), self._ticket.encode())
             if good:

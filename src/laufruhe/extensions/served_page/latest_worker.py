@@ -38,7 +38,7 @@ class LatestWorker:
         self._closed = False
 
     def ask(self, seconds: float, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Run the work in the process and return its result.
+        """Return the result of `work`, which the worker process computes.
 
         Raise `Superseded` if a newer request came before the answer, and `Late` if the work exceeds `seconds`.
         """
@@ -88,7 +88,7 @@ class LatestWorker:
                 self._workers, self._busy = None, False
 
     def close(self) -> None:
-        """End the process at once."""
+        """End the worker process at once."""
         with self._changed:
             self._closed = True
             self._end(self._workers)

@@ -70,7 +70,7 @@ class PageProblem:
     def standing(
         self, limits: Sequence[Limit], design: Evaluation, followed: SliderOptimum | None
     ) -> tuple[LimitValue, ...]:
-        """Return the values of all limits with prices [SI]."""
+        """Return value, state and shadow price of every limit for a design [SI]."""
         if design.resonance:
             return ()
         limit_values_of_design = limit_values(replace(self.problem, limits=tuple(limits)), design)
@@ -99,7 +99,10 @@ class PageProblem:
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
     def simpler(self, fixed_kinds: Collection[Kind]) -> Simplification:
-        """Return what is fixed and what is left out while sliders move; the page fixes numbers of `fixed_kinds`."""
+        """Return which open numbers are fixed, and which terms and limits are ignored, while sliders move.
+
+        The page fixes numbers of `fixed_kinds`.
+        """
         problem = self.full_problem
         kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
         if problem.phasing is not None:

@@ -51,7 +51,7 @@ class PageState:
 
     @classmethod
     def from_json(cls, body: object) -> PageState:
-        """Parse a request; `Refused` if it is malformed."""
+        """Return the state of a page from the JSON of its request; `Refused` if it is malformed."""
         if not isinstance(body, dict) or not set(body) <= {"edits", "held", "design", "has", "position"}:
             raise _strange("request", "must be a table of edits, held, design, has and position")
         design, has, position = body.get("design", {}), body.get("has", ""), body.get("position", 0)
@@ -65,7 +65,7 @@ class PageState:
         return cls(_edits(body.get("edits", []), "edits"), _edits(body.get("held", []), "held"), numbers, has, position)
 
     def tables(self, tables: Tables, with_fixed: bool) -> dict[str, Any]:
-        """Return the tables of the requested problem."""
+        """Return the tables of the problem file with the page's edits, also fixed numbers if `with_fixed`."""
         changed = dict(tables)
         for edit in (*self.edits, *(self.fixed if with_fixed else ())):
             changed = edit(changed)

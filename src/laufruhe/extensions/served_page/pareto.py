@@ -23,7 +23,7 @@ _NARROW = 1e-3
 
 
 def partners(problem: Problem) -> dict[str, Measure]:
-    """Return measures for the second axis of a front, by name: measures of the problem, then usual ones."""
+    """Return measures for the second axis of a Pareto front, by name: those of the problem, then common ones."""
     if not can_follow(problem):
         return {}
     minimised = {term.measure for term in problem.objective}
@@ -51,7 +51,7 @@ class ParetoFront:
         self._minimum = Follower(self.problem.changed(objective=(Term(across),), limits=self.others))
 
     def ends(self) -> tuple[float, float]:
-        """Return the minimum of the other measure, and its value at the least objective."""
+        """Return the ends of the Pareto front: minimum of the other measure, and its value at the least objective."""
         minimum = self._minimum.at(self.others)
         if minimum.conflict:
             raise ModelError(f"no design satisfies the limits {' and '.join(minimum.conflict)} together")

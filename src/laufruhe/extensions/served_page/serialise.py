@@ -29,7 +29,7 @@ _DIGITS = 9
 
 
 def as_text(answer: dict[str, Any]) -> str:
-    """Return JSON; a model is JSON already, numbers that are not finite become null."""
+    """Return an answer as JSON text; its model is JSON already, and numbers that are not finite become null."""
     plain = {key: entry for key, entry in answer.items() if key not in ("model", "engine")}
     text = json.dumps(finite(plain), allow_nan=False)
     texts = {"model": answer.get("model"), "engine": json.dumps(answer["engine"]) if "engine" in answer else None}
@@ -50,7 +50,7 @@ def design(problem: Problem, values: Sequence[Value]) -> dict[str, float]:
 
 
 def limits(values: Iterable[LimitValue], problem: Problem, is_estimate: bool = False) -> list[dict[str, Any]]:
-    """Return values, sides, state and prices of limits, in words and numbers."""
+    """Return value, side, state and shadow price of each limit as JSON data, in words and numbers."""
     edges = {limit.name: limit for limit in problem.limits}
     return [
         {
@@ -81,7 +81,7 @@ def _words(limit: LimitValue, problem: Problem, is_estimate: bool) -> str:
 
 
 def fixing_edits(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
-    """Return edits that fix the numbers that are not affine; empty without any, or if one cannot be fixed."""
+    """Return edits of the problem file that fix all numbers in which loads are not affine; empty if one cannot be."""
     fixes: list[list[Any]] = []
     if result.phasing is not None and result.phasing.ranking:
         star = result.phasing.ranking[0]
@@ -100,7 +100,7 @@ def fixing_edits(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
 
 
 def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> dict[str, Any]:
-    """Return a star as the page may request it again."""
+    """Return a crank star and firing order as the value with which the page can request it again."""
     phasing = result.problem.phasing
     optional = [name for names in phasing.shafts.optional for name in names] if phasing is not None else []
     return {

@@ -54,7 +54,7 @@ class Server(ThreadingHTTPServer):
         self._lock = threading.Lock()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection; evict the slowest sender if all are in use, or refuse."""
+        """Start a thread for a connection; if all threads are in use, end the slowest sender's, or refuse."""
         has_room = self._room.acquire(blocking=False)
         if not has_room and self._evict():
             has_room = self._room.acquire(timeout=EVICTION)
@@ -81,7 +81,7 @@ class Server(ThreadingHTTPServer):
             self._readers.pop(request, None)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """Handle one connection."""
+        """Handle the requests of one connection in its thread."""
         try:
             super().process_request_thread(request, client_address)
         finally:
@@ -92,7 +92,7 @@ class Server(ThreadingHTTPServer):
         """Ignore clients that have gone away; log nothing."""
 
     def server_bind(self) -> None:
-        """Bind without looking up a name."""
+        """Bind the server to its port without a look-up of the host name."""
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
@@ -142,7 +142,7 @@ class HttpRequest(BaseHTTPRequestHandler):
         """Log nothing: others may read a log."""
 
     def do_GET(self) -> None:
-        """Send the page and its files, which hold nothing of the problem."""
+        """Send the page and its script files, which contain no data of the problem."""
         self.server.has_read(self.connection)
         path = "/page.html" if self.path == "/" else self.path
         refusal = self.server.guard.refusal("GET", self._headers())
@@ -176,7 +176,7 @@ class HttpRequest(BaseHTTPRequestHandler):
         return {name: values[0] if len(values) == 1 else "?" for name, values in headers.items() if values}
 
     def _body(self) -> Any:
-        """Return the JSON of the request; None after a refusal."""
+        """Return the JSON data of the request; None if the request was refused."""
         length = self.headers.get("Content-Length", "")
         if self.headers.get("Transfer-Encoding") is not None or not length.isdecimal() or len(length) > 9:
             return self._refused(HTTPStatus.LENGTH_REQUIRED, "the length of the request is missing")

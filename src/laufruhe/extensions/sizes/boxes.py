@@ -101,7 +101,10 @@ class SizeBoxes:
         return SizeNumber(measure, sense, self._monotonicity(factors), tuple(map(Bundle, series)))
 
     def _monotonicity(self, numbers: Callable[[Array], Array]) -> Monotonicity:
-        """Return 1 for each size if all numbers rise with it, -1 if all fall, 0 if none changes; shape (sizes,)."""
+        """Return how numbers follow each open size: 1 if all rise, -1 if all fall, 0 if none changes.
+
+        Shape (sizes,).
+        """
         lower, upper = self.model.lower, self.model.upper
         monotonicity = np.zeros(len(lower))
         for start in (lower, upper):
@@ -125,21 +128,21 @@ class SizeBoxes:
         return np.array([_common_sign(*pair) for pair in zip(changes, names, strict=True)])
 
     def with_limits(self, limits: Sequence[Limit]) -> SizeBoxes:
-        """Return the boxes with some of the limits alone, and no objective."""
+        """Return the same search with some of the limits alone, and no objective."""
         boxes = copy.copy(self)
         boxes.terms, boxes.limits = [], [limit for limit in self.limits if limit[2] in limits]
         boxes._combined = boxes._programs(self._propose)
         return boxes
 
     def reach(self, lower: Array, upper: Array) -> SizeReach:
-        """Return the ranges of masses and rod length on a box."""
+        """Return the ranges of masses and rod length over a box of sizes."""
         ends = (self.model.masses(corner(sign * self._mass_signs, lower, upper)) for sign in (1.0, -1.0))
         light, heavy = ends
         rod = self.model.rod_length(lower), self.model.rod_length(upper)
         return SizeReach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
 
     def add_tangents(self, lower: Array, upper: Array) -> None:
-        """Add tangents of loads at masses of a box."""
+        """Add linear lower bounds (tangents) of loads at the masses of a box of sizes."""
         reach, maximum = self.reach(lower, upper), MAX_TANGENTS if self._combined is None else FEW_TANGENTS
         (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
@@ -148,7 +151,7 @@ class SizeBoxes:
                     bundle.add_tangents(np.append(masses, unbalances), length)
 
     def minimum(self, number: SizeNumber, lower: Array, upper: Array, reach: SizeReach) -> float:
-        """Return a lower bound of a measure on a box."""
+        """Return a lower bound of a measure over a box of sizes."""
         vertex = corner(number.monotonicity, lower, upper)
         if not number.pieces:
             return number.sense * self.model.value(number.measure, vertex)
@@ -165,7 +168,7 @@ class SizeBoxes:
         return scaled.minimum(reach)
 
     def objective(self, lower: Array, upper: Array, multipliers: Sequence[CombinedMultipliers] = ()) -> float:
-        """Return a lower bound of the objective on a box; infinite if multipliers exclude the box."""
+        """Return a lower bound of the objective over a box of sizes; infinite if multipliers prove it infeasible."""
         reach = self.reach(lower, upper)
         # multipliers of the whole problem replace the bounds of single loads
         numbers = [(w, number) for w, number in self.terms if not (multipliers and number.pieces)]
@@ -175,7 +178,10 @@ class SizeBoxes:
         return bound + max(*(self._combined.minimum(rows, lower, upper, reach) for rows in multipliers), 0.0)
 
     def violates_limit(self, lower: Array, upper: Array, k: int | None = None, sign: float = 0.0) -> bool:
-        """Return True if a limit is violated in the whole box; with k, of limits with monotonicity `sign` in size k."""
+        """Return True if a limit is violated in the whole box of sizes.
+
+        With an index k, only limits count whose measure rises (sign 1) or falls (-1) with size k.
+        """
         reach = self.reach(lower, upper)
         return any(
             self.minimum(number, lower, upper, reach) > maximum
@@ -186,7 +192,7 @@ class SizeBoxes:
     def cut(
         self, lower: Array, upper: Array, target: float, multipliers: tuple[CombinedMultipliers, ...] = ()
     ) -> SizeCut | None:
-        """Return a box without ends that have no better design; None if nothing remains."""
+        """Return a box of sizes without those ends that have no design below `target`; None if nothing remains."""
         self.add_tangents(lower, upper)
         if self.violates_limit(lower, upper) or self.objective(lower, upper, multipliers) >= target:
             return None
@@ -208,7 +214,10 @@ class SizeBoxes:
     def multipliers_of(
         self, lower: Array, upper: Array, target: float, multipliers: tuple[CombinedMultipliers, ...]
     ) -> tuple[CombinedMultipliers, ...]:
-        """Return multipliers of a box, then those of its parent; with all samples if the bound is near the target."""
+        """Return multipliers of a box of sizes, then those of its parent box.
+
+        They are for all samples if the box's bound is near `target`.
+        """
         if self._combined is None:
             return ()
         is_near = bool(multipliers) and self.objective(lower, upper, multipliers) >= (1.0 - NEAR) * target
@@ -218,7 +227,7 @@ class SizeBoxes:
     def _without_empty_ends(
         self, lower: Array, upper: Array, k: int, target: float, multipliers: Sequence[CombinedMultipliers]
     ) -> tuple[Array, Array]:
-        """Return the box without the parts at both ends of side k that are proven to be empty."""
+        """Return the box of sizes without the ends of side k that are proven to have no better design."""
         is_side = np.arange(len(lower)) == k
 
         def low_empty(edge: float) -> bool:
@@ -281,7 +290,7 @@ class _Sizes(BoxBisection):
     def bound_box(
         self, lower: Array, upper: Array, multipliers: tuple[CombinedMultipliers, ...] = ()
     ) -> tuple[float, Box] | FathomedPart:
-        """Return the bound of a box and its remainder after the cut."""
+        """Return the lower bound of a box of sizes, and what remains of the box after its ends are cut off."""
         cut = self._boxes.cut(lower, upper, self.cutoff, multipliers)
         if cut is None:
             return FathomedPart(self.level)
@@ -297,7 +306,10 @@ class _Sizes(BoxBisection):
 def divided_sizes(
     boxes: SizeBoxes, value: float, gap_tolerance: float, maximum: int = MAX_BOXES, witness: Witness | None = None
 ) -> BoxResult:  # fmt: skip
-    """Return the bound by bisection, until no design is better than `value` by more than `gap_tolerance` (Z12)."""
+    """Return a lower bound of the objective over all sizes, by bisection of boxes (Z12).
+
+    The search ends when no design is better than `value` by more than `gap_tolerance` [SI].
+    """
     bisection = _Sizes(boxes, value, gap_tolerance, witness)
     result = bisection.run(bisection.bound_box(boxes.model.lower, boxes.model.upper), maximum)
     if witness is not None:

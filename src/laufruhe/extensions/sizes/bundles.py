@@ -109,7 +109,7 @@ class GroupedRows:
 
     @classmethod
     def from_rows(cls, lengths: RodSeries, z: Array) -> GroupedRows:
-        """Return the groups for multipliers `z` of the rows of a piece, with the initial factors."""
+        """Return groups of load rows with common size factors, weighted by multipliers `z`, at the initial factors."""
         price = lengths.piece.affine.dual_norm(z)
         rows_of_columns = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
         products = z[:, :, None] * rows_of_columns
@@ -124,7 +124,10 @@ class GroupedRows:
         return cls(lengths, tuple(groups), price)
 
     def with_factors(self, factors: Sequence[Array]) -> tuple[Array, float]:
-        """Return <Z, V> with other factors, shape (n, 1 + columns), and their largest ratio to the initial factors."""
+        """Return the weighted sum <Z, V> of load rows for other size factors, shape (n, 1 + columns).
+
+        The second result is the largest ratio of these factors to the initial ones.
+        """
         if not factors:
             return np.asarray(self.groups[0][:, 0, 0]), 1.0
         ratios = [factor / initial for factor, initial in zip(factors, self.lengths.piece.initial_factors, strict=True)]

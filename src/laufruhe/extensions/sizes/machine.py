@@ -144,7 +144,7 @@ class RunningGear(Extra):
         return part
 
     def move(self, engine: Engine, changes: Mapping[Any, float], _: Sequence[SliderCrank]) -> Engine:
-        """Return the engine with changes of its sizes, and of the masses that follow."""
+        """Return the engine with other sizes of its running gear, and the masses that follow from them."""
         if not changes:
             return engine
         return resized(
@@ -152,7 +152,7 @@ class RunningGear(Extra):
         )
 
     def scaled(self, length: float, mass: float) -> Self:
-        """Return the gear of a similar engine, with factors of its lengths and masses."""
+        """Return the running gear of a similar engine, scaled by factors of lengths and masses."""
         scaled_parts: dict[str, object] = {}
         for name in PARTS:
             part = getattr(self, name)

@@ -58,7 +58,7 @@ class Piece:
     initial_factors: tuple[Array, ...]
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
-        """Return the ratio of factors at other sizes to the initial ones, or None if their ratios differ."""
+        """Return the common ratio of size factors to their initial values; None if their ratios differ."""
         if not factors:
             return 1.0
         pairs = zip(factors, self.initial_factors, strict=True)
@@ -81,7 +81,7 @@ class Piece:
         return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
 
     def pruned(self, low: Array, high: Array) -> Piece:
-        """Return the piece of a maximum without the rows that are largest for no columns between `low` and `high`."""
+        """Return the same maximum without load rows that are never the largest for unbalances in [`low`, `high`]."""
         affine_rows, reach = self.affine, 0.5 * (high - low)
         size = lengths(affine_rows.rows(low + reach))
         change = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
@@ -172,7 +172,7 @@ class SizeModel:
         return {**self._sizes_given, **dict(zip(self.names, x.tolist(), strict=True))}
 
     def masses(self, x: Array) -> Array:
-        """Return the masses that the running gear adds for sizes `x`, shape (4,)."""
+        """Return what the running gear adds for sizes `x`: three masses of a rod, and an unbalance, shape (4,)."""
         gear = self._moving.gear
         if gear is None or gear.density is None:
             return np.zeros(MASSES)
@@ -193,7 +193,10 @@ class SizeModel:
     def factors(
         self, positions: Sequence[tuple[int, int | None, int]], measure: Measure, engine: Engine
     ) -> list[Array]:
-        """Return the factors of sizes at the positions of a piece, shape (places, 1 or d) each; [] without places."""
+        """Return factors from load to stress, which depend on sizes, for some places of a measure.
+
+        Each has the shape (places, 1 or d); the list is empty without such factors.
+        """
         if not positions:
             return []
         chosen_places, rows = measure.places(measure.load.places(engine)), []
@@ -221,7 +224,10 @@ class SizeModel:
         return samples * (max(math.ceil(FINE / samples), 1) if self._averages(measure) else measure.norm.refinement)
 
     def pieces_over_length(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
-        """Return a function from a rod length [m] to the pieces of a measure, with the same rows at each length."""
+        """Return a function from a rod length [m] to the load rows of a measure, in pieces with common size factors.
+
+        The rows are the same at each length.
+        """
         length = self._sizes_given[ROD_LENGTH]
         if not measure.is_load:
             return lambda rod_length: self._new_pieces(measure, rod_length)
@@ -231,7 +237,10 @@ class SizeModel:
         return lambda rod_length: self._new_pieces(measure, rod_length, kinks)
 
     def fixed_rows(self, measure: Measure) -> list[Mask]:
-        """Return masks of the rows of each piece of a measure that no kink passes as the rod length changes."""
+        """Return masks of the load rows at angles that no kink (jump of slope) passes as the rod length changes.
+
+        There is one mask for each piece of the measure.
+        """
         pieces = self.pieces_over_length(measure)(self._sizes_given[ROD_LENGTH])
         if not measure.is_load:
             return [np.ones(len(piece.affine.constant), dtype=bool) for piece in pieces]
@@ -259,7 +268,7 @@ class SizeModel:
         ]
 
     def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
-        """Return the pieces of a measure (rows with common factors) at a rod length; the largest is its value."""
+        """Return a measure as pieces (load rows with common size factors) at a rod length; the largest is its value."""
         length = self.problem.engine.slider_cranks[0].rod_length if rod_length is None else rod_length
         cache, key = self._pieces.setdefault(length, {}), (measure, self._averages(measure))
         if key not in cache:
@@ -284,7 +293,7 @@ class SizeModel:
         return masses.min(axis=0), masses.max(axis=0)
 
     def _unit_evaluations(self, length: float) -> list[Evaluation]:
-        """Return evaluations at a rod length [m]: without masses and unbalances, then with one unit of each column."""
+        """Return evaluations at a rod length [m]: without open masses and unbalances, then with one unit of each."""
         if length not in self._evaluations:
             problem, unbalances = self.problem, self.problem.unbalances
             engine = problem.design([0.0] * len(unbalances), unbalances)
@@ -340,7 +349,7 @@ class SizeModel:
 
 
 def _without_moving_kinks(signals: Sequence[Spectrum], angles: Array, margin: float) -> Mask:
-    """Return the mask of angles that no kink passes between lengths, nor comes nearer than `margin` [rad]."""
+    """Return the mask of crank angles that no kink of a load comes nearer than `margin` [rad] at any rod length."""
     period = signals[0].period
     kinks = [np.zeros(0) if signal.kinks is None else signal.kinks.angles for signal in signals]
     if len({len(signal) for signal in kinks}) > 1:

@@ -36,7 +36,7 @@ MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
 
 
 def solve_mounted_sizes(problem: Problem) -> Result:
-    """Return the best local optimum of a few searches, with a lower bound."""
+    """Return the best sizes of an engine on elastic mounts: a local optimum of a few searches, with a lower bound."""
     started = time.perf_counter()
     without_mounts = replace(
         problem,
@@ -73,7 +73,7 @@ def _bound(problem: Problem, model: SizeModel, design: Design) -> float:
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:
-    """Return a problem that decides masses in place of running-gear sizes, and its values for the sizes `values`.
+    """Return a problem with open masses in place of open sizes, and its decision values for the sizes `values`.
 
     Limits on stresses and on sizes are omitted.
     """

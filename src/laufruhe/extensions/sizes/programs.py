@@ -61,7 +61,10 @@ class SizePrograms:
     def multipliers_of(
         self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False
     ) -> CombinedMultipliers | None:
-        """Return multipliers from the cone program of a box, or None if they bound nothing."""
+        """Return multipliers that bound the objective over a box of sizes, from its cone program.
+
+        The result is None if they do not.
+        """
         program = self.program(lower, upper, reach)
         x, multipliers = self._propose(program, exactly)
         if x is None and not exactly:
@@ -73,7 +76,7 @@ class SizePrograms:
         return self._combined(stripped, minorant(stripped, interpolate_duals(stripped, multipliers)).multipliers)
 
     def program(self, lower: Array, upper: Array, reach: SizeReach) -> AffineProblem:
-        """Return the program of a box: masses as decisions before the unbalances, factors at their minimum."""
+        """Return the cone program of a box of sizes: masses and unbalances are open, factors minimal."""
         half = 0.5 * (reach.high - reach.low)
         open_masses = [int(k) for k in np.flatnonzero(half > 0.0)]
         masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, ()) for k in open_masses]
@@ -113,7 +116,10 @@ class SizePrograms:
         return CombinedMultipliers(tuple(parts), constant, size, not rows.terms)
 
     def minimum(self, multipliers: CombinedMultipliers, lower: Array, upper: Array, reach: SizeReach) -> float:
-        """Return the lower bound of a box from multipliers; infinite if they prove the box infeasible."""
+        """Return the lower bound of the objective over a box of sizes by multipliers.
+
+        It is infinite if the box is infeasible.
+        """
         if not multipliers.parts:
             return 0.0
         total, remainder, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))

@@ -50,7 +50,7 @@ class RodSeries:
 
     @classmethod
     def fixed(cls, piece: Piece, length: float) -> RodSeries:
-        """Return the series for a fixed rod length: one term, no remainder."""
+        """Return load rows at a fixed rod length as a series with one term and no remainder."""
         affine = piece.affine
         return cls(
             piece, length, length, affine.constant[None], affine.slope[None], np.zeros(1 + affine.slope.shape[-1])
@@ -89,7 +89,7 @@ class RodSeries:
 def rod_series(
     pieces: Callable[[float], Sequence[Piece]], start: float, low: float, high: float, masks: Sequence[Mask]
 ) -> list[RodSeries]:
-    """Return the series of each piece of a measure between two rod lengths.
+    """Return the load rows of a measure as series in the rod length between two lengths, one for each piece.
 
     Parameters
     ----------

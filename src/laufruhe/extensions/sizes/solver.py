@@ -68,7 +68,7 @@ class SizeProgram(LocalProgram):
         return np.concatenate([np.full(d.width, d.decision in self.model.sizes, dtype=bool) for d in self.domains])
 
     def numbers(self, shares: Array) -> Array:
-        """Return the objective, then the relative margin of each limit and of each sector."""
+        """Return the objective, then the relative margin of each limit and of each unbalance's sector."""
         columns, problem = self.columns(shares), self.problem
         sizes, unbalances = columns[self.sized], columns[~self.sized]
         value = sum(term.weight * self.model.value(term.measure, sizes, unbalances) for term in problem.objective)
@@ -78,7 +78,7 @@ class SizeProgram(LocalProgram):
         return np.array([value, *margins, *self.edges(shares)])
 
     def place(self, values: Array) -> Array:
-        """Return the shares of the bounds for sizes `values` [m] and the best unbalances for them."""
+        """Return the start point of a search for sizes `values` [m], with the best unbalances for them."""
         problem, decisions = self.problem, self.model.sizes
         if not self.model.domains:
             return self.shares(values)
@@ -138,7 +138,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
 
 
 def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
-    """Return the optimum of a program or None, and multipliers, at few samples or `exactly` at many."""
+    """Return the optimum of a cone program, or None, and multipliers, at few samples or `exactly` at many."""
     steps = MANY_STEPS if exactly else FEW_STEPS
     coarse = replace(
         program,
@@ -173,7 +173,10 @@ def check_acts(model: SizeModel) -> None:
 
 
 def solve_star_sizes(problem: Problem) -> Result:
-    """Return the best star with its optimal sizes and unbalances; the best value so far bounds the next search."""
+    """Return the best crank star with its optimal sizes and unbalances.
+
+    The best objective so far bounds the search of the next star.
+    """
     phasing = problem.phasing
     if phasing is None:
         raise ValueError("neither throws nor firing order of the problem are open")

@@ -223,7 +223,7 @@ class TwistBoxes:
         return series(centre[None], half[None], inverse[None], along, excitation.inside, angles[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> LinearBound:
-        """Return a linear lower bound of an RMS over orders, sections and operating points.
+        """Return a linear lower bound of the RMS of a torque or stress over orders, sections and operating points.
 
         `chains` are those at the lower corner, the centre and the upper corner of the box, and `twists` the series of
         the response at each operating point.
@@ -248,7 +248,7 @@ class TwistBoxes:
     def _alternating(
         self, measure: Measure, chains: Sequence[Torsion], excitation: _Excitation, twist: Expansion, chosen: Indices
     ) -> LinearResponse:
-        """Return the response of the chosen sections over a box, in every order but zero."""
+        """Return the alternating torque or stress of chosen shaft sections as linear functions over a box."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
         twisted = _twist_of(len(chains[1].sections), len(root))
         scaled = twisted / root

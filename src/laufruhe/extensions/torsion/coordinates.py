@@ -44,14 +44,14 @@ class TwistCoordinates:
         return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 
     def from_decisions(self, values: Array) -> Array:
-        """Return the coordinates for given values of the decisions, shape (n,)."""
+        """Return the coordinates (stiffness in place of diameter) for values of the decisions, shape (n,)."""
         coordinates = np.array(values, dtype=float)
         for k, section in self._round:
             coordinates[k] = section.moved(section.stiffness, float(values[k])).stiffness
         return coordinates
 
     def decisions(self, coordinates: Array) -> Array:
-        """Return the values of the decisions for given coordinates, shape (n,)."""
+        """Return the values of the decisions (diameters again) for coordinates, shape (n,)."""
         values = np.array(coordinates, dtype=float)
         for k, section in self._round:
             diameter = section.diameter or 0.0
@@ -65,15 +65,18 @@ class TwistCoordinates:
         return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
 
     def ends(self, lower: Array, upper: Array, resonance: Resonance) -> tuple[Torsion, Torsion] | None:
-        """Return the chains with the lowest and the highest modes in a box; None if they are not at corners (V15)."""
+        """Return the torsional chains with the lowest and the highest natural frequencies in a box (V15).
+
+        The result is None if they are not at corners of the box.
+        """
         absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
         falls = np.zeros(len(lower), dtype=bool)
         for k, keys in enumerate(self._keys):
-            shares = [resonance.share(absorbers[part]) if part in absorbers else 1.0 for part, _ in keys]
+            ratios = [resonance.inertia_ratio(absorbers[part]) if part in absorbers else 1.0 for part, _ in keys]
             if keys[0][1] != "inertia":
                 continue
-            known = [share for share in shares if share is not None]
-            if len(known) < len(shares) or min(known) < 0.0 < max(known):
+            known = [ratio for ratio in ratios if ratio is not None]
+            if len(known) < len(ratios) or min(known) < 0.0 < max(known):
                 return None
             falls[k] = max(known) > 0.0
         low, high = self.chain(np.where(falls, upper, lower)), self.chain(np.where(falls, lower, upper))

@@ -141,7 +141,7 @@ def speeds_between(design: Evaluation, low: float, high: float) -> Array:
 
 
 def torque_over_speed(design: Evaluation, speeds: Array) -> Array:
-    """Return half the peak to peak torque [N m] by section, shape (speeds, sections).
+    """Return half the peak to peak torque of each shaft section at crank speeds [N m], shape (speeds, sections).
 
     The load is that of the operating point with the largest mean torque.
     """

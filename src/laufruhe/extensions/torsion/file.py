@@ -116,7 +116,7 @@ class _OpenNumbers:
         self.decisions: list[Decision] = []
 
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
-        """Return the number `key` of all `parts` of a name, or its start if it is open, which adds a decision."""
+        """Return the value of key `key` of parts with one name; an open number gives its start, and adds a decision."""
         number = Open.from_value(value)
         drives = (NumberDrive(TORSION, (part, key)) for part in parts)
         self.decisions += number.decisions(f"torsion.{name}.{key}", unit, *drives)
@@ -171,7 +171,7 @@ def _chain(
 
 
 def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> list[Disc]:
-    """Return a disc for each throw from the front, with the reduced inertia of its pistons and rods."""
+    """Return the discs of the torsional chain, one for each throw from the front, with reduced inertias."""
     places = sorted({throw.x for throw in throws}, reverse=True)
     at = [[k for throw in throws if throw.x == x for k in throw.cylinders] for x in places]
     # the mass of a throw that turns, without its rods
@@ -209,7 +209,7 @@ def _section(
     shaft: SectionTable, table: TorsionTable, where: str, stiffness_given: float | Open | None, name: str,
     links: Sequence[str], open_numbers: _OpenNumbers,
 ) -> list[ShaftSection]:  # fmt: skip
-    """Return equal sections of shaft, named after the discs that they join."""
+    """Return equal shaft sections of the torsional chain, named after the discs that they join."""
     require_one_of(shaft, where, "stiffness", "pieces")
     diameter, bore, length = shaft.diameter, shaft.bore, None
     if stiffness_given is not None:
@@ -281,7 +281,7 @@ def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]
 
 
 def _read(table: TorsionTable, problem: Problem, context: ExtensionContext) -> Problem:
-    """Return the problem with its chain; refuse a rotating inertia that contradicts the discs (V14)."""
+    """Return the problem with the torsional chain of [torsion]; refuse an inertia that contradicts the discs (V14)."""
     chain, decisions = _chain(table, problem.engine.slider_cranks, context.throws)
     wheel = problem.engine.flywheel
     result = replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))

@@ -87,7 +87,7 @@ class ShaftSection:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
 
     def moved(self, stiffness: float, diameter: float | None) -> ShaftSection:
-        """Return the section with another stiffness, or with another diameter and the stiffness of this diameter."""
+        """Return the shaft section with another stiffness, or with another diameter and its stiffness."""
         if diameter is None or diameter == self.diameter or self.length is None:
             return replace(self, stiffness=stiffness)
         stiffness = stiffness_of([(self.length, diameter, self.bore)], self.shear_modulus)

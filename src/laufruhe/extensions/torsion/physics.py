@@ -52,8 +52,11 @@ class AtSpeed:
         """Return the inertia matrix of discs and rings [kg m2], which is diagonal."""
         return np.diag(inertias(chain))
 
-    def share(self, absorber: Absorber) -> float | None:
-        """Return the ratio of effective to own inertia: 1; None for a pendulum, whose stiffness grows with inertia."""
+    def inertia_ratio(self, absorber: Absorber) -> float | None:
+        """Return the effective over the own inertia of an absorber: 1.
+
+        The result is None for a pendulum, which stiffens with speed.
+        """
         return None if absorber.order else 1.0
 
 
@@ -75,8 +78,8 @@ class InOrder:
         pulls = [(chain.index(a.on), k, complex(a.inertia * (a.order / self.order) ** 2)) for k, a in _rings(chain)]
         return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
 
-    def share(self, absorber: Absorber) -> float | None:
-        """Return the ratio of effective to own inertia: 1 for a ring, 1 / (1 - h^2/n^2) for a pendulum.
+    def inertia_ratio(self, absorber: Absorber) -> float | None:
+        """Return the effective over the own inertia of an absorber: 1 (ring), 1 / (1 - h^2/n^2) (pendulum).
 
         It is 0 if the order equals the tuning of the pendulum, so that the disc stands still. A pendulum with a spring
         has no such ratio, and None is returned.
@@ -123,7 +126,9 @@ def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
 
 
 def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
-    """Solve K q = (2 pi f)^2 J q in the twists of all links, some of which may have no stiffness (V4).
+    """Return the natural modes of a chain of discs: solve K q = (2 pi f)^2 J q in the twists of all links (V4).
+
+    Some links may have no stiffness.
 
     `fixed` are the stiffnesses of the absorbers in these modes [N m/rad].
     """
@@ -153,7 +158,9 @@ def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalM
 
 
 def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) -> Array:
-    """Return |sum_k a_k e^{-i h phi_k}| over the cylinders, shape (orders, modes) (V6; textbook 2.9).
+    """Return the vector sums by which the cylinders excite each mode, shape (orders, modes) (V6; textbook 2.9).
+
+    A vector sum is |sum_k a_k e^{-i h phi_k}| over the cylinders.
 
     phi_k is the firing angle of cylinder k, a_k the amplitude of its throw in the mode. The sum is the
     work of all cylinders over that of one cylinder at the largest amplitude.
@@ -256,7 +263,7 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
 
 
 def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """Return torque over twist, k (1 + i eta) + i h w c, shape (orders, sections) [N m/rad] (V8)."""
+    """Return the dynamic stiffness k (1 + i eta) + i h w c of each shaft section, (orders, sections) [N m/rad] (V8)."""
     stiff = np.array([s.stiffness * complex(1.0, s.loss_factor) for s in chain.sections])
     damping = np.array([s.damping for s in chain.sections])
     stiffness = stiff + 1j * speed * orders[:, None] * damping
@@ -313,7 +320,10 @@ def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
 
 
 def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """Return K + i H + i h w C - (h w)^2 J by order [N m/rad], affine in inertia, stiffness and damping (V5)."""
+    """Return the dynamic stiffness matrix K + i H + i h w C - (h w)^2 J of the chain by order [N m/rad] (V5).
+
+    It is affine in inertia, stiffness and damping.
+    """
     rate, discs = (orders * speed)[:, None, None], len(chain.discs)
     springs = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
     dampers = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
@@ -333,7 +343,10 @@ def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
 
 
 def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -> ComplexArray:
-    """Return the angles [rad] under torques [N m], orders above zero, shapes (orders, discs and rings, columns)."""
+    """Return the angles of discs and rings [rad] under torques [N m], orders above zero.
+
+    Both have the shape (orders, discs and rings, columns).
+    """
     dynamic = dynamic_stiffness(chain, orders, speed)
     try:
         angles = np.linalg.solve(dynamic, drives)

@@ -22,7 +22,7 @@ MAX_FACTOR = 40.0
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw half of the peak to peak torque: thick for the largest section, thin for each section of the last design."""
+    """Draw half of the peak to peak shaft torque over speed: thick for the largest, thin for each shaft section."""
     low, high = speed_range(result)
     speeds = speeds_between(result.final, low, high)
     drawn = page(1, 1, (7.6, 3.6))

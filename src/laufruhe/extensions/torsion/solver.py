@@ -32,7 +32,7 @@ MAX_OPEN, MAX_BOXES = 3, 3000
 
 
 def solve_torsion(problem: Problem) -> Result:
-    """Return the best discs, shafts and absorbers found, with the bound of the boxes, or a proven conflict of limits.
+    """Return the best discs, shafts and absorbers, with a lower bound by boxes, or proven contradicting limits.
 
     Root mean squares, inertia and irregularity are decided to a proven optimum of up to three numbers. A bound
     of any other measure uses these numbers only.
