@@ -109,7 +109,10 @@ def main() -> None:
     for (command, name), pictures in WANTED.items():
         with tempfile.TemporaryDirectory() as folder:
             problem = ROOT / "problems" / f"{name}.toml"
-            subprocess.run([sys.executable, "-m", "laufruhe", command, problem, "--out", folder], check=True)
+            subprocess.run(
+                [sys.executable, "-m", "laufruhe", command, problem, "--out", folder, "--format", "png"],
+                check=True,
+            )
             for drawn, kept in pictures.items():
                 shrunk(Path(folder) / f"{drawn}.png", PICTURES / f"{kept}.png")
 

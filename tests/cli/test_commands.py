@@ -24,7 +24,7 @@ PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
 TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
 DECIDED = {"decisions.csv", "limits.csv", "weights.csv"}
 ALL_FILES = PAGES | TABLES | DECIDED
-ALL_FILES |= {f"{name}.png" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
+ALL_FILES |= {f"{name}.svg" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 
 
 @pytest.fixture
@@ -189,15 +189,15 @@ def test_what_others_made_is_never_touched(here: Path) -> None:
     for out in (".", "mine", "..", here):
         refused(run("solve", path, "--out", out), "--out")
     assert run("evaluate", path, "--no-plots").exit_code == 0
-    (here / "results/scene-initial/cycle.png").write_text("mine")
-    refused(run("evaluate", path), "results", "'cycle.png', which Laufruhe did not make")
+    (here / "results/scene-initial/cycle.svg").write_text("mine")
+    refused(run("evaluate", path), "results", "'cycle.svg', which Laufruhe did not make")
     for name, text in (("trace.csv", "1,2\n"), ("package.json", '{"name": 1}'), ("deep.json", "[" * 5000),
                        ("book.json", '{"title": "mine"}'), ("list.json", '[{"problem": 1}]')):  # fmt: skip
         (here / name).write_text(text)
         refused(run("check", path, "--json", name), "--json", "did not make")
         assert (here / name).read_text() == text
     assert (here / "mine/report.md").read_text() == "mine"
-    assert (here / "results/scene-initial/cycle.png").read_text() == "mine"
+    assert (here / "results/scene-initial/cycle.svg").read_text() == "mine"
     for _ in range(2):
         assert run("check", path, "--json", "own.json").exit_code == 0
 

@@ -21,4 +21,4 @@ def test_results_are_those_of_one_run(seed: int, whole: Whole, tmp_path: Path) -
     told = Told()
     solve_kills.attacked(tmp_path / "s", seed, whole, told)
     assert told.wrong == []
-    assert {".laufruhe.json", "result.json", "report.md", "cycle.png"} <= set(whole.files)
+    assert {".laufruhe.json", "result.json", "report.md", "cycle.svg"} <= set(whole.files)

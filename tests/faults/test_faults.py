@@ -228,7 +228,7 @@ def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch
     words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", "out"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
-    assert (tmp_path / "out/cycle.png").is_file()
+    assert (tmp_path / "out/cycle.svg").is_file()
 
 
 @pytest.mark.parametrize("name", ["inline-five-open", "vee-six-open", "two-stroke-four-open", "inline-five-uneven-gas"])

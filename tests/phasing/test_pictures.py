@@ -47,7 +47,7 @@ def test_the_trade_lies_above_its_bound(uneven):
 def test_command_writes_rankings_and_pictures(tmp_path):
     answer = CliRunner().invoke(app, ["solve", str(PROBLEMS / "inline-five-open.toml"), "--out", str(tmp_path)])
     assert answer.exit_code == 0
-    assert {"star.png", "firings.png", "report.md", "result.json"} <= {path.name for path in tmp_path.iterdir()}
+    assert {"star.svg", "firings.svg", "report.md", "result.json"} <= {path.name for path in tmp_path.iterdir()}
     report = (tmp_path / "report.md").read_text(encoding="utf-8")
     assert "## Crank stars" in report
     assert "1-3-5-4-2" in report

@@ -86,7 +86,7 @@ def test_a_study_of_a_package_runs(tmp_path: Path) -> None:
     environment = installed(tmp_path / "site")
     done = laufruhe(environment, "study", STUDY, "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "out" / "crests.png").exists()
+    assert (tmp_path / "out" / "crests.svg").exists()
     text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     assert "crest factor" in text
     # a sine of half the force at one mount, of a quarter at two

@@ -20,4 +20,4 @@ def test_results_are_those_of_one_run(tmp_path: Path, seed: int, whole: kills.Wh
     told = kills.Told()
     kills.attacked(tmp_path / "s", seed, whole, told)
     assert told.wrong == []
-    assert set(whole.files) >= {"report.md", "fraction.nc", "fraction.csv", "fraction.png", "map.nc"}
+    assert set(whole.files) >= {"report.md", "fraction.nc", "fraction.csv", "fraction.svg", "map.nc"}

@@ -134,7 +134,7 @@ def test_the_ready_study_runs_and_goes_on(tmp_path: Path) -> None:
     words = ["study", str(written(tmp_path, text)), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert CliRunner().invoke(app, words).exit_code == 0
     made = {path.name for path in (tmp_path / "out").iterdir()}
-    assert {"designs.nc", "designs.csv", "designs.png", "engines.nc", "engines.csv", "engines.png"} <= made
+    assert {"designs.nc", "designs.csv", "designs.svg", "engines.nc", "engines.csv", "engines.svg"} <= made
     with xr.open_dataset(tmp_path / "out/designs.nc") as data:
         assert data.sizes == {"case": 2, "draw": 2_000}
         assert np.all(data["objective"].where(data["within_limits"] > 0.0).min("draw") >= data["lower_bound"])

@@ -145,7 +145,7 @@ def test_a_random_study_is_computed_told_and_drawn(seed: int, tmp_path: Path) ->
         "tables.xlsx",
         "p.nc",
         "p.csv",
-        "p.png",
+        "p.svg",
     }
     assert "nan" not in (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
     if part["kind"] in KINDS[:3]:

@@ -171,7 +171,7 @@ def test_map_by_its_command(tmp_path: Path) -> None:
         "tables.xlsx",
         "p.nc",
         "p.csv",
-        "p.png",
+        "p.svg",
     }
     with xr.open_dataset(out / "p.nc") as data:
         assert set(data["case"].values) == {"one", "two"}

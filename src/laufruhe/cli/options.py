@@ -44,14 +44,14 @@ PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=P
 class Format(StrEnum):
     """Kinds of picture files."""
 
-    PNG = "png"
     SVG = "svg"
+    PNG = "png"
     BOTH = "both"
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Endings of the files."""
-        return ("png", "svg") if self is Format.BOTH else (str(self),)
+        return ("svg", "png") if self is Format.BOTH else (str(self),)
 
 
 FORMAT = "Format of the picture files; the HTML report holds its own."

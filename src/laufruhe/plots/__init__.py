@@ -19,7 +19,7 @@ from matplotlib.figure import Figure
 from laufruhe.errors import refused
 from laufruhe.numerics.processes import fork_map
 from laufruhe.plots.letters import prepare
-from laufruhe.plots.style import as_svg, save
+from laufruhe.plots.style import save, save_and_show
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
 
@@ -58,12 +58,20 @@ def _words(result: Result) -> Iterator[str]:
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
     """Write all pictures, as png or svg, into a folder and return the file names."""
-    return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds, names(result)) for name in figure_names)
+    folder.mkdir(parents=True, exist_ok=True)
+    files: list[str] = []
+    for name in names(result):
+        drawn, ends = figure(result, name), [f"{name}.{kind}" for kind in kinds]
+        for file in ends:
+            save(drawn, folder / file)
+        files += ends
+    return tuple(files)
 
 
 def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], picture_names: Iterable[str]) -> dict[str, str]:
-    """Write some pictures as `draw` does, and return them as SVG by name."""
-    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, picture_names)}
+    """Write some pictures as files of these kinds, and return them as SVG by name."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return {name: save_and_show(figure(result, name), folder / name, kinds) for name in picture_names}
 
 
 def get_ready() -> None:
@@ -87,14 +95,3 @@ def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: in
     # pictures of a process that died
     svg_by_name |= draw_and_show(result, folder, kinds, [name for name in picture_names if name not in svg_by_name])
     return {name: svg_by_name[name] for name in picture_names}
-
-
-def _drawn(
-    result: Result, folder: Path, kinds: Sequence[str], picture_names: Iterable[str]
-) -> Iterator[tuple[str, list[str], Figure]]:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name in picture_names:
-        drawn, files = figure(result, name), [f"{name}.{kind}" for kind in kinds]
-        for file in files:
-            save(drawn, folder / file)
-        yield name, files, drawn

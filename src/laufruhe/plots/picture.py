@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from laufruhe.plots import style
 from laufruhe.plots.letters import prepare
-from laufruhe.plots.style import as_svg, heading, page, save, styled
+from laufruhe.plots.style import heading, page, save_and_show, styled
 from laufruhe.plots.words import SMALL, grouped, ink_on, legible, separate_texts, typeset
 from laufruhe.present.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
@@ -66,10 +66,7 @@ def _drawn(picture: Picture) -> Figure:
 
 def save_picture(picture: Picture, place: Path, kinds: Sequence[str] = ("png",)) -> str:
     """Write a picture as files of these kinds, `place` has no ending; return it as SVG."""
-    drawn = draw(picture)
-    for kind in kinds:
-        save(drawn, place.with_name(f"{place.name}.{kind}"))
-    return as_svg(drawn)
+    return save_and_show(draw(picture), place, kinds)
 
 
 def colour_of(colour: Colour) -> str:

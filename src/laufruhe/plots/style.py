@@ -212,12 +212,20 @@ def entry_of_dots(label: str, **look: Any) -> Line2D:
     return entry(label, **({"marker": "o", "linestyle": "none"} | look))
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a PNG or an SVG, by the ending."""
+def save(figure: Figure, path: Path, svg: str = "") -> None:
+    """Write a PNG or an SVG, by the ending; `svg` is the picture if it is already drawn as SVG."""
     if path.suffix == ".svg":
-        path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
+        path.write_text(svg or as_svg(figure), encoding="utf-8", newline="\n")
     else:
         path.write_bytes(as_png(figure))
+
+
+def save_and_show(figure: Figure, place: Path, kinds: Sequence[str]) -> str:
+    """Write a picture as files of these kinds, `place` has no ending; return it as SVG."""
+    svg = as_svg(figure)
+    for kind in kinds:
+        save(figure, place.with_name(f"{place.name}.{kind}"), svg)
+    return svg
 
 
 def as_png(figure: Figure) -> bytes:

@@ -118,7 +118,7 @@ class Part(Table):
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Endings of the files of this part."""
+        """Endings of the files of this part; "png" stands for its picture in any format."""
         return ("nc", "csv", "png")
 
     def about(self, **attributes: Any) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def test_economics_by_its_command(tmp_path: Path) -> None:
         "tables.xlsx",
         "three.nc",
         "three.csv",
-        "three.png",
+        "three.svg",
     }
     data = xr.open_dataset(out / "three.nc")
     assert data["standing"].values.tolist() == ["plain", "with shafts", "more cylinders"]

@@ -46,12 +46,12 @@ def test_every_figure_and_statement_is_on_the_page(
     assert {path.name for path in folder.glob("[!.]*")} == {
         "report.md",
         "report.html",
-        *(f"{p.name}.{e}" for p in parts for e in p.ends),
+        *(f"{p.name}.{e.replace('png', 'svg')}" for p in parts for e in p.ends),
     }
     page = (folder / "report.md").read_text(encoding="utf-8")
     for part in parts:
         assert isinstance(part, Replication)
-        assert f"({part.name}.png)" in page
+        assert f"({part.name}.svg)" in page
         assert part.says in page
         assert all(statement.text in page for statement in part.statements)
     assert "statements are confirmed." in page
