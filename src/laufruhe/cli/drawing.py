@@ -61,7 +61,10 @@ def _request(workers: Processes | None, name: str, *args: Any) -> Callable[[], A
 
 
 def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Callable[[], dict[str, str]]:
-    """Request the pictures of a result in a folder; return a function that waits for SVG by their names."""
+    """Start to draw the pictures of a result into a folder; return a function that waits for them.
+
+    That function returns the pictures as SVG, by their names.
+    """
     if not kinds:
         return dict
     # functions that read and solve have no pickle

@@ -110,7 +110,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 
 
 def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
-    """Choose the cheapest fidelity as `choose` does; `scale` is the reference to which errors are relative."""
+    """Return the cheapest fidelity within a tolerance; `scale` is the reference to which errors are relative."""
     allowed_error = max(tolerance - scale.relative_doubt, 0.0)
     fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
     estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
@@ -192,7 +192,7 @@ def _with_few_modes(reference: ErrorReference, fidelity: Fidelity, allowed_loss:
 
 
 def _description(reference: ErrorReference, fidelity: Fidelity) -> list[str]:
-    """Return descriptions of the physics that a fidelity computes."""
+    """Return descriptions of the physics that a fidelity computes, such as gas, rods and orders, for reports."""
     problem, mounting = reference.problem, reference.mounting
     orders = "every order" if fidelity.orders is None else f"orders to {fidelity.orders}"
     lines = [f"exact kinematics, {orders} of pistons and rods"]
@@ -262,7 +262,7 @@ def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
 
 
 def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None = None) -> Problem:
-    """Return the problem at its automatic fidelity; `scale` is the reference for its errors, if it is known."""
+    """Return the problem at the cheapest fidelity within `tolerance`; `scale` is the reference if it is known."""
     if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
         # simulations have no error bound for omitted orders
         return problem.at(replace(problem.fidelity, tolerance=tolerance))

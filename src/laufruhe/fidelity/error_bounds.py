@@ -103,7 +103,7 @@ class ErrorReference:
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
     def largest_change(self, ours: Evaluation, theirs: Evaluation) -> float:
-        """Return an upper bound of the change of the objective between two evaluations of the design (F6)."""
+        """Return an upper bound of the difference of the objective between two evaluations of one design (F6)."""
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
@@ -233,7 +233,7 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
-    """Return upper bounds of the errors of the objective from gas samples and from points of a trace (F9, F9a).
+    """Return upper bounds of the objective's errors from samples of the gas torque, and from trace points (F9, F9a).
 
     Both are in the unit of the objective, and the same for all designs, because unbalances do not change the gas.
     """

@@ -76,7 +76,7 @@ def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 
 def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """Yield names of properties of block and mounts, each with a copy of the problem in which it is changed.
+    """Yield properties of block and mounts, each with a problem in which it is changed, to test its effect.
 
     Stiffness, mass and inertia are scaled by `MORE`; loss and damping are set to zero.
     """

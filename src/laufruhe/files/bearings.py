@@ -30,7 +30,10 @@ class MainBearingTable(Table):
 
 
 def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
-    """Return one table for each bearing; `beside_throws` becomes bearings between and beyond the throws of a shaft."""
+    """Return the tables of main bearings, one for each bearing.
+
+    A table with `beside_throws` becomes bearings between and beyond the throws of a shaft.
+    """
     single: list[MainBearingTable] = []
     for k, table in enumerate(tables, 1):
         where, beyond = f"main_bearings[{k}]", table.beside_throws
@@ -60,7 +63,10 @@ def expand_bearings(tables: Sequence[MainBearingTable], throws: Sequence[Throw])
 
 
 def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
-    """Return the main bearings; refuse shafts without cranks, overlapping journals, and throws without support."""
+    """Return the main bearings of the engine from their tables.
+
+    Raise `Refused` for shafts without cranks, overlapping journals, and throws without support.
+    """
     shafts = {part.shaft.name: part.shaft for part in parts}
     bearings: list[Bearing] = []
     for k, table in enumerate(tables, 1):

@@ -47,7 +47,7 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """Return one complaint for each wrong key, at most `MAX_COMPLAINTS`, and the number of further complaints.
+    """Return one complaint for each wrong key of a file, at most `MAX_COMPLAINTS`, and the number of further ones.
 
     If keys belong to extensions that are not installed, only these are reported.
     """
@@ -72,7 +72,10 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
 
 
 def _walk(loc: Loc, model: type[BaseModel]) -> tuple[Loc, list[type[BaseModel]]]:
-    """Return a path of pydantic without the tags of unions (gas.seiliger.imep), and the models of the tables there."""
+    """Return the path of an error in the file, and the models of the tables at its end.
+
+    Tags of unions, such as seiliger in gas.seiliger.imep, are removed from the path `loc` of pydantic.
+    """
     path: list[str | int] = []
     models = [model]
     for part in loc:

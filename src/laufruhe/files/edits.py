@@ -107,7 +107,7 @@ def unit_of_bounds(tables: Mapping[str, Any], name: str) -> str:
 
 
 def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
-    """Return the address of a number from its name in results or its path in studies."""
+    """Return the address (keys and indices) of a number from its name in results or its path in studies."""
     first, _, remainder = name.partition(".")
     if name.replace(" ", "_") in tables.get("engine", {}):
         # numbers of all cylinders are named by their key alone

@@ -179,7 +179,7 @@ def cycle_of(table: EngineTable) -> Cycle:
 
 
 def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Return the slider-cranks and throws of [engine]; `gas` is True if gas acts on the bore."""
+    """Return the slider-cranks and crank throws that [engine] describes; `gas` is True if gas acts on the pistons."""
     kind = table.kind
     for key in _OWNED:
         if table.value_of(key) and not kind.takes(key):
@@ -233,7 +233,7 @@ def layout_of(table: EngineTable) -> Layout:
 
 
 def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
-    """Return the numbers that the layout needs, with open masses and leads at their start."""
+    """Return the numbers that the cylinder layout needs; open masses and lead angles have their start values."""
     values = {key.name: table.value_of(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
     numbers = {
@@ -288,7 +288,7 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
 
 
 def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
-    """Return masses and lengths of one cylinder, and its rod; None if the rod is not given as a rigid body."""
+    """Return masses and lengths of one cylinder, and its rod as a rigid body; None without [engine.rod]."""
     big_end = None if table.big_end is None else table.big_end.size
     if not table.kind.has_pistons:
         return table.kind.mechanism(values or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
@@ -411,7 +411,7 @@ def piston_masses(
 
 
 def leads_of(table: EngineTable) -> list[Decision]:
-    """Return one decision for each shaft with an open phase lead."""
+    """Return one decision for each shaft with an open lead angle."""
     lead, ports = table.value_of("crank_lead"), table.value_of("port_arc")
     # the layout checks the start only
     if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:

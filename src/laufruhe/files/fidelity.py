@@ -43,7 +43,7 @@ class FidelityTable(Table):
 
 
 def with_fidelity(problem: Problem, table: FidelityTable) -> Problem:
-    """Return the problem at the fidelity of a table."""
+    """Return the problem at the model fidelity that the table [fidelity] states, or that is chosen automatically."""
     is_auto = table.kinematics == "auto"
     if table.tolerance is not None and not is_auto:
         rule, remedy = 'is for kinematics = "auto" only', 'add kinematics = "auto"'

@@ -56,7 +56,7 @@ _SECTION = ("mean_diameter", "width", "height")
 
 
 def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tuple[Flywheel | None, list[Decision]]:
-    """Return the flywheel, or one with the crank inertia of [fidelity], and the decisions about it."""
+    """Return the flywheel with its open numbers as decisions; without [flywheel], one with fidelity.crank_inertia."""
     if table is None:
         return None if crank_inertia is None else Flywheel(crank_inertia), []
     require_one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")

@@ -216,7 +216,7 @@ class MeasureContext:
 
 
 def _why_stray(key: str, channel: Channel) -> str:
-    """Return the reason why a key does not apply to a channel, as the end of a sentence."""
+    """Return the reason why a key does not apply to a quantity (channel), as the end of a sentence."""
     if key == "of":
         return "is for masses and places of shafts only"
     if channel.is_mass:

@@ -356,7 +356,7 @@ class _Numbers:
     decisions: list[Decision]
 
     def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
-        """Set the numbers of one key in the last row, and add decisions for open values."""
+        """Set the numbers of one key for the last mount, and add decisions for open values."""
         unit, numbers = _FIELDS[key]
         for number, axis, value in zip(numbers, _AXES, map(Open.from_value, values), strict=False):
             self.rows[-1][number] = value.start

@@ -49,7 +49,7 @@ def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
 
 
 def plain(raw: Any, depth: int) -> Any:
-    """Return a copy down to a depth, with tuples and NumPy values replaced by lists and plain numbers."""
+    """Return a copy of nested tables, down to a depth, with lists and plain numbers for tuples and NumPy values."""
     if isinstance(raw, Mapping) and depth:
         return {key: plain(value, depth - 1) for key, value in raw.items()}
     if isinstance(raw, list | tuple) and depth:
@@ -64,7 +64,7 @@ def number_at(model: type[BaseModel], path: Sequence[str | int]) -> f.Number | N
 
 
 def annotations_at(model: type[BaseModel], path: Sequence[str | int]) -> list[Any]:
-    """Return the annotations at a path of a model; empty if there is no such key."""
+    """Return the type annotations of the key at a path of a pydantic model; empty if there is no such key."""
     annotations: list[Any] = [model]
     for part in path:
         annotations = [inner for annotation in annotations for inner in _inside(annotation, part)]

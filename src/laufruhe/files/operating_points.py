@@ -75,7 +75,7 @@ class Brake:
         self._rows = [] if table.file is None else self._read(table.file, folder)
 
     def _read(self, file: str, folder: Path) -> list[tuple[float, ...]]:
-        """Return the rows of the file: speed [rad/s], mean pressure [Pa] and, for kind fuel, fuel."""
+        """Return the rows of a friction measurement: speed [rad/s], mean pressure [Pa] and, for kind fuel, fuel."""
         names = ("speed", "load", "fuel")[: 3 if self.table.kind == "fuel" else 2]
         speed = si_value(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
         text, unit = f"1 {self.table.load_unit}", self.table.load_unit
@@ -94,7 +94,7 @@ class Brake:
         return mean_pressure(torque, self.displacement, self.turns)
 
     def indicated(self, brake: float, speed: float, where: str) -> tuple[float, float, float]:
-        """Return the lowest, middle and highest indicated mean pressure at a speed [Pa] (W4)."""
+        """Return lowest, middle and highest indicated mean pressure for a brake mean pressure at a speed [Pa] (W4)."""
         friction = self._friction(speed, where)
         pressures = friction.indicated(brake, self.table.deviations)
         if pressures[0] <= brake:
@@ -189,7 +189,10 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
 def _loads(
     table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
 ) -> list[tuple[str, float | None]]:  # fmt: skip
-    """Return name suffixes with indicated mean pressures [Pa]: three for a load at the brake with uncertainty."""
+    """Return the loads of an operating point as pairs of name suffix and indicated mean pressure [Pa].
+
+    A load at the brake with an uncertain friction gives three: least, mean and most load.
+    """
     keys = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
     if len(keys) > 1 or (table.motored and keys[1:]):
         raise Refused(f"{where}.{keys[0]}", None, f"is given beside {keys[1]}", "keep one")

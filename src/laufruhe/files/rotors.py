@@ -273,7 +273,10 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
 
 
 def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
-    """Return the allowed values of an unbalance with open size and angle; raise `Refused` if they are not convex."""
+    """Return the set of allowed values of an unbalance with open size and angle.
+
+    Raise `Refused` if the set is not convex.
+    """
     if not size.is_open:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)

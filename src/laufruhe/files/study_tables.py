@@ -92,7 +92,7 @@ def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """Return the keys and indices of a path; raise `Refused` if the problem has no such quantity."""
+    """Return the address (keys and indices) of a path in a problem file; raise `Refused` if it leads nowhere."""
     node: Any = tables
     keys = []
     parts = parts_of(where)
@@ -285,7 +285,7 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
 
 
 def _measured(quantity: str, values: tuple[Value, ...], key: str) -> tuple[str, tuple[float, ...] | None]:
-    """Return the unit of the first value, and all values in it; None for labels."""
+    """Return the unit of the first swept value, and all values in this unit; None in place of values for labels."""
     field = field_at(quantity)
     numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     # a whole number may be beyond all floats

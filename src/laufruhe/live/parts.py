@@ -106,7 +106,7 @@ class Reference:
 
     @classmethod
     def from_proof(cls, value: float, proof: Proof, gap: float) -> Reference:
-        """Return the reference of a design with this proof."""
+        """Return a design as the reference of a live page: its objective, and words that say how it is proven."""
         if proof is Proof.GLOBAL:
             return cls(value, "the proven optimum", True)
         if proof is Proof.WITHIN_GAP:
@@ -223,7 +223,7 @@ def with_unit(unit: str) -> dict[str, Any]:
 
 
 def pack_part(part: Any, block: PackedBlock) -> Any:
-    """Return a part of a signal field by field; its numbers are in the block."""
+    """Return a part of a signal as JSON data, field by field; its numbers go into the packed block."""
     if isinstance(part, np.ndarray):
         return block.add(part)
     if isinstance(part, tuple):

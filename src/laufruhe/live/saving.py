@@ -51,7 +51,7 @@ NOT_SAVED = Saved()
 def saved_file(problem: Problem, result: Result, slider_problem: Problem, values: Mapping[str, Value]) -> Saved:
     """Return the problem file of a design; placeholders stand for the decisions of `slider_problem`.
 
-    The file is empty if the reader would not accept it.
+    The text of the file is empty if the reader of problem files would not accept it.
     """
     if problem.origin is None:
         return NOT_SAVED

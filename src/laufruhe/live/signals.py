@@ -109,7 +109,7 @@ class Signal:
 
 
 def signal_of(model: AffineModel, measure: Measure) -> Signal:
-    """Return the signal of a load or of masses."""
+    """Return the signal of a measure of loads or masses, as an affine function of the sliders' values."""
     if not measure.is_load:
         rows, first = model.norm(measure, 1), np.zeros(1, dtype=np.intp)
         constant, slope = (Waves(first, part[None].astype(complex)) for part in (rows.constant, rows.slope))

@@ -192,7 +192,7 @@ class ArticulatedCrank(SliderCrank):
 
 
 def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
-    """Return a zero near `start` by Newton's method; `slope` returns a function and its derivative."""
+    """Return the zero of a function near `start` by Newton's method; `slope` returns its value and derivative."""
     angle = start
     for _ in range(_ROUNDS):
         value, derivative = slope(angle)

@@ -169,7 +169,7 @@ class Engine:
 
 
 def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
-    """Return the slider-cranks with phase leads [rad] by the names of their shafts (L10)."""
+    """Return the slider-cranks with other lead angles of their shafts [rad], by shaft name (L10)."""
 
     def turned(part: SliderCrank, lead: float) -> SliderCrank:
         throw, firing_angle = part.throw + part.shaft.ratio * lead, part.firing_angle - lead
@@ -179,7 +179,7 @@ def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -
 
 
 def with_leads(engine: Engine, leads: Mapping[str, float]) -> Engine:
-    """Return the engine with phase leads of its shafts [rad], and so of all loads on them (L10)."""
+    """Return the engine with other lead angles of its geared shafts [rad], by shaft name (L10)."""
     parts = parts_with_leads(engine.slider_cranks, leads)
     if any(part.facing is not None for part in parts):
         parts = with_shared_chambers([replace(part, facing=None) for part in parts], engine.cycle.angle)

@@ -36,7 +36,7 @@ class Facing:
         return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
 
     def swept(self, part: SliderCrank) -> Swept:
-        """Return the chamber that the piston `part` shares with this one."""
+        """Return the chamber between the piston `part` and this opposed piston."""
         if self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0):
             # pistons in step have half of the chamber each
             return Swept(part)
@@ -98,7 +98,7 @@ def _chamber(part: SliderCrank) -> SharedChamber:
 
 
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
-    """Return the slider-cranks; pistons that face each other get the chamber that both sweep."""
+    """Return the slider-cranks with chambers of opposed pistons: both pistons of a pair get their shared chamber."""
     pistons = list(parts)
     for k, part in enumerate(parts):
         for other in parts:

@@ -86,9 +86,10 @@ class FiringSlots:
         return self.throws * len(self.sides)
 
     def patterns(self, throw_slots: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
-        """Return all patterns within the bounds, else those with the least violation, and True if none is left out.
+        """Return the firing patterns within the bounds of firing intervals, and True if these are all.
 
-        If the firing order is given, `throw_slots` has the slots of the cylinders of every throw.
+        If no pattern keeps the bounds, those with the least violation are returned. If the firing order is given,
+        `throw_slots` has the slots of the cylinders of every throw.
         """
         even, slack, complete = self.cycle.angle / self.count, 0.0, True
 
@@ -109,7 +110,7 @@ class FiringSlots:
     def _first_assignments(
         self, slack: float, throw_slots: Sequence[Sequence[int]] | None
     ) -> tuple[list[SlotAssignment], bool]:
-        """Return assignments in order of unevenness, up to a largest number, and True if these are all."""
+        """Return assignments of firings to throws, roughly the most even first, and True if these are all."""
         even, assignments = self.cycle.angle / self.count, dict[SlotAssignment, None]()
         maximum = min(_MAX_ASSIGNMENTS, 300_000 // self.count**2) if slack == 0.0 else _MAX_BROKEN
         complete = False
@@ -185,7 +186,10 @@ class FiringSlots:
                 yield tuple((first, shapes[number]) for first, number in turned)
 
     def _timed(self, assignment: SlotAssignment) -> FiringPattern | None:
-        """Return the firing angles that violate bounds least and then are most even; None if there are none."""
+        """Return the best firing angles for an assignment: least violation of bounds, then most even.
+
+        The result is None without any.
+        """
         from scipy.optimize import linprog
 
         count, cycle_angle = self.count, self.cycle.angle

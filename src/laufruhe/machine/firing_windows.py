@@ -65,7 +65,7 @@ class FiringWindow:
         return self.within(*self.bounds.root) or self.bounds.root
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """Return the smallest box around the throws of a box that keep the window, or None if empty."""
+        """Return the smallest box of throw angles with all throws of a box that are in this window; None if empty."""
         for _ in range(_ROUNDS if self.bounds.open_angles else 1):
             paths = self.bounds.shortened(self.paths, lower, upper)
             if paths is None:
@@ -139,7 +139,7 @@ class FiringBounds:
         return first[first != second], second[first != second]
 
     def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
-        """Return shortest paths of own angles in a box of throws and open angles, or None if infeasible."""
+        """Return bounds of all differences of throw angles in a box, by shortest paths; None if infeasible."""
         count = len(lower) - self.shares.shape[1]
         minimum, maximum = _range(self.shares, lower[count:], upper[count:])
         paths = paths.copy()
@@ -153,7 +153,7 @@ class FiringBounds:
         return None if np.any(np.diag(paths) < -_ROUNDING) else paths
 
     def tightened(self, paths: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return a box of throws and open angles, tightened by shortest paths."""
+        """Return a smaller box of throws and open angles, from bounds of their differences (shortest paths)."""
         count = len(lower) - self.shares.shape[1]
         low, high = lower.copy(), upper.copy()
         minimum, maximum = _range(self.shares, lower[count:], upper[count:])
@@ -189,7 +189,7 @@ class FiringBounds:
         return FiringWindow((), (0,) * len(self.layout.positions), self._start(), self)
 
     def windows(self) -> Iterator[FiringWindow]:
-        """Yield the window of every order and choice of dead centres that some throws keep."""
+        """Yield all feasible firing windows: firing orders, each with the whole turns at which cylinders fire."""
         firsts = [self.order[0] - 1] if self.order else [0]
         if self.order is None and self.maximum > math.tau + SLACK:
             # the cylinder whose first dead centre comes more than a turn after all others need not be cylinder 1
@@ -247,7 +247,7 @@ class FiringBounds:
     def _with_interval(
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
-        """Return the paths with the bounds of the interval between two cylinders, or None if infeasible.
+        """Return shortest paths with the bounds of the interval between two firings added; None if infeasible.
 
         `before` and `after` are indices of the cylinders, with the whole turns of their firings. `wrapped` is True for
         the interval from the last firing to the first one of the next cycle.

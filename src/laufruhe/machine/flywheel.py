@@ -123,7 +123,7 @@ class Flywheel:
         return replace(self, rim=replace(self.ring, width=self.ring.width * (mass / self.ring.mass)))
 
     def moved(self, numbers: Any) -> Flywheel:
-        """Return the flywheel with other decision variables."""
+        """Return the flywheel with other values of its open numbers."""
         rest, *section = (float(number) for number in numbers)
         if self.rim is None:
             return Flywheel(rest)

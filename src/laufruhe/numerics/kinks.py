@@ -63,7 +63,7 @@ class SignalKinks:
         return np.concatenate([self.angles[slopes & ~steps], breaks - SAME_ANGLE, breaks + SAME_ANGLE])
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
-        """Return the closed form of all kinks together, or a derivative of it, at angles [rad], shape (angles, ...)."""
+        """Return the part of a signal that its kinks cause, or its derivative, at angles [rad], shape (angles, ...)."""
         k = len(self.jumps)
         weights = self.pieces(period, derivative)
         weights = weights.reshape(*weights.shape[:2], -1)

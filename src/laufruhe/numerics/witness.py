@@ -28,7 +28,7 @@ def is_over(bound: float, value: float, zero_level: float = 0.0) -> bool:
 
 
 def check_bound(what: str, bound: float, value: float, zero_level: float = 0.0) -> bool:
-    """Return True if a lower bound does not exceed the value of a known design; else report a contradiction.
+    """Return True if a lower bound does not exceed a known design's objective; else report a contradiction.
 
     `what` names the bound in the report. An absolute difference up to `zero_level` counts as zero.
     """

@@ -29,7 +29,7 @@ _CHUNK = 1 << 15
 
 
 def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> ComplexArray:
-    """Return F_h, and C_h in the unit of the places of throws, of many crank stars, shape (n, orders, 2) (S1).
+    """Return free force F_h and couple C_h of many crank stars, for one unit force a throw, (n, orders, 2) (S1).
 
     A star (throws,) has the step of every throw, 0 to phases - 1.
     """
@@ -113,7 +113,7 @@ class StarSpace:
         return total
 
     def images(self, stars: Stars) -> list[Stars]:
-        """Return stars and their equals: front and back swapped, and turned the other way round (S2).
+        """Return crank stars and their equivalent images: front and back swapped, and turned the other way round (S2).
 
         Every image is turned so that its first throw stands at step 0.
         """
@@ -126,7 +126,7 @@ class StarSpace:
         return [((image - image[:, :1]) % self.phases).astype(np.uint8) for image in out]
 
     def canonical(self, stars: Stars) -> Stars:
-        """Return the first in dictionary order among the images of each star, shape (n, throws) (S2)."""
+        """Return one representative of each crank star's images, the first in dictionary order, (n, throws) (S2)."""
         best, *others = self.images(stars)
         for other in others:
             differs = best != other
@@ -137,7 +137,7 @@ class StarSpace:
         return best
 
     def blocks(self) -> Iterator[Stars]:
-        """Yield all stars, one of each set of images, in blocks (n, throws)."""
+        """Yield all crank stars, one of each set of equivalent images, in blocks of shape (n, throws)."""
         order = outside_in(self.throws)
         for pattern in self.patterns:
             left = np.array([pattern], dtype=np.uint8)

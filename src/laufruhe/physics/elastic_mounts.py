@@ -161,7 +161,7 @@ class ElasticMounting:
         return self.driven(omegas, self.drives(wrenches))
 
     def driven(self, omegas: Array, drive: ComplexArray) -> ComplexArray:
-        """Return the modal amplitudes of known drives of the modes, shape (n, 6), as `responses` (E4)."""
+        """Return the amplitudes of the natural modes from modal loads `drive`, shape (n, 6) each (E4)."""
         modes = list(self._reached(drive))
         out = np.zeros(drive.shape, dtype=complex)
         if not modes:

@@ -78,7 +78,7 @@ def case_wrench(block: Block, case: LoadCase) -> Array:
 
 
 def stops_of(mounting: ElasticMounting) -> Stops:
-    """Return the stops of a mounting."""
+    """Return the bump stops of a mounting as arrays: directions, gaps and stiffness."""
     springs = every_spring(mounting.mounts)
     rows = np.array([np.array(spring.orientation) @ mounting.motions[place] for place, spring in springs])
     directions = np.zeros((3 * len(mounting.mounts), 3 * len(springs)))
@@ -102,7 +102,7 @@ def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
 
 
 def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
-    """Return the motion of least energy, shape (6,)."""
+    """Return the static motion of a block under a wrench, shape (6,): that of least energy with its stops."""
 
     def energy(q: Array) -> float:
         over = stops.beyond(stops.rows @ q)

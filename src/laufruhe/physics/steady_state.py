@@ -50,7 +50,7 @@ class SteadyState:
 def periodic_state(
     mounting: ElasticMounting, wrench: Spectrum, speed: float, samples: int = 360, tolerance: float = 1e-11
 ) -> SteadyState:
-    """Return the steady state by integration over one period, shot until it closes (E28).
+    """Return the periodic motion of a block on mounts, by integration over one period that repeats itself (E28).
 
     The start that repeats itself is found by Newton's method; the columns of its matrix
     are integrated together with the motion itself.

@@ -209,7 +209,7 @@ def _reduced_inertia(part: SliderCrank) -> float:
 
 
 def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
-    """Return the inertia without pistons and rods [kg m2]: of uneven speed, flywheel or extension; else None.
+    """Return the moment of inertia of all rotating parts, without pistons and rods [kg m2]; None if it is unknown.
 
     None if none of these is known.
     """

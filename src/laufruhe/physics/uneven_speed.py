@@ -150,7 +150,7 @@ def uneven_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelit
 
 
 def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Return the torque of the gas over the crank angle: its roll moment (L5)."""
+    """Return the gas torque over the crank angle [N m], as the roll moment of the gas (L5)."""
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))

@@ -46,7 +46,7 @@ class Indicator:
 
 
 def indicator_of(gas: Chambers, part: SliderCrank, point: OperatingPoint, angles: Array) -> Indicator:
-    """Return the diagram of a cylinder at crank angles from its dead centre [rad] (G14)."""
+    """Return volume, pressures and forces of a cylinder at crank angles from its dead centre [rad] (G14)."""
     mass, (_, _, acceleration) = part.motion(np, part.fires_at + part.shaft.ratio * angles).points[0]
     return Indicator(
         swept_volume(part, angles),
@@ -99,7 +99,7 @@ Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
 
 
 def is_twin(result: Result) -> bool:
-    """Return True for two cylinders with loads of first or second order."""
+    """Return True for a twin: an engine of two cylinders with loads of first or second order."""
     engine = result.final.engine
     if len(engine.cylinders) != 2 or not has_loads(result):
         return False

@@ -30,7 +30,7 @@ class Pose:
 
     @classmethod
     def at_angle(cls, part: SliderCrank, phi: float) -> Pose:
-        """Return the pose at a crank angle [rad] (C5)."""
+        """Return the positions of crank, pin and piston of a cylinder at a crank angle [rad] (C5), for drawings."""
         centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
         turn = part.throw + part.shaft.ratio * phi
         rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius

@@ -90,7 +90,7 @@ class Document:
         return Document(self.title, tuple(blocks))
 
     def as_markdown(self, ending: str) -> str:
-        """Return the text of `report.md`; `ending` is that of the picture files."""
+        """Return the document as the Markdown text of `report.md`; picture files have the ending `ending`."""
         parts = (
             block.as_markdown(ending) if isinstance(block, Illustration) else block.as_markdown()
             for block in self.blocks

@@ -26,7 +26,7 @@ def versions() -> dict[str, str]:
 
 
 def is_ours(path: Path) -> bool:
-    """Return True for an empty file, or one that begins as `strict` begins it."""
+    """Return True if a file may be overwritten: it is empty, or begins as JSON of this package does."""
     with suppress(OSError), path.open("rb") as stream:
         begin = stream.read(LONGEST_BEGIN)
         return not begin or _BEGIN.match(begin) is not None

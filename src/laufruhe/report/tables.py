@@ -215,7 +215,7 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
 
 
 def _on_crank(result: Result) -> Table:
-    """Return forces on main bearings along and across the turning crank (B4)."""
+    """Return a table of forces on main bearings over the cycle, along and across the turning crank (B4)."""
     names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
     designs = designs_with_loads(result)
     for k, point in enumerate(result.problem.points):

@@ -55,7 +55,7 @@ OPEN_FLYWHEEL = "the flywheel is open; a cheap model chooses one that breaks its
 
 
 def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
-    """Return table, picture (if `picture` names one) and choice for one problem."""
+    """Return the report on the fidelities of one problem: table, picture (if `picture` names one) and advice."""
     problem = trade.problem
     initial, minimum = (figure(value, problem.objective_unit or "", 6) for value in (trade.value, trade.optimum))
     optimum = "" if math.isnan(trade.optimum) else f", of the optimum {minimum}"
@@ -144,7 +144,10 @@ def as_json(trade: Trade) -> str:
 
 
 def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
-    """Return one line per problem, and their common findings; `refused` names problems without a trade."""
+    """Return the report on the fidelities of several problems: a row for each, and their common findings.
+
+    `refused` names the problems that were left out.
+    """
     rows = [*map(_index_row, trades), *([f"`{name}`", *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
     short = (
         "`auto` is the safe choice: its error stays below a stated bound. Problems of modes or sag only need no loads.",
@@ -174,7 +177,7 @@ def _index_row(trade: Trade) -> list[str]:
 
 
 def _why_dashes(trade: Trade) -> str:
-    """Return the reasons for missing numbers of the index."""
+    """Return the reasons for dashes (missing numbers) of a problem in the table of all problems."""
     problem, (_, decided) = trade.problem, choices(trade)
     reasons = {
         "nothing is open": not is_open(problem),

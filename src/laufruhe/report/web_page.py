@@ -37,7 +37,7 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
 
 @cache
 def template() -> Template:
-    """Return the compiled template of a page."""
+    """Return the compiled Jinja template of the HTML report."""
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)

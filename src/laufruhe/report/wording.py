@@ -24,7 +24,7 @@ LARGE_RESIDUAL = 1e-3
 
 
 def headline(result: Result) -> str:
-    """Return the result in one sentence."""
+    """Return one sentence on a result: objective before and after, and how well it is proven."""
     o = result.objective
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         return f"{result.message[:1].upper()}{result.message[1:]}." if result.message else "No design was found."
@@ -86,7 +86,7 @@ def _attainable(limit: AttainableLimit, lead: str) -> str:
 
 
 def fidelity_of(result: Result) -> str:
-    """Return the computed physics and the numerical error of the objective, in words."""
+    """Return the model fidelity of a result in words: computed physics and numerical error of the objective."""
     f = result.problem.fidelity
     text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
@@ -115,7 +115,7 @@ def fired(result: Result) -> str:
 
 
 def why_star(result: Result) -> str:
-    """Return a sentence that compares the best crank star with the next; empty for a single star."""
+    """Return a sentence on why the best crank star beats the next in the ranking; empty for a single star."""
     stars = result.phasing.ranking if result.phasing is not None else ()
     k, rival = next(((k, star) for k, star in enumerate(stars, 1) if star.throws != stars[0].throws), (0, None))
     if rival is None or not rival.value:

@@ -94,7 +94,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
 
 
 def _decision(decision: Decision, length: float, mass: float) -> Decision:
-    """Return a decision whose bounds, start and unbalance gains are scaled by factors of lengths and masses."""
+    """Return a decision of an engine scaled to equal power: bounds, start and gains times length and mass factors."""
     size = {"": 1.0, "m": length, "kg": mass, "kg m": mass * length}[decision.unit]
     return replace(
         decision,

@@ -55,7 +55,7 @@ class Regions:
                 self.seconds[mark] = seconds
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write the values of the piece of work with the fingerprint `mark`, then mark it as done."""
+        """Store the values of a finished batch of draws with the fingerprint `mark`, then mark it as done."""
         region, values = self._wanted[mark], np.ascontiguousarray(record[VALUES], dtype="<f8")
         packed = _SECONDS.pack(seconds)
         self._values[region.case, region.first : region.last] = values
@@ -88,7 +88,7 @@ def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
 
 
 def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
-    """Return the arrays of a part: existing ones if they fit, else new ones."""
+    """Return the Zarr arrays that store a part of a study: existing ones if they fit, else new ones."""
     store = _store_at(root)
     columns = {key: asdict(column) for key, column in template.columns.items()}
     about = {"columns": columns, "cases": [*template.cases], "chunk": template.chunk}
@@ -130,7 +130,7 @@ def _standing(store: Any, name: str, about: Mapping[str, Any], forms: Mapping[st
 
 
 def _store_at(root: Path) -> Any:
-    """Return the group of a store, new in an empty folder; raise `InputError` if the folder holds anything else."""
+    """Return the Zarr group in a folder, new if it is empty; raise `InputError` if it contains other files."""
     import zarr
 
     if not any(root.iterdir()):

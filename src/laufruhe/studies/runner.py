@@ -116,10 +116,10 @@ class _Piece:
 
 
 def answers(tasks: Sequence[Task], problem_files: ProblemFiles, jobs: int) -> Generator[PointResult, None, None]:
-    """Yield the answer of every task in any order; raise the error of the first task that fails.
+    """Yield the result of every point of a study in any order; raise the error of the first point that fails.
 
-    An executor that is set does all of the work. Without one, worker processes start as soon as they would finish the
-    remaining tasks clearly earlier.
+    If an executor such as a Dask cluster is set, it computes all points. Otherwise this process begins, and worker
+    processes start as soon as they would finish the remaining points clearly earlier.
     """
     started, first = time.perf_counter(), 0
     if current_executor() is None:
@@ -151,7 +151,7 @@ def _answer(k: int, task: Task, problem_files: ProblemFiles) -> PointResult:
 
 
 def _distributed(tasks: Sequence[Task], first: int, problem_files: ProblemFiles, jobs: int) -> Iterator[PointResult]:
-    """Yield answers of the tasks from `first` on; pieces grow with the measured speed."""
+    """Yield the results of the tasks from `first` on, computed by workers; batches grow with the measured speed."""
     done, spent = 0, 0.0
     worth = NEAR if current_executor() is None else FAR
     folder = Path.cwd()

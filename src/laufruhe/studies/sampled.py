@@ -64,14 +64,14 @@ class Sampled(Part):
         return [(k, min(k + self.piece, self.draws)) for k in range(0, self.draws, self.piece)]
 
     def random(self, span: tuple[int, int], width: int) -> Array:
-        """Return numbers from 0 to 1, shape (draws, width); they do not depend on the pieces."""
+        """Return random numbers from 0 to 1 for a range of draws, (draws, width); they do not depend on the batches."""
         steps = -(-width // _WORDS)
         generator = np.random.Philox(key=self.seed)
         generator.advance(span[0] * steps)
         return np.random.Generator(generator).random((span[1] - span[0], steps * _WORDS))[:, :width]
 
     def gathered(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return all draws along case and draw, a variable for each column."""
+        """Return all draws as a dataset with dimensions case and draw, and a variable for each column."""
         first = next(k for k, point in enumerate(points) if point.span is not None)
         columns, cases = records[first][COLUMNS], [case.name for case in self.cases]
         values = np.empty((len(columns), len(cases), self.draws))
@@ -105,7 +105,7 @@ def in_unit(values: xr.DataArray) -> tuple[Array, str]:
 
 
 def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[float] = ()) -> p.Line:
-    """Return the line of the share of values [%] below each value."""
+    """Return the line of a picture that shows which percentage of values lies below each value."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return p.Line((), (), colour, label, dash=dash)

@@ -56,7 +56,10 @@ class ProblemFiles:
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Return the tables of a point's problem, not to be modified; `InputError` names missing tables or keys."""
+        """Return the tables of the problem file of a point with its changes; do not modify them.
+
+        `InputError` names missing tables or keys.
+        """
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
@@ -88,7 +91,7 @@ class ProblemFiles:
         return refused(where, "", rule, remedy, self.folder / case.problem)
 
     def problem(self, point: Point) -> Problem:
-        """Return the problem of a point with its shafts, scaled to equal power if its case asks for it."""
+        """Return the problem of a point: its file with swept values, scaled to equal power if the case asks for it."""
         problem = load_tables(self.tables(point), self.folder / point.case.problem)
         if point.shafts is not None:
             problem = with_shafts(problem, point.shafts)
@@ -137,7 +140,7 @@ class ProblemFiles:
 
 @cache
 def program() -> str:
-    """Return a hash of the code and the libraries that an answer depends on.
+    """Return a hash of the program: its code and the libraries on which results depend.
 
     The version alone would retain the points of a changed working copy.
     """

@@ -69,7 +69,7 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         return dict(self._records[mark])
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write a record and its seconds; the system has both when this returns."""
+        """Append the record of a finished point and its seconds to the file; both are written when this returns."""
         if self._stream is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = FileIO(self.path, "a")
@@ -93,7 +93,7 @@ def _checksum(line: bytes) -> bytes:
 def stores_of(
     study: StudyFile, problem_files: ProblemFiles, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
-    """Yield each store of results with the fingerprints of the points that it stores, finished or not.
+    """Yield each store of results, with the fingerprints of all points that belong to it, finished or not.
 
     A range of random draws is a region of an array on disk (`Regions`). The record of any other point is a line of the
     file `finished` (`FinishedPoints`).

@@ -39,7 +39,7 @@ _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
 def decide_scene(problem: Problem) -> tuple[Result, str, str]:
-    """Return result, status and proof of a problem of a study; evaluate the initial design if there is no solution."""
+    """Return result, status and proof of a study's problem; without a solution, those of the initial design."""
     try:
         result = solve(problem)
     except SolverError:
@@ -250,7 +250,7 @@ class SweptPart(Part):
         return problems
 
     def _check_distinct(self, case: CaseTable, problem_files: ProblemFiles) -> None:
-        """Refuse a number that is swept and set, or swept twice, however its path is written."""
+        """Raise `InputError` for a number that is both swept and set, or swept twice, however its path is written."""
         tables, reasons = problem_files.tables(Point(case.model_copy(update={"set": {}}))), {}
         for path, value in case.set.items():
             with problem_files.named(case):

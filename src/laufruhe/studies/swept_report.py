@@ -59,7 +59,7 @@ def claim_of(data: xr.Dataset) -> str:
 
 
 def by_point(data: xr.Dataset, *named: str) -> list[Text]:
-    """Return a row per point: case, `named` coordinates and swept values with units, the metric and its proof."""
+    """Return a table with a row for each point: case, swept values with units, the objective and its proof."""
     data = readable_metric(data)
     columns = ["case", *named, *swept_names(data)]
     metric, unit = data.attrs["metric"], data["objective"].attrs["units"]
@@ -88,7 +88,7 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
 
 
 def over_sweep(data: xr.Dataset, line_coords: Sequence[str], words: str) -> p.Picture:
-    """Draw one line per case and combination over the last sweep."""
+    """Draw the objective over the last swept number, one line for each case and combination of the others."""
     data = readable_metric(data)
     names = swept_names(data)
     panel = p.Panel(lines(data, [*line_coords, *names]), swept_axis(data, names[-1]), metric_axis(data))
@@ -96,7 +96,7 @@ def over_sweep(data: xr.Dataset, line_coords: Sequence[str], words: str) -> p.Pi
 
 
 def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
-    """Return the metric over the last coordinate, a line for every case and combination of the others."""
+    """Return lines of the objective over the last coordinate, one for each case and combination of the others."""
     place, numbers = spread(data, names[-1]), data[names[-1]].dtype.kind in "fi"
     marks: list[p.Mark] = []
     for label, chosen, colour in groups(data, names[:-1]):
@@ -138,7 +138,7 @@ def metric_axis(data: xr.Dataset, *names: str) -> p.Axis:
 
 
 def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Colour]]:
-    """Return label, mask of its points and colour of every line."""
+    """Return the lines of a picture: label, mask of its points in the dataset, and colour."""
     keyed_by = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
     columns = [data[name].values.tolist() for name in keyed_by]
     keys = list(zip(*columns, strict=True)) if keyed_by else [()] * data.sizes["point"]
@@ -159,7 +159,10 @@ def _with_unit(values: xr.DataArray, value: Any) -> str:
 
 
 def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Picture:
-    """Draw initial and final bars; one bar for points without decisions, or where `once` is true."""
+    """Draw bars of the initial and the final objective of every point.
+
+    A point without decisions, or where `once` is true, has one bar.
+    """
     data = readable_metric(data)
     count = data.sizes["point"]
     has_no_decisions = data["proof"].values == NOTHING_OPEN

@@ -118,7 +118,10 @@ class Trade:
 
 
 def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trade:
-    """Measure every fidelity, by the first of several objectives; raise `ModelError` if the problem has none."""
+    """Return time, error and regret of every model fidelity for a problem; `ModelError` without an objective.
+
+    The first of several objectives counts.
+    """
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
     left_out = [f"The trade takes the drawing, without {extra.words}." for extra in problem.extras]
@@ -195,7 +198,7 @@ class _Decided:
             self.of(engine)
 
     def of(self, engine: Engine) -> tuple[float, float]:
-        """Return the reference objective of a design, and its largest relative violation of a limit."""
+        """Return the objective of a design by the reference model, and its largest relative violation of a limit."""
         problem = self._problem
         final = reference(problem, engine)
         value, violation = objective_value(problem, final), final.violation(problem.limits)
@@ -205,7 +208,7 @@ class _Decided:
         return value, violation
 
     def by(self, variant: Problem) -> Engine | None:
-        """Return the design that a fidelity decides; None if it finds none within the limits."""
+        """Return the design that is optimal at a fidelity; None if no design within the limits is found."""
         # a tolerance would choose modes anew for every design of open mounts
         variant = variant.at(replace(variant.fidelity, tolerance=None))
         with working_on(SERIAL), suppress(SolverError, ModelError):
@@ -220,7 +223,7 @@ class _Decided:
 
 
 def _row(name: str, variant: Problem, scale: ErrorReference, decided: _Decided) -> TradeRow:
-    """Measure a fidelity, all but its regret."""
+    """Return time and error of a fidelity; its regret needs the best design of all and follows later."""
     evaluation, truth = evaluate(variant), decided.initial_value
     value = objective_value(variant, evaluation)
     prepared, gradient = _prepared_times(variant)
@@ -279,7 +282,7 @@ def _prepared_times(variant: Problem) -> tuple[float, float]:
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
-    """Compare integration in time with the frequency domain, at the first operating point."""
+    """Return how mount forces integrated in time differ from the frequency domain, at the first operating point."""
     if problem.engine.block is None or not mounting_in(problem.engine).dynamic.has_law:
         return None
     point, mounting = problem.points[0], mounting_in(problem.engine)
@@ -300,7 +303,7 @@ def _price_of_time(problem: Problem) -> TimeDomain | None:
 
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
-    """Return the inertia that leaves 2 % speed variation, and the change of the objective that it causes."""
+    """Return a flywheel inertia at which speed varies by 2 %, and the change of the objective with that variation."""
     reciprocating = sum(p.reciprocating_mass * p.crank_radius**2 for p in problem.engine.slider_cranks)
     inertia = 30.0 * max(reciprocating, 1e-12)
     for _ in range(12):

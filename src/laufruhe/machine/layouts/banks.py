@@ -16,7 +16,7 @@ X_BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
 
 
 def in_banks(name: str, cylinders: int, spacing: float, banks: Sequence[float], stagger: float = 0.0) -> Layout:
-    """Return banks at these angles [rad] that share the throws, numbered bank by bank from the front.
+    """Return the layout of cylinder banks at these angles [rad] on shared throws, numbered bank by bank.
 
     The throws are `spacing` apart; the first of two banks stands forward by `stagger` [m].
     """
@@ -99,7 +99,7 @@ class Boxer(LayoutKind):
     banks = 2
 
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return banks at 180 degrees."""
+        """Return the layout of a boxer engine: two banks at 180 degrees, each cylinder on its own throw."""
         count, stagger = inputs.cylinders, inputs.options["bank_stagger"]
         if stagger is None:
             raise KeyedError("bank_stagger", "is missing; add the distance between opposed cylinders")

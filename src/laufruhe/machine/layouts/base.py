@@ -88,7 +88,7 @@ class LayoutInput:
 
 
 def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:
-    """Return the rod of a table of [engine], its centre of gravity counted from the pin `end`."""
+    """Return the rod that a table of [engine] describes; its centre of gravity counts from the pin `end`."""
     if not 0.0 <= table["centre_of_gravity"] <= length:
         rule = f"does not lie on the rod of {units.quantity_text(length, 'm')}; count it from the {end}"
         raise KeyedError(f"{key}.centre_of_gravity", rule, units.quantity_text(table["centre_of_gravity"], "m"))

@@ -57,7 +57,10 @@ class Triangle:
         return away if corner == bank else away + Fraction(1, 2)
 
     def centre(self, corner: int, bank: int) -> Turn:
-        """Return the crank angle of a dead centre in turns: of a bank's piston on a corner, lower throw upright."""
+        """Return the crank angle of the dead centre of a bank's piston on a corner's crank, in turns.
+
+        The throw of the lower crank is upright at a crank angle of zero.
+        """
         at: Turn = self.axis(0, 0)
         for k in range(bank):
             # step over to the other piston of bank k, then to the next bank on its crank
@@ -113,7 +116,7 @@ class Delta(LayoutKind):
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """Return the pistons at the first corners of the banks, then at the second, and the throws of all cranks."""
+        """Return the pistons of a delta engine, those at first corners of banks first, and the throws of all cranks."""
         triangle, mechanism, order = self._triangle(inputs), inputs.mechanism, inputs.firing_order
         pistons: list[SliderCrank] = []
         cranks: list[Throw] = []

@@ -43,7 +43,10 @@ class Radial(LayoutKind):
     needs_rod = True
 
     def place(self, inputs: LayoutInput) -> Layout:
-        """Return cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
+        """Return the layout of a radial engine: cylinders at equal angles around one throw.
+
+        A crank angle of zero is the true dead centre of cylinder 1 (C5). Articulated rods delay the other dead centres.
+        """
         count, none = inputs.cylinders, (0.0,) * inputs.cylinders
         _check(inputs)
         banks = tuple(math.tau * k / count for k in range(count))
@@ -86,7 +89,7 @@ def _check(inputs: LayoutInput) -> None:
 
 
 def _hinged(inputs: LayoutInput, on_crank: Sequence[SliderCrank]) -> tuple[SliderCrank, ...]:
-    """Return the slider-cranks with every rod but the master's on a knuckle pin of the master rod.
+    """Return the slider-cranks with articulated rods: all but the master rod are on its knuckle pins.
 
     Without a length of articulated rods every piston comes as high as the master's; a knuckle radius of zero leaves
     all rods on the crank pin.

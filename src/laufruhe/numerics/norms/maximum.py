@@ -38,7 +38,7 @@ class Maximum(Norm):
         return float(lengths(rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return v_k / |v_k| for the longest row and zero for all others."""
+        """Return a subgradient (dual rows) of the maximum: v_k / |v_k| for the longest row, zero for all others."""
         size, z = lengths(rows), np.zeros_like(rows)
         k = int(np.argmax(size)) if len(size) else 0
         if len(size) and size[k] > 0.0:
@@ -65,7 +65,7 @@ class Maximum(Norm):
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return an epigraph variable of the program that no softened row length exceeds (E22)."""
+        """Return a variable of the smooth program that is at least every softened row length (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)

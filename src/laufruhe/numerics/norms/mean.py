@@ -53,14 +53,14 @@ class Mean(Norm):
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
-        """Return w_k v_k / |v_k| as base, and the indices of zero rows."""
+        """Return all subgradients of the mean: w_k v_k / |v_k| as base, and indices of zero rows, which are free."""
         size = lengths(rows)
         vanishing = size <= ZERO_TOL * float(size.max(initial=0.0))
         base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
         return Subdifferential(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return max_k |z_k| / w_k over dual rows z_k; infinite if a row without weight is not zero."""
+        """Return the dual norm of dual rows z_k: max_k |z_k| / w_k; infinite if a row without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf

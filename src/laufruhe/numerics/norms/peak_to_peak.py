@@ -53,7 +53,10 @@ class PeakToPeak(Norm):
         return np.asarray(2.0 * balls.radii.reshape(len(row_sets), -1).max(axis=1, initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return unit vectors from the centre of the largest ball to its support points, weighted by their shares."""
+        """Return a subgradient (dual rows) of the peak to peak of the worst signal.
+
+        It has unit vectors from the centre of the largest enclosing ball to its support points, weighted.
+        """
         z = np.zeros_like(rows)
         balls = enclosing_balls(_signals(rows, grid.steps))
         if balls.radii.max(initial=0.0) > 0.0:
@@ -107,7 +110,7 @@ class PeakToPeak(Norm):
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return twice an epigraph variable of the radii of all enclosing balls (E22)."""
+        """Return twice a variable of the smooth program that is at least the radius of every enclosing ball (E22)."""
         import casadi as ca
 
         rows = rows / unit

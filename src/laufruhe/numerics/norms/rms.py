@@ -37,7 +37,7 @@ class RootMeanSquare(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return sqrt(sum_k |z_k|^2 / w_k) over dual rows z_k; infinite if a row without weight is not zero."""
+        """Return the dual norm of dual rows z_k: sqrt(sum_k |z_k|^2 / w_k); infinite for a row without weight."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -84,7 +84,7 @@ class RootMeanSquare(Norm):
         return math.sqrt(float(shares @ squares.mean(axis=1)))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the difference between the sampled norm and Parseval's sum."""
+        """Return the sampling error of the norm: the difference between its sampled value and Parseval's exact sum."""
         squares = [float(np.square(lengths(s.series.sample(steps))).mean()) for s in signals]
         sampled = math.sqrt(float(shares @ np.array(squares)))
         # orders of kinks beyond the listed ones add between zero and a bound

@@ -35,7 +35,7 @@ class RootMeanQuad(Norm):
         return longest and longest * float(grid.weights @ (size / longest) ** 4) ** 0.25
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Return the dual rows w_k |v_k|^2 v_k / norm(V)^3, zero if the norm is."""
+        """Return the gradient (dual rows) of the norm: w_k |v_k|^2 v_k / norm(V)^3; zero if the norm is zero."""
         value = self.value(grid, rows)
         if value == 0.0:
             return np.zeros_like(rows)
@@ -47,7 +47,10 @@ class RootMeanQuad(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4) of dual rows z_k; infinite if one with w_k = 0 is not zero."""
+        """Return the dual norm (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4).
+
+        It is infinite if a row z_k with w_k = 0 is not zero.
+        """
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -107,7 +110,7 @@ class RootMeanQuad(Norm):
         return math.sqrt(math.sqrt(float(shares @ np.array(fourth))))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the difference of sampled and exact means, plus a bound for orders of kinks beyond the list.
+        """Return the sampling error of the norm: difference of sampled and exact means, plus a bound of further orders.
 
         |v|^4 has four times the orders of v, so a mean over more samples than these is the exact integral.
         """

@@ -64,7 +64,7 @@ class WorstMean(Norm):
         return float(self._prices(grid, z).sum())
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return the directions of the design's rows, weighted by the shares of operating points in Z."""
+        """Return dual rows along the design's load rows, weighted by operating point as the dual rows Z are."""
         size, shares = lengths(rows), _shares(grid)
         prices = np.repeat(self._prices(grid, z), _size(grid))
         small = size <= 1e-6 * float(size.max(initial=0.0))
@@ -72,7 +72,10 @@ class WorstMean(Norm):
         return np.where(small[:, None], z, directions)
 
     def cones(self, grid: Grid) -> Cones:
-        """Return one cone and head for each row, and one head that is at least the mean of every operating point."""
+        """Return the cones of the norm: each row length is at most a variable.
+
+        One more is at least every point's mean.
+        """
         count, size = len(grid.weights), _size(grid)
         point = np.arange(count) // size
         value = np.zeros(count + 1)
@@ -85,7 +88,7 @@ class WorstMean(Norm):
         return Cones(value, np.arange(count), np.ones(count), linear_rows=linear_rows)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return an epigraph variable, with the constraint that no mean of softened lengths exceeds it (E22)."""
+        """Return a variable of the smooth program: at least every operating point's mean of softened lengths (E22)."""
         import casadi as ca
 
         weights = ca.DM(_shares(grid).reshape(grid.points, _size(grid)))

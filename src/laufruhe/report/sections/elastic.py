@@ -17,7 +17,7 @@ from laufruhe.solvers.result import Result
 
 
 def modes(result: Result) -> list[Table]:
-    """Return the modes of the initial and the final design, and the final mounts; empty for rigid mounts."""
+    """Return tables of natural modes of both designs, and of the final elastic mounts; empty for rigid mounts."""
     if not is_elastic(result):
         return []
     facts_by_design = [facts_of(design) for design in result.designs.values()]
@@ -70,7 +70,7 @@ def _mounts(result: Result, facts: MountingFacts) -> Table:
 
 
 def load_cases(result: Result) -> list[Table]:
-    """Return travel and force of every mount under each static load case."""
+    """Return a table of travel and force of every mount under each static load case."""
     if not is_elastic(result) or not result.final.engine.load_cases:
         return []
     mounting, rows = mounting_in(result.final.engine), []

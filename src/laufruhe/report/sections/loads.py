@@ -73,7 +73,10 @@ def _cells(measures: list[CycleMeasures], scale: float) -> list[str]:
 
 
 def orders(result: Result) -> list[Table]:
-    """Return the orders above a small share of the largest, at the hardest operating point."""
+    """Return tables of load amplitudes by order at the operating point with the largest loads.
+
+    Orders below a small share of the largest are left out.
+    """
     if not has_loads(result):
         return []
     k, designs = hardest_point(result), evaluations_with_loads(result)
@@ -103,7 +106,7 @@ def _amplitudes(loads: PointLoads) -> list[Array]:
 
 
 def torque(result: Result) -> list[Table]:
-    """Return a row per operating point, if the problem asks for torque or has a flywheel."""
+    """Return a table of crank torque by operating point, if a measure needs torque or there is a flywheel."""
     engine, problem = result.final.engine, result.problem
     if not uses_torque(result):
         return []

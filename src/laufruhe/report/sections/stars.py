@@ -18,7 +18,7 @@ ORDERS_SHOWN = 6
 
 
 def crank_stars(result: Result) -> list[Table]:
-    """Return stars, firing orders, and the trade against even firing if there is one."""
+    """Return tables of the best crank stars, their firing orders, and the objective against even firing."""
     if result.phasing is None:
         return []
     phasing = ranking_of(result)

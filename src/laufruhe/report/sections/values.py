@@ -43,7 +43,7 @@ EQUAL = (
 
 
 def decisions(result: Result) -> list[Table]:
-    """Return a row per decision."""
+    """Return a table of the decisions: initial and final value, bounds and shadow price, a row for each."""
     pairs = pairwise([None, *result.decisions])
     rows = [_decision(before, d, objective_unit(result)) for before, d in pairs if d is not None]
     head, note = ("decision", "initial", "final", "bounds", "at bound", "shadow price"), ""
@@ -70,7 +70,7 @@ def _decision(before: DecisionValue | None, d: DecisionValue, unit: str) -> tupl
 
 
 def limits(result: Result) -> list[Table]:
-    """Return a row per limit."""
+    """Return a table of the limits: value, bound and shadow price, a row for each."""
     values, decided, unit = limits_of(result), result.certificate is not None, objective_unit(result)
     sides = {limit.side for limit in values}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
@@ -94,7 +94,7 @@ def _limit(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
 
 
 def attainable(result: Result) -> list[Table]:
-    """Return the designs nearest to each of conflicting limits, with the other limits met; a row per decision."""
+    """Return a table of the designs nearest to each conflicting limit, with the other limits met."""
     designs: list[tuple[str, AttainableLimit | NearestDesign]] = [
         (f"nearest to '{design.name}'", design) for design in result.reached if design.decisions
     ]
@@ -112,7 +112,7 @@ def attainable(result: Result) -> list[Table]:
 
 
 def objectives(result: Result) -> list[Table]:
-    """Return a row per objective; and a row per decision with its range after each objective."""
+    """Return tables of several objectives in order, and of the range of each decision after each objective."""
     ranks = result.ranks
     if not ranks:
         return []

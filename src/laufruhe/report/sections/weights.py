@@ -23,7 +23,7 @@ _FACTOR = (
 
 
 def weights(result: Result) -> list[Table]:
-    """Return a row per weight of the final design."""
+    """Return a table of the counterweights and balancers of the final design, a row for each."""
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
     rotors = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
     scale, two, rows = max((abs(rotor.unbalance) for rotor in rotors), default=0.0), is_changed(result), []
@@ -53,7 +53,7 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
 
 
 def factors(result: Result) -> list[Table]:
-    """Return a row per throw with counterweights."""
+    """Return a table of balance factors, a row for each throw with counterweights."""
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
     names = dict.fromkeys(balance.cylinders for design in designs for balance in balance_factors(design.engine))
     # a weight that a design lacks counts as zero there

@@ -24,7 +24,7 @@ MAX_GROUPS = 6
 
 
 def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
-    """Return groups of shafts that one decision drives, so that they are built together."""
+    """Return the balancer shafts in groups: shafts with a common decision are built together."""
     shaft_of = {rotor.name: rotor.shaft.name for rotor in problem.engine.rotors}
     groups = [{shaft} for shaft in shafts_of(problem)]
     for decision in problem.decisions:
@@ -81,7 +81,7 @@ class BalancerSizing(SweptPart):
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """Return bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+        """Return a bar chart of every set of shafts, the engine without shafts once; lines if a number is swept."""
         words = "Every set of shafts at its own optimum."
         if swept_names(data):
             return over_sweep(data, ["shafts"], words)
@@ -99,7 +99,7 @@ class BalancerSizing(SweptPart):
 
 
 def _counting(problem: Problem) -> Problem:
-    """Return the problem without terms and limits on the masses of shafts that are left out."""
+    """Return the problem without objective terms and limits on the masses of shafts that are not built."""
 
     def counted(quantity: Measure) -> Measure | None:
         if not quantity.is_mass:

@@ -33,7 +33,7 @@ class CounterweightFraction(SweptPart):
     kind: Literal["counterweight fraction"]
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return every swept fraction and then, for each speed, the open fraction."""
+        """Return the points to compute: each swept counterweight fraction and, for each speed, the open fraction."""
         problems = self.checked(problem_files)
         self.check_moved_by_loads(problems, problem_files, "counterweight")
         fraction = self._swept_fraction()
@@ -58,7 +58,7 @@ class CounterweightFraction(SweptPart):
         return next((axis for axis in self.axes() if axis.quantity.endswith(FACTORS)), None)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return the dataset of a sweep; `optimum` marks the rows with an open fraction."""
+        """Return the results of all fractions as a dataset; `optimum` marks the points with an open fraction."""
         fraction = self._swept_fraction()
         if fraction is None:
             return super().dataset(points, records)
@@ -78,7 +78,7 @@ class CounterweightFraction(SweptPart):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw the metric over the fraction with every proven optimum, or the best fraction over speed."""
+        """Draw the objective over the balance factor with dots at proven optima, or the best factor over speed."""
         data = readable_metric(data)
         if "optimum" not in data.coords:
             return _best_fraction(data)

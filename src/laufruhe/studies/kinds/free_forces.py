@@ -57,7 +57,7 @@ class FreeLoad:
 
 
 def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
-    """Return free force and couple of the reciprocating masses in one order, about the middle of the engine.
+    """Return the free force and couple that the reciprocating masses leave in one order, about the engine's middle.
 
     `order` is a multiple of crank speed; `spacing` is the unit of length of the couples [m]. Raise `ModelError` if
     cylinders differ in mechanism, because then no single cylinder gives the unit of force.
@@ -113,21 +113,24 @@ class FreeForces(Part):
         return {"kind": self.kind, "spacing": self.spacing}
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return one point per layout."""
+        """Return the points to compute: one for each engine layout."""
         points = [Point(case) for case in self.cases]
         for point in points:
             problem_files.problem(point)
         return points
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return free loads of one layout, and its shortest and longest firing interval [rad]."""
+        """Return free forces and couples of one layout, and its shortest and longest firing interval [rad]."""
         engine = problem_files.problem(point).engine
         loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
         intervals = engine.firing_intervals
         return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
-        """Return layouts side by side; NaN where the literature has no value."""
+        """Return the free forces of all layouts as a dataset, with printed values.
+
+        NaN where the literature has none.
+        """
         along = ("case", "order")
         table = {
             name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)
@@ -146,7 +149,7 @@ class FreeForces(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return free forces and couples by layout, printed values in brackets."""
+        """Return a table of free forces and couples by layout, values of the literature in brackets."""
         columns = [(what, int(order)) for order in data["order"].values for what in WHAT]
         head = ["layout", "firing intervals [deg]", *(f"{what} {order}" for what, order in columns)]
         head += ["force 1 left by crank weights", "couple 1 left by crank weights"]
@@ -170,7 +173,7 @@ class FreeForces(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw bars of the free loads and of the part that crank weights cannot take, printed values as dots."""
+        """Draw bars of free forces and of the part that crank weights cannot balance; printed values are dots."""
         count = data.sizes["case"]
         columns = [(what, order) for order in data["order"].values for what in WHAT]
         panels = []

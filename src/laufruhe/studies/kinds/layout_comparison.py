@@ -49,7 +49,10 @@ class LayoutComparison(SweptPart):
     )
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return every case at every combination, after checking that sizes are equal."""
+        """Return the points to compute: every case at every combination of swept values.
+
+        Cylinders must have one size.
+        """
         points = super().points(problem_files)
         power = self.cases[0].equal_power_to
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
@@ -71,7 +74,7 @@ class LayoutComparison(SweptPart):
     def _measures(
         self, problem: Problem, case: CaseTable, problem_files: ProblemFiles
     ) -> dict[str, Measure | InputError]:
-        """Return further quantities by name, or the error of an engine that lacks one."""
+        """Return further measures by name; for an engine without that quantity, the error in place of the measure."""
         context, measures = MeasureContext(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
             # an engine without weights has a mass of zero
@@ -85,7 +88,7 @@ class LayoutComparison(SweptPart):
         return measures
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return the record of the proven optimum, with every further quantity of that design."""
+        """Return the record of one layout's proven optimum, with every further quantity of that design."""
         problem = problem_files.problem(point)
         further: dict[str, Further] = {
             n: partial(_value, m) for n, m in self._measures(problem, point.case, problem_files).items()
@@ -98,7 +101,7 @@ class LayoutComparison(SweptPart):
         return solve_scene(problem, further)
 
     def _check_cylinders(self, problem_files: ProblemFiles) -> None:
-        """Refuse layouts of different cylinders, where a difference in size would pass for one of layout."""
+        """Raise `InputError` for layouts with different cylinders, because size would then change the comparison."""
         sizes = []
         for case in self.cases:
             as_drawn = Point(case.model_copy(update={"equal_power_to": None}), self.combinations()[0], self.metric)
@@ -116,7 +119,7 @@ class LayoutComparison(SweptPart):
                 raise problem_files.refused(case, "engine", rule, "compare layouts of one cylinder")
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return the dataset of a sweep with the size of comparison and the further quantities."""
+        """Return the results of all layouts as a dataset, with the further quantities."""
         power = self.cases[0].equal_power_to
         size = EQUAL if power is None else f"the power of {power} cylinders"
         data = super().dataset(points, records).assign_attrs(at=size)
@@ -144,7 +147,7 @@ class LayoutComparison(SweptPart):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw initial and final bars of every engine; lines where something is swept."""
+        """Draw bars of the initial and the final objective of every layout; lines if a number is swept."""
         size, is_equal = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
             decided = (data["proof"].values != NOTHING_OPEN).any()
@@ -161,7 +164,7 @@ def _value(measure: Measure | InputError, design: Evaluation) -> float:
 
 
 def _ranking(data: xr.Dataset) -> list[Text]:
-    """Rank best first; values that differ by rounding only share a place."""
+    """Return a table of the layouts, best first; values that differ by rounding share a rank."""
     best, points = data["objective"].values, data.sizes["point"]
     columns = [(data.attrs["metric"], data["objective"].attrs["units"], best, [""] * points)]
     for k, name in enumerate(data["quantity"].values.tolist()):
@@ -193,7 +196,7 @@ def _places(values: np.ndarray) -> list[int]:
 
 
 def _side_by_side(data: xr.Dataset, words: str) -> p.Picture:
-    """Rank engines, best first: a panel for the metric, unless it is a further quantity, and for each of those."""
+    """Draw the layouts by rank, best first: a panel for the objective and for each further quantity."""
     order = np.argsort(np.nan_to_num(data["objective"].values, nan=np.inf), kind="stable")
     names = [str(name) for name in data["case"].values[order]]
     units = data["quantity_unit"].values.tolist()

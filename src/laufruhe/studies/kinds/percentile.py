@@ -24,7 +24,7 @@ class PercentilePart(Part):
     share: float = Field(95.0, gt=0.0, lt=100.0, description="Share of the cycle in percent.")
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return a point for each case, whose objective has to be a load."""
+        """Return the points to compute: one for each case, whose objective must be a load."""
         for case in self.cases:
             if not any(term.measure.is_load for term in problem_files.problem(Point(case)).objective):
                 raise problem_files.refused(
@@ -33,14 +33,14 @@ class PercentilePart(Part):
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return the percentile [SI]."""
+        """Return the percentile of a load over the cycle, for one case [SI]."""
         problem = problem_files.problem(point)
         measure = next(term.measure for term in problem.objective if term.measure.is_load)
         rows = evaluate(problem).rows(measure)
         return {"value": float(np.percentile(lengths(rows.vectors), self.share)), "unit": measure.channel.unit}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return one number for each case."""
+        """Return the percentiles of all cases as a dataset."""
         values = [record["value"] for record in records]
         words = f"load not exceeded in {self.share:g} % of the cycle"
         variables = {"percentile": variable("case", values, words, records[0]["unit"])}
@@ -48,7 +48,7 @@ class PercentilePart(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return a row for each case."""
+        """Return a table of the percentiles, one row for each case."""
         about = data["percentile"].attrs
         values = zip(data["case"].values, data["percentile"].values, strict=True)
         rows = [[str(case), number(float(value))] for case, value in values]
@@ -56,7 +56,7 @@ class PercentilePart(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Return a mark for each case."""
+        """Return a picture of the percentiles, one mark for each case."""
         about = data["percentile"].attrs
         places = np.arange(data.sizes["case"], dtype=float)
         marks: list[p.Mark] = [p.Line(places, data["percentile"].values, p.colour(0, 1), width=0.0, marker="o")]

@@ -32,7 +32,7 @@ class RandomDesigns(Sampled):
     own_chunk: ClassVar[int] = 10_000
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return, for every case, the proven optimum and the pieces of its draws."""
+        """Return the points to compute, for every case: its proven optimum, and its random designs in batches."""
         for case in self.cases:
             with problem_files.blamed(Point(case), "decisions"):
                 problem = problem_files.problem(Point(case))
@@ -49,7 +49,7 @@ class RandomDesigns(Sampled):
         return [Point(case, span=span) for case in self.cases for span in (None, *self.spans())]
 
     def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
-        """Return columns for objective, limits and every open number."""
+        """Return the columns that store a random design: objective, limits and every open number."""
         columns: dict[str, Column] = {}
         for case in self.cases:
             problem = problem_files.problem(Point(case))
@@ -60,7 +60,7 @@ class RandomDesigns(Sampled):
         return columns
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return the record of the proven optimum, or the values of a piece."""
+        """Return the record of one point: the proven optimum, or the values of a batch of random designs."""
         if point.span is None:
             return solve_scene(problem_files.problem(point))
         problem, designs, names = self._prepared(point, problem_files)
@@ -80,7 +80,7 @@ class RandomDesigns(Sampled):
         return {VALUES: rows}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return all draws, with the proven optimum of every case."""
+        """Return all random designs as a dataset, with the proven optimum of every case."""
         best = [records[k] for k, point in enumerate(points) if point.span is None]
         data = self.gathered(points, records)
         about = data["objective"].attrs
@@ -101,7 +101,7 @@ class RandomDesigns(Sampled):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Compare the random designs of every case with the proven optimum."""
+        """Return a table that compares the random designs of every case with its proven optimum."""
         objective, unit = in_unit(data["objective"])
         best, bound = (in_unit(data[name].assign_attrs(units=data["objective"].attrs["units"]))[0]
                        for name in ("optimum", "lower_bound"))  # fmt: skip
@@ -120,7 +120,7 @@ class RandomDesigns(Sampled):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw the share of random designs below each value, and the optimum."""
+        """Draw the percentage of random designs with an objective below each value, and the proven optimum."""
         objective, unit = in_unit(data["objective"])
         best = in_unit(data["optimum"])[0]
         marks: list[p.Mark] = []

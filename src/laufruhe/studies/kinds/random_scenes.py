@@ -59,7 +59,7 @@ class RandomScenes(Sampled):
         return [Point(case, span=span) for case in self.cases for span in self.spans()]
 
     def columns(self, problem_files: ProblemFiles) -> dict[str, Column]:
-        """Return columns for drawn numbers, outcomes and decisions."""
+        """Return the columns that store a random problem: drawn numbers, results and decisions."""
         spans = self.drawn()
         columns = {span.quantity: Column(span.unit, span.quantity) for span in spans}
         for case in self.cases:
@@ -92,7 +92,7 @@ class RandomScenes(Sampled):
         return {VALUES: np.array(rows)}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return all draws, status and proof as flag values with their meanings."""
+        """Return all random problems as a dataset; status and proof are numbers with their meanings as attributes."""
         data = self.gathered(points, records)
         for name, codes in _CODES.items():
             meanings = " ".join(code.replace(" ", "_") for code in codes)
@@ -102,7 +102,7 @@ class RandomScenes(Sampled):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Count the outcomes of every case, and compare its initial and final designs."""
+        """Return a table with the number of results by proof for every case, and its initial and final objectives."""
         unit = in_unit(data["objective"])[1]
         head = ["case", "scenes", "proven optimum", "proven within gap or local", "infeasible", "failed", "impossible"]
         head += [f"initial: 5 % below [{unit}]", "median", "95 % below", f"final: 5 % below [{unit}]", "median"]

@@ -58,7 +58,7 @@ class SpeedsTable(f.Table):
         return self
 
     def with_point(self, point: OperatingPoint) -> Array:
-        """Return ascending speeds [rad/s], including that of an operating point within the range."""
+        """Return the speeds of the map, ascending [rad/s], with that of an operating point if it is in the range."""
         count = self.points or int((self.last - self.first) / (self.step or 1.0) + 1e-9) + 1
         steps = self.first + (self.step or (self.last - self.first) / (count - 1)) * np.arange(count)
         steps = steps[~np.isclose(steps, point.speed, rtol=1e-9)]
@@ -85,7 +85,7 @@ class SpeedMapStudy(Part):
     by_order: bool = f.optional("Show the amplitude of every order of the first measure too.", False)
 
     def points(self, problem_files: ProblemFiles) -> list[Point]:
-        """Return one point per case, because decisions do not depend on the speeds of the map."""
+        """Return the points to compute: one for each case, because decisions do not depend on the map's speeds."""
         for case in self.cases:
             problem = problem_files.problem(Point(case))
             self._load(problem, case, problem_files)
@@ -120,7 +120,7 @@ class SpeedMapStudy(Part):
         return {replace(m, points=None): limit for m, limit in limits.items() if narrowed <= set(m.channel.keys)}
 
     def answer(self, point: Point, problem_files: ProblemFiles) -> Record:
-        """Return values, limits and orders of every design at every speed, for one point of the study."""
+        """Return measures, limits and orders of every design at every speed, for one point of the study."""
         problem = problem_files.problem(point)
         load, limits = (
             self._load(problem, point.case, problem_files),
@@ -149,7 +149,7 @@ class SpeedMapStudy(Part):
             yield FINAL, result.final.engine if has_design else None, proof if has_design else status
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Return a point for every case, design and speed, in that order; NaN on an undamped resonance."""
+        """Return the measures as a dataset over case, design and speed; NaN on an undamped resonance."""
         units = {name: unit for record in records for name, unit in record["measures"]}
         parts = [
             _design_dataset(point.case.name, design, attributes, record)
@@ -170,7 +170,7 @@ class SpeedMapStudy(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Return a row per measure: its extremes, and the speeds over its limit."""
+        """Return a table of measures: extremes over speed, and speeds at which a limit is broken."""
         data = _readable(data)
         head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"above it, from to [{RPM}]"]
         rows = []
@@ -194,7 +194,7 @@ class SpeedMapStudy(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Draw a panel per measure, initial designs dashed; then a panel per design of its orders."""
+        """Draw each measure over speed, initial designs dashed, and the orders of each design in a panel of its own."""
         data = _readable(data)
         designs = list(_designs(data))
         panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
@@ -221,7 +221,7 @@ def _speed_curves(
     measures: Sequence[Measure],
     by_order: bool,
 ) -> Record:
-    """Return values (measures, speeds), amplitudes (orders, speeds) and natural frequencies [Hz] of one design."""
+    """Return the curves of one design over speed: measures, amplitudes by order, and natural frequencies [Hz]."""
     values = np.full((len(measures), len(speeds)), math.nan)
     if engine is None:
         return {"values": values.tolist(), "orders": [], "sizes": [], "modes": []}
