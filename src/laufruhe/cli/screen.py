@@ -118,7 +118,7 @@ def share_below_one(option: str, value: float) -> float:
 
 @contextmanager
 def resources(seconds: float | None, scheduler: str | None) -> Iterator[None]:
-    """Apply --time-limit to searches, and --scheduler to parallel work."""
+    """Apply the options --time-limit to searches, and --scheduler to parallel work, within the block."""
     from laufruhe.numerics.budget import limit_time
 
     with ExitStack() as stack:

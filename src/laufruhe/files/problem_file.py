@@ -91,7 +91,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Note:
-    """Note that a file may add to any number, such as a tolerance.
+    """Extra text that a file may write at any number, such as a tolerance "± 2 %", read by an extension.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ from laufruhe.problem.decision import AddressDrive
 
 
 class Quantity(ABC):
-    """Number of the file that determines several other numbers.
+    """Number of [quantities], such as stroke over bore, that determines several other numbers of the file.
 
     Attributes
     ----------

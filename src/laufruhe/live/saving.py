@@ -28,7 +28,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Saved:
-    """A problem file with placeholders for numbers.
+    """Text of a problem file that a live page can save, with placeholders for the numbers of its sliders.
 
     Attributes
     ----------

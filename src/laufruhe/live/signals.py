@@ -33,7 +33,7 @@ class Waves:
 
     @classmethod
     def from_series(cls, coefficients: ComplexArray) -> Waves:
-        """Return the non-zero orders of a series, shape (n, ...)."""
+        """Return a Fourier series, shape (n, ...), without its negligible orders."""
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
         smallest = np.argsort(size, kind="stable")
         left_out = smallest[np.cumsum(size[smallest]) <= ZERO * size.max(initial=0.0)]

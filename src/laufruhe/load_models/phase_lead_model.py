@@ -26,8 +26,8 @@ FINE = 1440
 
 
 @dataclass(frozen=True, eq=False)
-class LoadShare:
-    """Share of one shaft, or of the fixed parts, in a load.
+class LoadPart:
+    """Part of a load that one shaft with an open lead angle causes, or all parts with a fixed phase together.
 
     Attributes
     ----------
@@ -40,13 +40,13 @@ class LoadShare:
     bare: list[Spectrum]
     columns: list[list[Spectrum]]
 
-    def earlier(self, lead: float) -> LoadShare:
-        """Return the share that comes earlier by a lead [rad]."""
+    def earlier(self, lead: float) -> LoadPart:
+        """Return the part of the load if its shaft runs ahead by another lead angle [rad]."""
         return self.mapped(lambda signal: signal.shift(-lead / signal.period, -lead)) if lead else self
 
-    def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadShare:
-        """Return the share with the function `change` applied to every spectrum."""
-        return LoadShare(
+    def mapped(self, change: Callable[[Spectrum], Spectrum]) -> LoadPart:
+        """Return the part of the load with the function `change` applied to every spectrum."""
+        return LoadPart(
             [change(signal) for signal in self.bare], [[change(signal) for signal in column] for column in self.columns]
         )
 
@@ -92,9 +92,9 @@ class PhaseLeadModel:
         self.domains = self.base_model.domains
         self._shafts = [AffineModel(problem_of_shafts(problem, name.__eq__), True, True) for name in self.names]
         self._fixed = AffineModel(problem_of_shafts(problem, lambda name: name not in self.names), True, True)
-        self._cache: dict[Measure, tuple[LoadShare, list[LoadShare]]] = {}
+        self._cache: dict[Measure, tuple[LoadPart, list[LoadPart]]] = {}
 
-    def shares(self, measure: Measure) -> tuple[LoadShare, list[LoadShare]]:
+    def shares(self, measure: Measure) -> tuple[LoadPart, list[LoadPart]]:
         """Return the parts of a load: from all parts with a fixed phase, and from each shaft with an open lead angle.
 
         Their spectra have a common period, so that they can be added.
@@ -103,7 +103,7 @@ class PhaseLeadModel:
             shares = []
             for model in (self._fixed, *self._shafts):
                 bare, columns = zip(*model.spectra(measure.load), strict=True)
-                shares.append(LoadShare(list(bare), [list(column) for column in zip(*columns, strict=True)]))
+                shares.append(LoadPart(list(bare), [list(column) for column in zip(*columns, strict=True)]))
             signals = [signal for share in shares for column in (share.bare, *share.columns) for signal in column]
             base = common_base([self.problem.engine.cycle.base_order, *(signal.base for signal in signals)])
             count = max(len(signal.with_finer_base(base).coefficients) for signal in signals)

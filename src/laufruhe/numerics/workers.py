@@ -59,11 +59,11 @@ SERIAL = SerialExecutor()
 
 
 class TimeIsOver(SolverError):
-    """End of the time limit before all pieces of work were done."""
+    """Error: the time limit ended before all pieces of work were done."""
 
 
 class WorkersGone(SolverError):
-    """Loss of all workers, or of every worker that had tried one piece of work."""
+    """Error: all workers, or every worker that had tried one piece of work, died."""
 
 
 @contextmanager

@@ -106,7 +106,7 @@ def two_order_roll(rod_ratio: float) -> ComplexArray:
 
 
 def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    """Piston and rod by their closed forms (K7-K10)."""
+    """Return the loads of piston and rod of a slider-crank, from closed forms of their order coefficients (K7-K10)."""
     radius, ratio = part.crank_radius, part.shaft.ratio
     shape = part.rod_ratio, part.offset_ratio
 

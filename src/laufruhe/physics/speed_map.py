@@ -61,11 +61,11 @@ def speed_map(
     gas: Spectrum | None,
     speeds: Array,
     minimum: float = 1e-7,
-    wanted: Sequence[float] | None = None,
+    only_orders: Sequence[float] | None = None,
 ) -> SpeedMap:
     """Return the mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
 
-    Orders under the share `minimum` of the largest, at every speed, are left out, and those that are not `wanted`.
+    Orders under the share `minimum` of the largest, at every speed, are left out, and those not in `only_orders`.
     """
     spectra = [inertia] if gas is None else [inertia, gas]
     base = common_base([spectrum.base for spectrum in spectra])
@@ -76,8 +76,8 @@ def speed_map(
     growth = [np.asarray(speeds, dtype=float) ** 2, np.ones(len(speeds))][: len(spectra)]
     size = sum(np.abs(c).max(axis=1) * g.max(initial=0.0) for c, g in zip(padded, growth, strict=True))
     indices = np.flatnonzero(size > minimum * np.max(size, initial=0.0))
-    if wanted is not None:
-        indices = indices[orders_equal(indices * float(base), wanted)]
+    if only_orders is not None:
+        indices = indices[orders_equal(indices * float(base), only_orders)]
     orders: Array = np.asarray(indices, dtype=float) * float(base)
     parts = [c[indices] for c in padded]
     omegas = np.outer(speeds, orders).reshape(-1)

@@ -82,7 +82,7 @@ def transmissibility_of(
     """
     loads = split_loads(design.engine, point, design.fidelity)
     try:
-        field = speed_map(mounting_in(design.engine), *loads, speeds, wanted=orders)
+        field = speed_map(mounting_in(design.engine), *loads, speeds, only_orders=orders)
     except ModelError:
         return
     curves = field.transmissibility

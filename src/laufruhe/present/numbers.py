@@ -65,7 +65,10 @@ _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 
 
 def in_grams(value: float, unit: str, scale: float) -> str:
-    """Return " = " and a mass in g or an unbalance in g mm; empty for other units."""
+    """Return a mass or an unbalance once more in workshop units, as " = 12 g" or " = 30 g mm".
+
+    The text is empty for other units, and for values that are zero by rounding of `scale`.
+    """
     if unit not in _WORKSHOP or abs(value) <= ROUNDS_TO_ZERO * scale:
         return ""
     name, factor = _WORKSHOP[unit]

@@ -16,7 +16,7 @@ NumberTables: TypeAlias = Mapping[str, tuple[Callable[[Result], object], Callabl
 
 @dataclass(frozen=True)
 class Section:
-    """Tables and numbers of one extension.
+    """Tables and JSON numbers that one extension adds to the report of a result.
 
     Attributes
     ----------

@@ -22,7 +22,7 @@ Record: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True)
 class Column:
-    """Column of numbers, one for every draw."""
+    """Column of a table of draws: one number for every draw."""
 
     unit: str
     words: str

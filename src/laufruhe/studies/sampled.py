@@ -27,7 +27,7 @@ _WORDS = 4
 
 
 class Sampled(Part):
-    """Cases with many draws each, all with the same random numbers."""
+    """Study part with many random draws for each case; all cases use the same random numbers."""
 
     draws: Annotated[int, Field(ge=1, le=MAX_DRAWS)] = f.required("Number of draws of each case.")
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964

@@ -30,7 +30,7 @@ _ROUNDS, _MIN_SCALE, _MAX_SCALE = 10, 1e-4, 1e4
 
 @dataclass(frozen=True, eq=False)
 class Cone:
-    """Cone of consecutive rows of a program.
+    """Cone constraint on consecutive rows of a cone program.
 
     Attributes
     ----------

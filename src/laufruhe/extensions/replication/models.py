@@ -50,7 +50,7 @@ class GridTable(Table):
 
 
 class ReplicaCase(CaseTable):
-    """Case whose numbers replace those of the part."""
+    """Case of a replication: its numbers replace those of the study part."""
 
     problem: str = f.required("A name under problems, or a problem file.")
     numbers: dict[str, Any] = f.optional("Numbers in place of those of the part.", {})
@@ -118,7 +118,7 @@ class BarsTable(Table):
 
 
 class WordsTable(Table):
-    """Words at a place."""
+    """Words at a point of a picture."""
 
     x: Expression
     y: Expression
@@ -138,7 +138,7 @@ class AreaTable(Table):
 
 
 class PanelTable(Table):
-    """A panel with two axes, drawn once for every reading."""
+    """A panel of a picture with two axes, drawn once for each interpretation ("reading") of the source."""
 
     title: str = ""
     once: bool = f.optional("Whether one drawing serves all readings.", False)
@@ -151,7 +151,7 @@ class PanelTable(Table):
 
 
 class PictureTable(Table):
-    """The picture of a part; its title is that of the part where left out."""
+    """The picture of a study part; by default its title is that of the part."""
 
     title: str | None = None
     words: str = ""

@@ -20,7 +20,7 @@ Chosen = tuple[tuple[int, ...], ...]
 
 @dataclass(frozen=True)
 class Lot:
-    """Measured parts of one kind; the drawing has their mean mass.
+    """Lot: a batch of measured pistons or rods; the engine as drawn has their mean mass.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Lot:
 
 @dataclass(frozen=True)
 class Assembly(Extra):
-    """Lots of measured parts; each cylinder takes one part of each lot."""
+    """Lots (batches of measured pistons and rods) to assemble; each cylinder takes one part of each lot."""
 
     lots: tuple[Lot, ...]
     words: ClassVar[str] = "the choice of parts"

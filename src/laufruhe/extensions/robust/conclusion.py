@@ -203,7 +203,7 @@ def _design(
 def _priced_tolerances(
     problem: Problem, robust: RobustDesign, engine_errors: Array, samples: int, share: float
 ) -> tuple[PricedTolerance, ...]:
-    """Return the priced tolerances, the most expensive first (R11)."""
+    """Return every tolerance with its price, the fall of the objective if it is tighter, the largest first (R11)."""
 
     def objective(name: str, factor: float) -> float:
         # objective of the active error sets, or of the share of engines, with one tolerance times the factor

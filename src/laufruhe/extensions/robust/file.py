@@ -48,7 +48,7 @@ RESIDUAL = "tolerances.residual_unbalance"
 
 
 class TolerancesTable(Table):
-    """Tolerances of built engines that belong to no number of this file."""
+    """Tolerances of built engines that belong to no single number of this file, such as residual unbalance."""
 
     closed: ClassVar[str] = "is a tolerance, and the optimum would always be zero"
 
@@ -77,7 +77,7 @@ class RobustTable(Table):
 
 @dataclass(frozen=True)
 class Mark:
-    """Tolerance as written at the number of a file with the keys `path`.
+    """Tolerance as written at a number of the file, such as "1.25 kg ± 2 %"; `path` has the keys of that number.
 
     Attributes
     ----------

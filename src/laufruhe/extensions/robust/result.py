@@ -118,7 +118,7 @@ class RobustResult(ResultDetails):
 
 @dataclass(frozen=True)
 class Place:
-    """Measured parts that one cylinder takes.
+    """Piston and rod (measured parts) that one cylinder takes in an assembly.
 
     Attributes
     ----------

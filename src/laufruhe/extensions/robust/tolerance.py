@@ -161,7 +161,7 @@ class Error:
 
 @dataclass(frozen=True)
 class Tolerance:
-    """Tolerance of a number of the drawing.
+    """Tolerance of a number of the engine drawing: the errors that it allows in a built engine.
 
     Attributes
     ----------

@@ -76,7 +76,7 @@ def _run_result(
     problem: Problem, kinds: frozenset[Kind], limits: Sequence[Limit], terms: Sequence[Term], relaxed: Result | None,
     decide: Decide,
 ) -> Result | None:  # fmt: skip
-    """Return the result of a method for run-ups; None if no method has open numbers of these kinds."""
+    """Return the optimum with run-ups by the method that suits the kinds of open numbers; None without a method."""
     phasing = problem.phasing
     if phasing is not None:
         has_stops = any(spring.stop_gap < math.inf for _, spring in every_spring(problem.engine.mounts))

@@ -42,7 +42,7 @@ class LatestWorker:
 
         Raise `Superseded` if a newer request came before the answer, and `Late` if the work exceeds `seconds`.
         """
-        request_number, workers = self._turn()
+        request_number, workers = self._next_request()
         try:
             try:
                 future = workers.submit(work, *args, **kwargs)
@@ -64,8 +64,11 @@ class LatestWorker:
                     self._busy = False
                 self._changed.notify_all()
 
-    def _turn(self) -> tuple[int, Processes]:
-        """Wait for the worker process, end overdue work; return the number of the request and the process."""
+    def _next_request(self) -> tuple[int, Processes]:
+        """Return the number of this request and the worker process, once the process is free.
+
+        Work of an earlier request that takes too long is ended.
+        """
         with self._changed:
             self._newest += 1
             request_number = self._newest

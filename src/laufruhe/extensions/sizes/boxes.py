@@ -39,7 +39,7 @@ NEAR = 2e-3
 
 
 class SizeCut(NamedTuple):
-    """Remainder of a box, its bound, the side to halve, and its multipliers."""
+    """Part of a box of sizes that is left after cuts: its lower bound, the side to halve, and its multipliers."""
 
     lower: Array
     upper: Array

@@ -41,7 +41,7 @@ BETWEEN, MARGIN, SAME = 7, 0.02, 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """Sampled rows of a measure that share their factors of sizes.
+    """Part of a measure: sampled load rows that have the same factors of sizes (from load to stress).
 
     Attributes
     ----------

@@ -27,7 +27,7 @@ CONVERGED = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class RodSeries:
-    """Rows of a piece of a measure as functions of the rod length.
+    """Load rows of a measure as a series in the rod length; one piece of rows with common size factors.
 
     Attributes
     ----------

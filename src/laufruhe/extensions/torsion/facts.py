@@ -75,7 +75,7 @@ class Barred:
 
 @dataclass(frozen=True, eq=False)
 class TorsionFacts:
-    """Torsional vibration of one design in numbers.
+    """Torsional vibration of one design in numbers, for reports: modes, vector sums and critical speeds.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ STEEL = 80e9
 
 @dataclass(frozen=True)
 class Disc:
-    """Disc that turns with the crankshaft.
+    """Rigid disc of the torsional chain: a throw, flywheel or pulley that turns with the crankshaft.
 
     Attributes
     ----------

@@ -162,7 +162,7 @@ class LayoutKind(ABC):
 
 
 class Parts(LayoutKind):
-    """Free list of slider-cranks with their places."""
+    """Layout by a free list of slider-cranks, each with its own position."""
 
     name = "parts"
     keys = ()

@@ -64,16 +64,16 @@ class Maximum(Norm):
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a variable of the smooth program that is at least every softened row length (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)
-        program.hold(softened_lengths(rows / unit, share) - top)
+        program.hold(softened_lengths(rows / unit, softness) - top)
         return top * unit
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return squared lengths, shape (k, 1), which are smooth at zero, and the limit maximum^2."""
         import casadi as ca

@@ -92,11 +92,11 @@ class Mean(Norm):
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return the weighted sum of softened lengths."""
         import casadi as ca
 
-        return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
+        return ca.dot(ca.DM(grid.weights), softened_lengths(rows, softness * unit))
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return the root mean square at each place, averaged over places and operating points."""

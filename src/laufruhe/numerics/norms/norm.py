@@ -274,7 +274,7 @@ class Norm(ABC):
         """Return the norm of rows on a grid as second-order cones (P1)."""
         raise self._unclaimed("cones")
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a smooth CasADi expression of the norm to minimise (N3, E22).
 
         Parameters
@@ -283,21 +283,21 @@ class Norm(ABC):
             Program that receives epigraph variables and their constraints.
         rows
             CasADi matrix, shape (k, d).
-        unit, share
+        unit, softness
             Size of the norm in its unit, and relative softness: the expression differs from the norm by at most
-            share x unit.
+            softness x unit.
         """
         raise self._unclaimed("smooth form")
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return a smooth form of the limit norm(rows) <= maximum.
 
         It has a CasADi expression, its largest allowed value, and the derivative of that value by `maximum`. The
         expression is smooth at zero rows too, and as exact as `smooth_expression` with unit one, which is the default.
         """
-        return self.smooth_expression(program, grid, rows, 1.0, share), maximum, 1.0
+        return self.smooth_expression(program, grid, rows, 1.0, softness), maximum, 1.0
 
     @abstractmethod
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:

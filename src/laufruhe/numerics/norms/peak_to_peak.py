@@ -109,7 +109,7 @@ class PeakToPeak(Norm):
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return twice a variable of the smooth program that is at least the radius of every enclosing ball (E22)."""
         import casadi as ca
 
@@ -122,7 +122,7 @@ class PeakToPeak(Norm):
         top = program.head(ca.sqrt(ca.mmax(ca.vertcat(*reach))))
         for signal, middle in zip(signals, middles, strict=True):
             centre = program.free(middle)
-            program.hold(softened_lengths(signal - ca.repmat(centre, grid.steps, 1), share) - top)
+            program.hold(softened_lengths(signal - ca.repmat(centre, grid.steps, 1), softness) - top)
         return 2.0 * unit * top
 
     def upper_bound(self, signals: Sequence[Spectrum], shares: Array) -> float:

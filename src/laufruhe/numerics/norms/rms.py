@@ -37,7 +37,7 @@ class RootMeanSquare(Norm):
         return Subdifferential(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Return the dual norm of dual rows z_k: sqrt(sum_k |z_k|^2 / w_k); infinite for a row without weight."""
+        """Return the dual norm sqrt(sum_k |z_k|^2 / w_k); infinite if a dual row z_k without weight is not zero."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -63,15 +63,15 @@ class RootMeanSquare(Norm):
         """Return one cone with all rows, each multiplied by the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), is_single=True)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return sqrt(N^2 + e^2) - e with N the norm and e = share x unit."""
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+        """Return sqrt(N^2 + e^2) - e with N the norm and e = softness x unit."""
         import casadi as ca
 
-        softness = share * unit
-        return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + softness**2) - softness
+        absolute_softness = softness * unit
+        return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + absolute_softness**2) - absolute_softness
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return the mean square, which is smooth at zero, and the limit maximum^2."""
         import casadi as ca

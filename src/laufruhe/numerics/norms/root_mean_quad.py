@@ -88,15 +88,15 @@ class RootMeanQuad(Norm):
             ),
         )
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Return (N^4 + e^4)^(1/4) - e with N the norm and e = share x unit."""
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
+        """Return (N^4 + e^4)^(1/4) - e with N the norm and e = softness x unit."""
         import casadi as ca
 
         squares = ca.sum2(rows * rows) / unit**2
-        return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + share**4)) - share)
+        return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + softness**4)) - softness)
 
     def smooth_limit(
-        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, share: float
+        self, program: EpigraphProgram, grid: Grid, rows: Any, maximum: float, softness: float
     ) -> tuple[Any, float, float]:
         """Return the mean of fourth powers, which is smooth at zero, and the limit maximum^4."""
         import casadi as ca

@@ -87,12 +87,12 @@ class WorstMean(Norm):
         )
         return Cones(value, np.arange(count), np.ones(count), linear_rows=linear_rows)
 
-    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
         """Return a variable of the smooth program: at least every operating point's mean of softened lengths (E22)."""
         import casadi as ca
 
         weights = ca.DM(_shares(grid).reshape(grid.points, _size(grid)))
-        softened = softened_lengths(rows, share * unit) / unit
+        softened = softened_lengths(rows, softness * unit) / unit
         means = ca.sum2(weights * ca.reshape(softened, _size(grid), grid.points).T)
         top = program.head(ca.mmax(means))
         program.hold(means - top)

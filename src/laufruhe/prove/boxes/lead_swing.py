@@ -38,7 +38,7 @@ class _Part:
 
 
 class LeadSwing:
-    """Bounds of the degree of irregularity over boxes of leads."""
+    """Lower bounds of the degree of irregularity over boxes of lead angles."""
 
     def __init__(self, problem: Problem, model: PhaseLeadModel, measure: Measure) -> None:
         fidelity, inertia = problem.fidelity, turning_inertia(problem.engine, problem.fidelity)

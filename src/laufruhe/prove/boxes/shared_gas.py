@@ -138,7 +138,7 @@ def _pressed(
 
 
 class SharedGasBoxes:
-    """Lower bounds on boxes of leads for cranks that share gas chambers."""
+    """Lower bounds of the objective on boxes of lead angles between cranks that share gas chambers."""
 
     what = "boxes of leads"
     batch_size = 1

@@ -76,7 +76,7 @@ class _Box(BoundedBox):
 
 
 class LeadSearch(RebalancedSearch[_Box]):
-    """Branch and bound search over the leads of a problem."""
+    """Branch and bound search over the open lead angles of geared shafts."""
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)

@@ -21,7 +21,7 @@ AHEAD = 32
 
 
 class SearchBox(Protocol):
-    """A box of open numbers."""
+    """A box: a range for every open number, with its lower bound, as `divide_boxes` needs it."""
 
     @property
     def bound(self) -> float:

@@ -81,9 +81,9 @@ class Task:
     leading_variables: int | None = None
 
 
-def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
-    """Return the local optima from numbered start points of a program; `share` has the program and these points."""
-    task, points = share
+def run(batch: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
+    """Return the local optima from numbered start points of a program; `batch` has the program and these points."""
+    task, points = batch
     if not points:
         return []
     report_progress("derivatives of the smooth program")

@@ -183,7 +183,7 @@ BoundByBoxes: TypeAlias = Callable[[float, float, Design], BoxResult]
 
 @dataclass(frozen=True, eq=False)
 class ProvenDesign:
-    """Best design, as shares and evaluated, with the lower bound by boxes."""
+    """Best design with its lower bound by boxes; its decisions are relative to their ranges (shares)."""
 
     shares: Array
     design: Design

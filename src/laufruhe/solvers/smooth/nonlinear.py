@@ -46,8 +46,8 @@ from laufruhe.solvers.smooth.ipopt import Task, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 StopWhen: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
-Share: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
-RunStarts: TypeAlias = Callable[[Share], list[LocalOptimum]]
+StartBatch: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
+RunStarts: TypeAlias = Callable[[StartBatch], list[LocalOptimum]]
 
 # number of starts for which arrays are expanded to scalars: evaluation is three times as fast for short arrays, and
 # compilation is slower
@@ -194,9 +194,9 @@ class _SharedStarts:
     def __init__(self, stack: ExitStack, count: int) -> None:
         self._count, self._executor = count, stack.enter_context(executor_for(count))
 
-    def __call__(self, share: Share) -> list[LocalOptimum]:
+    def __call__(self, batch: StartBatch) -> list[LocalOptimum]:
         """Return the local optima of a program's starts, run on all workers, in the order of the starts."""
-        task, points = share
+        task, points = batch
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
             return sorted((optimum for _, batch in answers for optimum in batch), key=lambda o: o.start)
@@ -208,22 +208,22 @@ class _ReadyWorkers:
     def __init__(self, stack: ExitStack, count: int) -> None:
         self._count, self._ahead = count, stack.enter_context(speculation(run))
 
-    def begin(self, share: Share) -> None:
+    def begin(self, batch: StartBatch) -> None:
         """Submit starts that are likely to be needed."""
-        self._ahead.prefetch(self._shares(share))
+        self._ahead.prefetch(self._batches(batch))
 
-    def __call__(self, share: Share) -> list[LocalOptimum]:
+    def __call__(self, batch: StartBatch) -> list[LocalOptimum]:
         """Return the local optima of a program's starts, run by the pool; a single start runs in this process."""
-        if len(share[1]) == 1:
-            return run(share)
-        self.begin(share)
-        optima = [optimum for key, part in self._shares(share) for optimum in self._ahead.result(key, part)]
+        if len(batch[1]) == 1:
+            return run(batch)
+        self.begin(batch)
+        optima = [optimum for key, part in self._batches(batch) for optimum in self._ahead.result(key, part)]
         return sorted(optima, key=lambda o: o.start)
 
-    def _shares(self, share: Share) -> list[tuple[Hashable, Share]]:
-        task, points = share
-        shares = [points[k :: self._count] for k in range(min(self._count, len(points)))]
-        return [((task.stages, tuple(number for number, _ in part)), (task, part)) for part in shares]
+    def _batches(self, batch: StartBatch) -> list[tuple[Hashable, StartBatch]]:
+        task, points = batch
+        batches = [points[k :: self._count] for k in range(min(self._count, len(points)))]
+        return [((task.stages, tuple(number for number, _ in part)), (task, part)) for part in batches]
 
 
 def _merge_equal(optima: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
