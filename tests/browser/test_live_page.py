@@ -71,6 +71,12 @@ def test_a_broken_limit_is_said(shown):
     assert re.search("Breaks .*(counterweight mass|and [1-9] more)", shown.locator("[data-role=regret]").inner_text())
 
 
+@pytest.mark.parametrize(("mass", "met"), [(1.0 + 9e-6, "true"), (1.0 + 2e-5, "false")])
+def test_a_limit_is_broken_beyond_the_tolerance_of_solvers(shown, mass, met):
+    shown.evaluate(f"laufruheLive.page.then(page => page.setDesign({{'web.mass': {mass!r}}}))")
+    shown.locator(f'tr[data-measure="counterweight mass"][data-met={met}]').wait_for()
+
+
 def test_limits_that_do_not_follow_stand_as_in_the_design_of_the_report(page: Page, tmp_path):
     page.goto(page_of(problem_of("soft-single-run-up"), tmp_path).as_uri())
     twist = page.locator('tr[data-measure="run-up twist"]')

@@ -18,6 +18,7 @@ from laufruhe.files.reader import load
 from laufruhe.present.numbers import figure
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from live.pages import designs, evaluated, model_of, page_of, problem_of
 
 pytestmark = pytest.mark.slow
@@ -48,7 +49,7 @@ def printed(problem: Problem, found: Evaluation, names: Collection[str]) -> dict
     """What a report shows of these limits of a design."""
     stands = {limit: found.check_limit(limit) for limit in problem.limits if limit.name in names}
     return {
-        limit.name: [figure(stand.value, limit.measure.unit), str(stand.violation <= 1e-5).lower()]
+        limit.name: [figure(stand.value, limit.measure.unit), str(stand.violation <= FEASIBILITY_TOL).lower()]
         for limit, stand in stands.items()
     }
 

@@ -22,8 +22,10 @@ from laufruhe.problem.measure import Measure
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show
+from laufruhe.report.sections.values import limits as limit_tables
 from laufruhe.report.wording import fired
 from laufruhe.solvers import Result, evaluate_only
+from laufruhe.solvers.conclusion import violated_limits
 from problem_files import PROBLEMS
 from report.result_schema import SCHEMA
 
@@ -54,6 +56,19 @@ def test_the_schema_finds_what_is_missing() -> None:
     written = parsed(scenes.solved(scenes.TIGHT))
     del written["certificate"]["gap"]
     assert not Draft202012Validator(SCHEMA).is_valid(written)
+
+
+@pytest.mark.parametrize(("excess", "is_broken"), [(9e-6, False), (2e-5, True)])
+def test_a_report_and_a_solver_call_the_same_limits_broken(excess: float, is_broken: bool) -> None:
+    initial = scenes.stated(scenes.IMPOSSIBLE)
+    (limit,) = (limit for limit in initial.problem.limits if limit.name == "quiet mounts")
+    limits = (replace(limit, maximum=initial.final.values(limit.measure)[0] / (1.0 + excess)),)
+    result = evaluate_only(initial.problem.changed(limits=limits))
+    names = {limit.name for limit in limits if is_broken}
+    assert set(violated_limits(limits, result.final)) == names
+    assert {limit["name"] for limit in parsed(result)["constraints"] if not limit["met"]} == names
+    (table,) = limit_tables(result)
+    assert {row[0] for row in table.rows if row[3] == "broken"} == names
 
 
 def test_numbers_are_those_of_the_result() -> None:

@@ -16,6 +16,7 @@ from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
 from laufruhe.present.numbers import share
 from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.units import readable
 
 VERSION = 1
@@ -173,6 +174,8 @@ class LiveModel:
         as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "reference", "save")
         plain = {
             "version": VERSION,
+            # the rule of `is_met`
+            "tolerance": FEASIBILITY_TOL,
             **{key: getattr(self, key) for key in as_they_are},
             "signals": signals,
             "measures": [

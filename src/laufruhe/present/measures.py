@@ -23,7 +23,7 @@ from laufruhe.problem.evaluation import Evaluation, channel_samples
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import FEASIBLE, limit_values
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL, limit_values
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.values import LimitValue
@@ -107,9 +107,9 @@ def breaks_a_limit(problem: Problem, evaluation: Evaluation) -> bool:
 
 
 def is_met(limit: LimitValue) -> bool:
-    """Return True if the design keeps a limit, within solver rounding."""
+    """Return True if the design keeps a limit within the tolerance of feasible designs."""
     sign = 1.0 if limit.side == "at most" else -1.0
-    return sign * (limit.value - limit.limit) <= FEASIBLE * (abs(limit.limit) or 1.0)
+    return sign * (limit.value - limit.limit) <= FEASIBILITY_TOL * (abs(limit.limit) or 1.0)
 
 
 def has_mounts(result: Result) -> bool:

@@ -182,12 +182,12 @@ def test_words_of_what_is_simpler() -> None:
     [
         (1.1, "at most", True),
         (1.0, "at most", False),
-        (1.0 + 5e-6, "at most", True),
-        (1.0 + 5e-7, "at most", False),
+        (1.0 + 2e-5, "at most", True),
+        (1.0 + 9e-6, "at most", False),
         (0.9, "at least", True),
         (1.0, "at least", False),
-        (1.0 - 5e-6, "at least", True),
-        (1.0 - 5e-7, "at least", False),
+        (1.0 - 2e-5, "at least", True),
+        (1.0 - 9e-6, "at least", False),
     ],
 )
 def test_page_and_report_call_the_same_limits_broken(value: float, side: str, broken: bool) -> None:

@@ -1,7 +1,7 @@
 // Evaluation of a design: measures, limits, and comparison with the optimum.
 
-// relative tolerance of limits, and relative difference below which objectives count as equal
-const KEPT = 1e-5, AT = 5e-5;
+// relative difference below which objectives count as equal
+const AT = 5e-5;
 
 /** A model with its numbers. */
 async function opened(model) {
@@ -16,12 +16,12 @@ function measured(model, x) {
   });
 }
 
-/** The tighter side of a limit, and whether it is kept; null if unknown. */
-function standing(measure, value, isKnown) {
+/** The tighter side of a limit, and whether it is kept within a relative tolerance; null if unknown. */
+function standing(measure, value, isKnown, tolerance) {
   const { sides } = measure;
   const room = ([sense, edge]) => (sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1);
   const side = sides.reduce((a, b) => (a && room(a) <= room(b) ? a : b), null);
-  return { value, met: isKnown ? !side || room(side) >= -KEPT : null, side };
+  return { value, met: isKnown ? !side || room(side) >= -tolerance : null, side };
 }
 
 /** Measures of a role. */
@@ -45,7 +45,8 @@ function judgedAt(model, x, told = null) {
   return {
     x,
     objective: isKnown ? terms.reduce((sum, measure) => sum + measure.weight * value(measure), 0) : told?.objective ?? null,
-    limits: ofRole(model, "limit").map((measure) => standing(measure, known(measure), measure.followed || told !== null)),
+    limits: ofRole(model, "limit").map((measure) =>
+      standing(measure, known(measure), measure.followed || told !== null, model.tolerance)),
     ranks: ofRole(model, "rank").map((measure) => ({ measure, value: measure.followed ? value(measure) : null })),
   };
 }
