@@ -117,7 +117,7 @@ def test_from_a_file(tmp_path: Path) -> None:
         load(written(tmp_path, text + "gas = false\n"))
     with pytest.raises(InputError, match=r"fidelity\.gas_orders"):
         load(written(tmp_path, text.replace("gas_orders = 12", "gas_orders = 0")))
-    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*is chosen by kinematics"):
+    with pytest.raises(InputError, match=r"fidelity\.gas_orders.*is chosen automatically if kinematics"):
         load(written(tmp_path, text + 'kinematics = "auto"\n'))
     with pytest.raises(InputError, match=r"fidelity\.gas_orders.*add \[gas\]"):
         load(written(tmp_path, scenes.SHAKING_ONLY + "\n[fidelity]\ngas_orders = 3\n"))

@@ -82,7 +82,7 @@ REFUSED = {
     "speed for frequency": (MOUNTS, BLOCK, SAG.replace("40/3 Hz", "400 rpm"), "'rpm' is no frequency in Hz"),
     "unknown key": (MOUNTS.replace("loss_factor", "loss_facto"), BLOCK, SAG, "did you mean 'loss_factor'"),
     "unknown leader": (MOUNTS.replace('mirror_of = "rear left"', 'mirror_of = "rear lef"'), BLOCK, SAG,
-                       "is no mount defined before this one; did you mean 'rear left'"),
+                       "is not the name of a mount that stands before this one in the file; did you mean 'rear left'"),
     "follows already": (MOUNTS.replace('mirror_of = "rear left"', 'mirror_of = "rear left"\nloss_factor = 0.2'), BLOCK,
                         SAG, "already follows from mount 'rear left'"),
     "impossible inertia": (MOUNTS, BLOCK.replace("27 kg", "270 kg"), SAG, "block: .*belong to no body"),

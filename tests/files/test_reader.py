@@ -248,7 +248,7 @@ BAD = [
     bad("weights of a moment", '"mean mount force"', "\"mean roll moment\"\ndirection_weights = [1, 1, 0]",
         "objective.direction_weights: is for forces and travels at places, not for a roll moment; leave it out"),
     bad("gas without bore", "bore = \"100 mm\"\n", "",
-        "engine.bore: is missing, and gas acts on it; add it"),
+        "engine.bore: is missing, but gas pressure acts on the piston; add it"),
     bad("unknown gas model", '"seiliger"', '"seliger"',
         """gas.model = "seliger": is not allowed; did you mean 'seiliger'?"""),
     bad("no gas model", "model = \"seiliger\"\n", "",

@@ -148,7 +148,7 @@ def test_no_star_of_the_eighteen_has_less_couple() -> None:
     [
         ("cylinders = 3", "cylinders = 4", "engine.cylinders = 4: is no multiple of the 3 banks"),
         ('"two-stroke"', '"four-stroke"', "engine.cycle = four-stroke: has ports in a triangle of cranks"),
-        ("reversed_crank = 1", "reversed_crank = 4", "is no crank of a triangle; give 1, 2 or 3"),
+        ("reversed_crank = 1", "reversed_crank = 4", "is not one of the three cranks of the triangle; give 1, 2 or 3"),
         ("reversed_crank = 1", "crank_leads = [20]", "engine.crank_leads: has 1 angles"),
         ('crank_distance = "1.1 m"', "", "engine.crank_distance: is missing"),
         ('"1.1 m"', '"0.8 m"', "because their pins meet"),

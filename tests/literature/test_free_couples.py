@@ -280,5 +280,5 @@ def test_what_turns_against_the_crank() -> None:
 def test_cylinders_that_differ_have_no_unit() -> None:
     engine = load(PROBLEMS / "tractor-two.toml").engine
     heavy = replace(engine.slider_cranks[0], reciprocating_mass=2.0)
-    with pytest.raises(ModelError, match="have no unit"):
+    with pytest.raises(ModelError, match="have no common unit"):
         free_load(replace(engine, slider_cranks=(heavy, engine.slider_cranks[1])), 1, SPACING)

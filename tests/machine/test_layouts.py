@@ -278,5 +278,5 @@ class TestBuild:
         assert throw_rotors([Throw(0.0, 0.0, (0,))]) == ()
 
     def test_throws_must_be_as_many_as_the_layout_has(self) -> None:
-        with pytest.raises(ModelError, match=r"3 throws given where the layout has 4"):
+        with pytest.raises(ModelError, match=r"3 throws given, but the layout has 4"):
             build(FOUR, inline(4, 0.1), MECHANISM, (0.0, 1.0, 2.0))

@@ -105,7 +105,7 @@ def test_balancing_that_cannot_change_the_objective_is_refused(tmp_path: Path, k
 
 
 def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="the rules of equal power do not cover a block and its springs"):
+    with pytest.raises(InputError, match="equal_power_to cannot scale a block"):
         computed(study(tmp_path, "layout comparison", in_case="equal_power_to = 2"))
 
 

@@ -188,9 +188,12 @@ JOINED = '[[mounts.places]]\nname = "pad"\njoined_to = "front left"\nstiffness =
 @pytest.mark.parametrize(
     ("more", "told"),
     [
-        (JOINED.replace('"front left"', '"pad"'), 'joined_to = "pad": is no mount defined before'),
-        (JOINED + 'position = ["0 mm", "0 mm", "0 mm"]', "is already given by mount 'front left'"),
-        (JOINED + JOINED.replace('"pad"', '"shim"').replace('"front left"', '"pad"'), "joined to another mount itself"),
+        (JOINED.replace('"front left"', '"pad"'), 'joined_to = "pad": is not the name of a mount'),
+        (JOINED + 'position = ["0 mm", "0 mm", "0 mm"]', "already follows from mount 'front left'"),
+        (
+            JOINED + JOINED.replace('"pad"', '"shim"').replace('"front left"', '"pad"'),
+            "is itself joined to another mount",
+        ),
         (JOINED + 'damping_per_stiffness = "-1 ms"', "damping_per_stiffness"),
         (JOINED + "damping_per_stiffness = 0.001", "has no unit"),
     ],

@@ -156,7 +156,7 @@ def test_limits_are_kept_by_what_is_searched() -> None:
         ("[objective]", '[[balancer_shafts]]\nname = "s"\nratio = { between = [1, 2] }\nposition = ["0 m", "0 m"]\n'
          '[[balancer_shafts.unbalances]]\nx = "0 m"\nunbalance = "0 kg m"\n[objective]', "it is a gear ratio"),
         ('name = "rated"\nspeed = "3000 rpm"', 'speed = { between = ["2000 rpm", "3000 rpm"] }',
-         "give each operating point a name"),
+         "list the operating points one by one"),
         ('speed = "3000 rpm"', 'speed = "3000 rpm"\ngas = false\n[gas]\nmodel = "seiliger"\nimep = "8 bar"\n'
          'peak_pressure = { between = ["60 bar", "80 bar"] }', "is open but has no effect in this engine"),
         ('["80 mm", "100 mm"], start = "90 mm"', '["0 mm", "100 mm"]', "must be more than 0 m"),

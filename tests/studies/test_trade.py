@@ -128,7 +128,7 @@ def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pyt
 
     def out_of_time(problem: Problem, *_: object) -> Trade:
         if problem.name == never.stem:
-            raise SolverError("the time limit is over before any fidelity was measured; raise it")
+            raise SolverError("the time limit ended before any fidelity was measured; raise the time limit")
         return trade(problem)
 
     monkeypatch.setattr("laufruhe.cli.fidelity.trade", out_of_time)

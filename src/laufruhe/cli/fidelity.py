@@ -35,7 +35,7 @@ Pages = dict[str, bytes]
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
-    """Return the text on the fidelity that a problem needs, and a function that makes JSON of it."""
+    """Return a text on the model fidelity that a problem needs, and a function that returns it as JSON."""
     problem = _with_objective(path)
     choice = choose(problem, tolerance) if problem.load_terms else needs(problem)
     answer = (problem, choice, tolerance, _times(problem, choice))
@@ -71,7 +71,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in open_kinds(problem)]
     if len(of_wheels) == len(read):
-        rule = "is open, and cheap models are not compared for an open flywheel"
+        rule = "is open, but fidelities are compared for a fixed flywheel only"
         raise refused("flywheel", "", rule, "fix the flywheel", of_wheels[0][0])
     paths, problems = zip(
         *((path, problem) for path, problem in read if Kind.FLYWHEEL not in open_kinds(problem)), strict=True

@@ -195,7 +195,7 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
         refuse_keys(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and kind.has_pistons and table.bore is None and None in bores:
-        raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
+        raise Refused("engine.bore", None, "is missing, but gas pressure acts on the piston", "add it")
     if kind.is_free:
         parts = _sharing_chambers(table, _free_parts(table), gas)
         return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
@@ -296,7 +296,7 @@ def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> t
     rod = None
     if table.rod is not None:
         if math.isinf(rod_length):
-            raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
+            raise Refused("engine.rod", None, "has no effect in a Scotch yoke (rod_ratio = 0)", "leave it out")
         with errors_at_key("engine.rod"):
             rod = rod_of("rod", table.rod.model_dump(), rod_length, "crank pin")
         if table.rod_inertia_deficit != 0.0:

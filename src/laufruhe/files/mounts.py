@@ -323,7 +323,7 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
 def _number_before(name: str, earlier: Sequence[str], where: str) -> int:
     if name not in earlier:
         remedy = nearest(name, earlier) if earlier else "define the other mount first"
-        raise Refused(where, name, "is no mount defined before this one", remedy)
+        raise Refused(where, name, "is not the name of a mount that stands before this one in the file", remedy)
     return earlier.index(name)
 
 

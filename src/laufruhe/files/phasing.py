@@ -222,7 +222,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     if kind.fires_evenly and phasing.continuous:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
         rule = f"allows uneven firing, and layout '{engine.layout}' fires evenly"
-        raise Refused(where, None, rule, 'write throws = "open", without intervals')
+        raise Refused(where, None, rule, 'write throws = "open", and remove phasing.intervals')
     for angle in ("bank_angle", "split_pin_angle"):
         if phasing.throws is not None and Open.from_value(engine.value_of(angle)).is_open:
             rule = "is open while throws are given, and needs open throws"

@@ -291,7 +291,7 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
         remedy = "give an operating point bmep or brake_torque, or leave [friction] out"
         raise Refused("friction", None, "is given, but no operating point uses it", remedy)
     if any(part.swept.piston.bore is None for part in cylinders):
-        raise Refused("engine.bore", None, "is missing, and a load at the brake needs the displacement", "add it")
+        raise Refused("engine.bore", None, "is missing, but a load at the brake needs the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 

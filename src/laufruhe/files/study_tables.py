@@ -196,7 +196,7 @@ def axis_of(sweep: SweepTable) -> SweepAxis:
     if sweep.values is None:
         values, key = _spaced(sweep), "points"
     elif any(value is not None for value in (*spaced, sweep.spacing)):
-        raise Refused("values", None, "are given beside from, to, points or spacing", "give one or the other")
+        raise Refused("values", None, "are given, but also from, to, points or spacing", "give one or the other")
     else:
         values, key = tuple(sweep.values), "values"
     if len(values) < 2:
@@ -255,7 +255,9 @@ def _span(quantity: str, first: Value, last: Value, spacing: str | None) -> Span
     if low >= high:
         raise Refused("from", first, "does not lie below to", "write the smaller end of the range first")
     if spacing == "log" and low <= 0.0:
-        raise Refused("from", first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
+        raise Refused(
+            "from", first, "is not above zero, so a logarithmic sweep cannot begin there", 'leave spacing = "log" out'
+        )
     is_text = isinstance(first, str) and (unit != "1" or _is_limit(quantity))
     return Span(quantity, unit, low, high, spacing == "log", is_text)
 
@@ -266,7 +268,7 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
     if len(missing) == len(ends):
         raise Refused("values", None, "is missing", "add values, or from, to and points")
     if sweep.first is None or sweep.last is None or sweep.points is None:
-        raise Refused(missing[0], None, "is missing", "a spaced sweep needs from, to and points")
+        raise Refused(missing[0], None, "is missing", "an equally spaced sweep needs the keys from, to and points")
     if sweep.points < 2:
         raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
     if sweep.points > MAX_POINTS:

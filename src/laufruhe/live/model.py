@@ -67,7 +67,7 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
 
 
 def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
-    """Return values of all decisions by name, from sizes and angles of a result; the start where missing."""
+    """Return values of all decisions by name, from the sizes and angles of a result; by default their start."""
     values: dict[str, Value] = {}
     for decision in problem.decisions:
         if decision.name not in numbers:

@@ -203,5 +203,5 @@ def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
         if abs(step) <= 1e-14:
             return angle
     if abs(slope(angle)[0]) > 1e-12 * abs(slope(angle)[1]):
-        raise ModelError(f"no dead centre is found near {math.degrees(start):g} deg; lengthen the rods")
+        raise ModelError(f"the piston has no dead centre near {math.degrees(start):g} deg; lengthen the rods")
     return angle

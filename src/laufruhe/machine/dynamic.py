@@ -52,7 +52,10 @@ class FluidTrack:
         return self.bulge * self.stiffness / (self.bulge + self.stiffness)
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Return the stiffness of the bulge in series with track and lower chamber at angular frequencies [rad/s]."""
+        """Return the complex stiffness that the fluid adds to a hydraulic mount [N/m], at angular frequencies [rad/s].
+
+        The fluid track and the lower chamber act in series with the bulge, the elastic wall of the upper chamber.
+        """
         behind = self.stiffness - self.mass * omegas**2 + 1j * self.damping * omegas
         total = self.bulge + behind
         # without damping the fluid resonates: the force of the mount has no size there

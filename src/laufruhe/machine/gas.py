@@ -171,7 +171,7 @@ class PressureTrace:
 
 
 def check_pressures(gas: object, *names: str) -> None:
-    """Raise `ModelError` if one of the named pressures of a gas is not positive and finite."""
+    """Raise `ModelError` if one of the pressures `names` of a gas model is not positive and finite."""
     for name in names:
         pressure = getattr(gas, name)
         if not 0.0 < pressure < math.inf:

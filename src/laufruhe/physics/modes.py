@@ -60,7 +60,7 @@ class Modes:
 
 
 def modes_of(mass: Array, stiffness: Array, loss: Array | None = None) -> Modes:
-    """Return the modes of M and K, shapes (6, 6) (E6, E7).
+    """Return the natural modes of a block with mass matrix M and stiffness matrix K, shape (6, 6) each (E6, E7).
 
     Solved in coordinates in which the mass is one, so that a block with hardly any
     inertia about one axis costs no digits of the others.

@@ -82,7 +82,7 @@ class AxisResidual:
         return answer - self.nearest(answer) * self.mass
 
     def under(self, z: Array) -> tuple[Array, float]:
-        """Return y, |y| <= 1, and c such that y' left A right - c never exceeds the residual (E19, E46)."""
+        """Return a linear lower bound of the residual: y, |y| <= 1, and c (E19, E46)."""
         y = z / max(float(np.linalg.norm(z)), 1.0)
         along = float(y @ self.mass)
         if self.maximum == np.inf and along > 0.0:

@@ -42,7 +42,7 @@ def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed
 
 
 def mount_maps(mounting: Mounting, order: float, speed: float) -> ComplexArray:
-    """Return the mount forces per wrench at one order and speed, shape (mounts, 3, 6)."""
+    """Return the matrices from a wrench on the engine to its mount forces, at one order and speed, (mounts, 3, 6)."""
     if isinstance(mounting, RigidMounting):
         return mounting.maps.astype(complex)
     if not isinstance(mounting, ElasticMounting):

@@ -23,7 +23,7 @@ def point_motion(lib: Maths, arm: Sequence[Any]) -> Any:
 
 
 def moved_wrench(lib: Maths, place: Sequence[Any]) -> Any:
-    """Return the map of a wrench from the origin to a place, M - place x F, shape (6, 6) (E1)."""
+    """Return the matrix that moves the reference of a wrench from the origin to `place`, shape (6, 6) (E1)."""
     x, y, z = place
     return lib.matrix(
         [
@@ -38,7 +38,7 @@ def moved_wrench(lib: Maths, place: Sequence[Any]) -> Any:
 
 
 def turned_axes(lib: Maths, angles: Sequence[Any]) -> Any:
-    """Return the axes of C2 turned about x, then y, then z, as rows, shape (3, 3) (E2)."""
+    """Return the axes of a turned mount as rows, shape (3, 3): those of C2 turned about x, then y, then z (E2)."""
     (cx, sx), (cy, sy), (cz, sz) = ((lib.cos(a), lib.sin(a)) for a in angles)
     return lib.matrix(
         [

@@ -31,7 +31,7 @@ _Parts: TypeAlias = tuple[complex, ...]
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Return the wrench (Fx, Fy, Fz, Mx, My, Mz) on the block from everything that moves, shape (n, 6) [N, N m] (C7).
+    """Return the wrench (Fx, Fy, Fz, Mx, My, Mz) on the block from gas and moving masses, (n, 6) [N, N m] (C7).
 
     It is about the origin of C2.
 

@@ -20,7 +20,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:
-    """Return the wrench per squared crank speed [N s2, N m s2], and that of the gas [N, N m] or None."""
+    """Return the inertia wrench per squared crank speed [N s2, N m s2], and the gas wrench [N, N m] or None."""
     inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
     gas = fidelity.gas_of(point)
     if gas is None:

@@ -17,7 +17,7 @@ from laufruhe.physics.rigid_body import ROLL, plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
-    """Return (coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
+    """Return the wrench of all cylinders: coefficients of one times phase and weight of each, shape (n, 6) (L6)."""
     cycle = engine.cycle
     alike: dict[Hashable, list[tuple[int, Effect]]] = defaultdict(list)
     for k, part in enumerate(engine.slider_cranks):

@@ -69,7 +69,7 @@ class TimeModel:
         return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
-        """Return the forces on the mounts, shape (times, mounts, 3), of y and y' (n, times)."""
+        """Return the mount forces over time, shape (times, mounts, 3), from motion y and its rate, (n, times) each."""
         out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
         if self.has_stops:
             forces = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
@@ -77,7 +77,7 @@ class TimeModel:
         return out
 
     def mount_travels(self, y: Array) -> Array:
-        """Return the deflection of the mounts in the axes of C2, shape (times, mounts, 3), of y (n, times)."""
+        """Return the mount deflections over time in the axes of C2, (times, mounts, 3), from motion y (n, times)."""
         first = np.unique(self.places, return_index=True)[1]
         travels = self.travels.reshape(len(self.turns), 3, -1)[first]
         travels_in_c2 = np.einsum("mab,maj->mbj", self.turns[first], travels).reshape(-1, self.size)

@@ -167,7 +167,7 @@ def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Arr
 
 
 def moving_inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
-    """Return the inertia of pistons and rods reduced to the crank, and its derivative by the angle (F3)."""
+    """Return the inertia of pistons and rods, reduced to the crank [kg m2], and its derivative by crank angle (F3)."""
     total, slope = np.zeros(len(phi)), np.zeros(len(phi))
     for part in engine.slider_cranks:
         ratio, (inertia, steep) = part.shaft.ratio, reduced(part.motion(np, _alpha(part, phi)), fidelity.rod == "rigid")

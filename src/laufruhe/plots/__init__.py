@@ -40,7 +40,7 @@ def figure(result: Result, name: str) -> Figure:
     picture = import_module(PICTURES[name].module) if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
-        raise refused("name", f'"{name}"', "is no picture of this result", f"one of {known}", "figure")
+        raise refused("name", f'"{name}"', "is not the name of a picture of this result", f"one of {known}", "figure")
     prepare(_words(result))
     drawn: Figure = picture.figure(result)
     return drawn
@@ -81,7 +81,7 @@ def get_ready() -> None:
 
 
 def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
-    """Write all pictures as `draw_and_show` does, in several processes."""
+    """Draw all pictures of a result into files, divided among several processes; return them as SVG by name."""
     # find fonts once, for all processes
     prepare(_words(result))
     picture_names, (read_end, write_end) = names(result), os.pipe()

@@ -80,7 +80,7 @@ def _attainable(limit: AttainableLimit, lead: str) -> str:
         text = f"{best}{none}"
     else:
         text = f"{best}, a local optimum{none if limit.bound > 0.0 else ' without a proof'}"
-    ended = " Its search ended at the time limit; raise it." if limit.ended else ""
+    ended = " Its search ended at the time limit; raise the time limit." if limit.ended else ""
     text = f"{lead}{text}; {required}{ended}"
     return text[:1].upper() + text[1:]
 

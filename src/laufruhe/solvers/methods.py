@@ -285,7 +285,7 @@ def _at_time_limit(problem: Problem, result: Result | None) -> Result:
                 proof = ProofData(0.0, ProofStrength.RELAXED, math.inf, f"the initial design; {TIME_LIMIT_NOTE}")
                 return build_result(initial, initial.evaluation, proof, {})
     if result is None:
-        raise SolverError("no design was found within the time limit; raise it")
+        raise SolverError("no design was found within the time limit; raise the time limit")
     if result.status is Status.FAILED:
         return replace(result, message=f"{result.message}; {TIME_LIMIT_NOTE}")
     certificate = result.certificate

@@ -72,7 +72,7 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
     """
     tables, path = tables_and_path(source)
     if "study" not in tables:
-        raise refused("study", "", "is missing, so this is no study file", "use laufruhe solve for a problem", path)
+        raise refused("study", "", "is missing, so this is not a study file", "use laufruhe solve for a problem", path)
     try:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
@@ -85,7 +85,7 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
             raise refused(f"{where}.name", part.name, "is given twice", "give each part its own name", path)
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
-            raise refused(f"{where}.cases", "", "has two cases of one name", "give each its own", path)
+            raise refused(f"{where}.cases", "", "has two cases with the same name", "give each its own", path)
         for key, read in part.swept_or_drawn():
             try:
                 read()

@@ -64,7 +64,7 @@ class ProblemFiles:
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
             if name not in tables:
-                rule = "is left out by the study but does not exist"
+                rule = "is listed under without, but the problem does not have it"
                 raise self.refused(case, name, rule, nearest(name, list(tables)))
             del tables[name]
         with self.named(case):
@@ -80,7 +80,7 @@ class ProblemFiles:
         if path not in self._files:
             if not path.exists():
                 advice = nearest_file(path, "paths begin in the folder of the study")
-                raise refused("file", "", "is named by the study and does not exist", advice, path)
+                raise refused("file", "", "is named by the study, but does not exist", advice, path)
             self._files[path] = tables_of(path)
             if "study" in self._files[path]:
                 raise refused("study", "", "makes this a study file", "a case of a study names a problem", path)

@@ -123,7 +123,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     The first of several objectives counts.
     """
     if not problem.objective:
-        raise ModelError("a trade needs an objective; add [objective]")
+        raise ModelError("the comparison of fidelities needs an objective; add [objective]")
     left_out = [f"The trade takes the drawing, without {extra.words}." for extra in problem.extras]
     if len(problem.ranks) > 1:
         left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
@@ -145,7 +145,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     else:
         is_complete = True
     if not rows:
-        raise SolverError("the time limit is over before any fidelity was measured; raise it")
+        raise SolverError("the time limit ended before any fidelity was measured; raise the time limit")
     say("uneven crank speed")
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None

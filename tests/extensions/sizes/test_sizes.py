@@ -293,7 +293,7 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
          "running_gear.bolts.diameter is open, but no objective or limit depends on this size"),
         (changed(TEXT, '["25 mm", "60 mm"]', '["0 mm", "60 mm"]'), "must be more than 0 m"),
         (changed(TEXT, '"0.14 m"', '{ between = ["30 mm", "200 mm"], start = "140 mm" }'),
-         "does not let the crank turn"),
+         "leaves a rod too short for the crank to turn"),
     ],
 )  # fmt: skip
 def test_what_is_not_decided_is_refused_in_a_line(text: str, rule: str, tmp_path: Path) -> None:

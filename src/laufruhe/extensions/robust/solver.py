@@ -342,5 +342,5 @@ def _minimise_share(
             break
         best, values = candidate, candidate.values
     if best is None:
-        raise ModelError("no design was found within the time limit; raise it")
+        raise ModelError("no design was found within the time limit; raise the time limit")
     return replace(best, worst=_at_share(best.worst, adversary, best.values, share), samples=adversary.samples)

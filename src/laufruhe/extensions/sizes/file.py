@@ -175,7 +175,9 @@ def _decisions(
             raise Refused("engine.rod_length", None, rule, "fix it, or use a layout")
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
             length = units.quantity_text(shortest, "m")
-            raise Refused("engine.rod_length", length, "does not let the crank turn", "raise its lower bound")
+            raise Refused(
+                "engine.rod_length", length, "leaves a rod too short for the crank to turn", "raise its lower bound"
+            )
     return decisions
 
 

@@ -272,7 +272,7 @@ def moving_gear(engine: Engine) -> MovingGear:
 
 
 def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
-    """Return the engine with other sizes [m], and with the masses that follow."""
+    """Return the engine with other sizes of its running gear [m], and with the masses that follow from them."""
     new_parts = moving_gear(engine).resized(sizes)
     resized_engine = replace(
         engine, slider_cranks=new_parts.parts, rotors=new_parts.rotors, bearings=new_parts.bearings

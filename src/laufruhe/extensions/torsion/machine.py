@@ -84,7 +84,9 @@ class ShaftSection:
         if self.damping < 0.0 or self.loss_factor < 0.0:
             raise ModelError(f"shaft '{self.name}' has a negative damping; give zero or more")
         if self.diameter is not None and not 0.0 <= self.bore < self.diameter:
-            raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
+            raise ModelError(
+                f"shaft '{self.name}' has a bore of {self.bore:g} m, but a diameter of {self.diameter:g} m; reduce it"
+            )
 
     def moved(self, stiffness: float, diameter: float | None) -> ShaftSection:
         """Return the shaft section with another stiffness, or with another diameter and its stiffness."""

@@ -101,5 +101,5 @@ class ScotchYoke(DriveKind):
     def radius(self, sizes: Sizes) -> float:
         """Return half the stroke."""
         if sizes.offset:
-            raise KeyedError("offset", "means nothing in a Scotch yoke; leave it out")
+            raise KeyedError("offset", "has no effect in a Scotch yoke; remove this key")
         return super().radius(sizes)

@@ -161,7 +161,7 @@ def build(
     Without a firing order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone.
     """
     if len(angles) != len(layout.throw_positions):
-        raise ModelError(f"{counted(len(angles), 'throw')} given where the layout has {len(layout.throw_positions)}")
+        raise ModelError(f"{counted(len(angles), 'throw')} given, but the layout has {len(layout.throw_positions)}")
     cylinders = range(len(layout.positions))
     fires = (
         firing_angles(cycle, layout, angles, firing_order)

@@ -101,7 +101,9 @@ class Delta(LayoutKind):
             raise KeyedError("cycle", rule, str(inputs.cycle))
         reversed_one = inputs.options["reversed_crank"] or 0
         if reversed_one > 3:
-            raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))
+            raise KeyedError(
+                "reversed_crank", "is not one of the three cranks of the triangle; give 1, 2 or 3", str(reversed_one)
+            )
         ratios = _RATIOS[reversed_one]
         leads = inputs.options["crank_leads"]
         if leads is not None and len(leads) != 2:

@@ -26,7 +26,7 @@ applies = has_mount_forces
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw a group of bars per mount and one for all mounts; a row per operating point, and for many mounts."""
+    """Draw mean and maximum mount force as bars: a group for each mount, one for all, a row per operating point."""
     several = range(len(result.problem.points))
     points = list(several) if len(several) <= MAX_POINTS else [hardest_point(result)]
     names = [*result.initial.mount_names, "all mounts"]

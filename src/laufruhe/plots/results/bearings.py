@@ -38,7 +38,7 @@ applies = has_bearings
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw a column per bearing, to one scale: above the force on the block, below on the crankshaft."""
+    """Draw main bearing forces over a cycle, a column per bearing: on the block above, on the crankshaft below."""
     first = evaluations_with_loads(result)[0]
     # the operating point with the largest force on a bearing
     k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))

@@ -26,7 +26,7 @@ applies = is_elastic
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw orders and natural frequencies; critical speeds are their intersections."""
+    """Draw frequencies of orders over crank speed, and natural frequencies: critical speeds are their intersections."""
     facts, top = facts_of(result.final), highest_speed(result)
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]

@@ -64,7 +64,7 @@ class Row:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw a column per operating point; rows for shaking force, roll moment, rocking couple and every mount."""
+    """Draw the loads over the crank angle: a column per operating point, a row per load and mount."""
     points, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
     width = {1: ALONE, 2: PAIRED}.get(len(points), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)

@@ -20,7 +20,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw end and side view at a crank angle of zero."""
+    """Draw the engine to scale from the front and from the side, at a crank angle of zero."""
     view = EngineView.from_result(result)
     drawn = views(view)
     draw_views(drawn, view)

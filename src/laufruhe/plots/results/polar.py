@@ -64,7 +64,7 @@ class Frame:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw one panel per mount, to one scale; forces of one direction over the crank angle."""
+    """Draw the path of the force vector on each mount over a cycle, one panel per mount, to one scale."""
     k, series = hardest_point(result), series_of(result, loads=True)
     paths, steady = _moving([_closed(channel_samples(item.design, k)) for item in series])
     mounts = result.problem.engine.mounts[:MAX_PANELS]

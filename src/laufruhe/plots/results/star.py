@@ -25,7 +25,7 @@ applies = has_ranking
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the best stars: end view from the front, side view with every throw at its height."""
+    """Draw the best crank stars: end view from the front, and side view with every throw at its height."""
     phasing = ranking_of(result)
     stars = phasing.ranking[:MAX_STARS]
     unit, scale = (result.objective.unit, result.objective.initial) if result.objective else ("", 0.0)

@@ -36,7 +36,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw torque part by part, its work about the mean, the crank speed, and its orders."""
+    """Draw the crank torque of gas, pistons and rods, its work about the mean, its orders, and the crank speed."""
     engine, fidelity = result.final.engine, result.problem.fidelity
     facts = [torque_facts(engine, point, fidelity) for point in result.problem.points]
     points = result.problem.points

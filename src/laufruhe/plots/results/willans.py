@@ -24,7 +24,7 @@ def applies(result: Result) -> bool:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw a panel per operating point."""
+    """Draw the friction measurements: fuel over load with the Willans line, or drag over speed, per operating point."""
     tests = result.problem.friction[:MAX_LINES]
     drawn = page(len(tests), 1, (6.4, 2.3), gap=0.75)
     for axes, test in zip(drawn.panels, tests, strict=True):

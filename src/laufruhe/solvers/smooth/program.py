@@ -263,7 +263,9 @@ class SmoothProgram:
         if not pairs:
             orders = sorted({float(order) for point in self._points for order in point.force.orders if order > 0.0})
             names = ", ".join(f"{order:g}" for order in orders[:MAX_NAMED]) or "none"
-            raise ModelError(f"{quantity.name} is zero for every design; name an order that it has: {names}")
+            raise ModelError(
+                f"{quantity.name} is zero for every design; name an order at which it is not zero: {names}"
+            )
         ratios = [ca.sqrt(force / rigid) for force, rigid in pairs]
         largest = self._constraints.named(quantity.name).head(ca.mmax(ca.vertcat(*ratios)))
         for force, rigid in pairs:

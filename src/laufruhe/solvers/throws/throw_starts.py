@@ -103,7 +103,7 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
 
 
 def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
-    """Return firing patterns, most even first, and True if the list is complete."""
+    """Return patterns of firing angles within the bounds of intervals, most even first, and True if complete."""
     layout = phasing.layout(*phasing.minimum_geometry)
     first = [k for k, pin in enumerate(layout.pins) if pin == 0]
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
