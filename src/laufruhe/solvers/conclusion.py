@@ -301,7 +301,7 @@ def conflict_message(conflict: Sequence[str]) -> str:
 
 
 def smallest_conflicting(conflicting: Iterable[T], conflicts: Callable[[Sequence[T]], bool]) -> list[T]:
-    """Return a smallest set of limits that contradict each other: without any one of them, `conflicts` is False."""
+    """Return a minimal subset that still conflicts: without any one of its elements, `conflicts` is False."""
     subset = list(conflicting)
     for element in tuple(subset):
         reduced = [other for other in subset if other is not element]

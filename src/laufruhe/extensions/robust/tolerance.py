@@ -296,7 +296,7 @@ class Robust(Extra):
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
-        """Return the name of the objective for reports, with the engines that it counts, such as "worst case of"."""
+        """Return the name of the objective for reports, with the engines that it counts: `NAME, worst case`."""
         share, engines = self.population.share, self.population.engines
         if share is not None:
             return f"{name}, {100.0 * share:g} % of engines below"
@@ -304,7 +304,7 @@ class Robust(Extra):
 
 
 def robust_of(problem: Problem) -> Robust:
-    """Return the tolerances of a problem, and the engines that its objective covers."""
+    """Return the tolerances of a problem, and which engines its objective counts."""
     robust = problem.extra(Robust)
     assert robust is not None
     return robust

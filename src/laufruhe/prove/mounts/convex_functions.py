@@ -105,7 +105,7 @@ class Eigenvalue:
         return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return a linear lower bound of the eigenvalue function: sign <V, A(x)>, as value and gradient.
+        """Return a linear lower bound of the eigenvalue function: sign <V, A(x)>, as constant and gradient.
 
         The matrix V comes from the solver's `dual` matrix, or else from the eigenvector at x.
         """
@@ -133,7 +133,7 @@ class Residual:
         return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Return a linear lower bound of the residual's length, as value and gradient.
+        """Return a linear lower bound of the residual's length, as constant and gradient.
 
         Its direction is the solver's `dual` vector, or else the residual at x.
         """
