@@ -22,7 +22,7 @@ from laufruhe.physics.torque import swing_of
 
 def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:
     """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
-    return star_loads(engine, speed, lambda part: effects_of(part, EXACT)[1])
+    return star_loads(engine.cycle, engine.slider_cranks, speed, lambda part: effects_of(part, EXACT)[1])
 
 
 def rotating_loads(engine: Engine, speed: float) -> Spectrum:

@@ -18,7 +18,10 @@ def sin_psi(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> An
 
 def cos_psi(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
     """Return the cosine of the rod's angle, as the root of (1 - sin psi)(1 + sin psi) to keep digits (K1)."""
-    sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
+    return _cosine(lib, sin_psi(lib, alpha, rod_ratio, offset_ratio))
+
+
+def _cosine(lib: Any, sine: Any) -> Any:
     return lib.sqrt((1.0 - sine) * (1.0 + sine))
 
 
@@ -29,10 +32,11 @@ def rod_rate(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> A
 
 def rod_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
     """Return the acceleration of the rod's angle, psi'' = (psi'^2 sin psi - lambda sin alpha) / cos psi (K3)."""
-    sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
-    cosine = cos_psi(lib, alpha, rod_ratio, offset_ratio)
+    height = rod_ratio * lib.sin(alpha)
+    sine = height - offset_ratio
+    cosine = _cosine(lib, sine)
     rate = rod_ratio * lib.cos(alpha) / cosine
-    return (rate * rate * sine - rod_ratio * lib.sin(alpha)) / cosine
+    return (rate * rate * sine - height) / cosine
 
 
 def travel(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
@@ -45,18 +49,19 @@ def travel(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any
     sine = lib.sin(alpha)
     start = lib.sqrt((1.0 - offset_ratio) * (1.0 + offset_ratio))
     rod_part = sine * (rod_ratio * sine - 2.0 * offset_ratio)
-    return 2.0 * half * half + rod_part / (start + cos_psi(lib, alpha, rod_ratio, offset_ratio))
+    return 2.0 * half * half + rod_part / (start + _cosine(lib, rod_ratio * sine - offset_ratio))
 
 
 def piston_velocity(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
     """Return the piston velocity s' / r = -sin alpha - cos alpha tan psi, positive away from the crank (K5)."""
-    tangent = sin_psi(lib, alpha, rod_ratio, offset_ratio) / cos_psi(lib, alpha, rod_ratio, offset_ratio)
-    return -lib.sin(alpha) - lib.cos(alpha) * tangent
+    height = lib.sin(alpha)
+    sine = rod_ratio * height - offset_ratio
+    return -height - lib.cos(alpha) * (sine / _cosine(lib, sine))
 
 
 def piston_acceleration(lib: Any, alpha: Any, rod_ratio: Any, offset_ratio: Any = 0.0) -> Any:
     """Return the piston acceleration s'' / r = -cos alpha + sin alpha tan psi - lambda cos^2 alpha / cos^3 psi (K6)."""
-    sine = sin_psi(lib, alpha, rod_ratio, offset_ratio)
-    cosine = cos_psi(lib, alpha, rod_ratio, offset_ratio)
-    turning = lib.cos(alpha)
-    return -turning + lib.sin(alpha) * sine / cosine - rod_ratio * turning * turning / (cosine * cosine * cosine)
+    height, turning = lib.sin(alpha), lib.cos(alpha)
+    sine = rod_ratio * height - offset_ratio
+    cosine = _cosine(lib, sine)
+    return -turning + height * sine / cosine - rod_ratio * turning * turning / (cosine * cosine * cosine)

@@ -19,7 +19,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Indices
 
 DEGREES = 4
 """Number of functions whose jumps are computed: the value and its first three derivatives."""
@@ -30,10 +30,14 @@ _NODES = 6
 _PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
 # shortest interval, and the largest degree of a polynomial that it determines to enough digits
 _DEGREES_OF = ((0.01, _NODES - 1), (1e-3, 3), (1e-5, 2), (0.0, 1))
+_SHORTEST = np.array([minimum for minimum, _ in _DEGREES_OF])
 _FACTORIALS = np.array([float(math.factorial(m)) for m in range(DEGREES)])
 _CANCELLED = 1e-12
 _MET = 1e-7
 _STEPS = 360
+_QUARTERS = np.array([-1j, -1.0, 1j, 1.0])
+"""Powers 1, 2, 3 and 4 of 1 / i."""
+_RUN = 32
 _BLOCK = 1 << 16
 
 
@@ -70,7 +74,9 @@ class SignalKinks:
         values = np.empty((len(angles), weights.shape[2]))
         step = max(_BLOCK // k, 1)
         for start in range(0, len(angles), step):
-            x = np.mod((angles[start : start + step, None] - self.angles) / period, 1.0) - 0.5
+            x = (angles[start : start + step, None] - self.angles) / period
+            x -= np.floor(x)
+            x -= 0.5
             piece, power = weights[0].sum(axis=0), np.ones_like(x)
             for factors in weights[1:]:
                 power *= x
@@ -95,15 +101,13 @@ class SignalKinks:
         b is the base order `base`; the coefficient of order 0 is zero.
         """
         k, degrees = self.jumps.shape[:2]
-        flat, orders = self.jumps.reshape(k, degrees, -1), np.arange(count) * base
-        waves = np.exp(-1j * np.outer(orders, self.angles))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(1, 1 + degrees)
-        shares[:1] = 0.0
-        weighted = (waves @ flat.reshape(k, -1)).reshape(count, degrees, -1)
-        total, size = (shares[:, None] @ weighted)[:, 0], np.abs(shares) @ np.abs(flat).sum(axis=0)
+        flat = self.jumps.reshape(k, degrees, -1)
+        size, shares = _shares(count, base, degrees)
+        weighted = (_waves(self.angles * base, count) @ flat.reshape(k, -1)).reshape(count, degrees, -1)
+        total = (shares[:, None] @ weighted)[:, 0]
+        largest = size @ np.abs(flat).sum(axis=0)
         # sums that a crank star cancels are exactly zero
-        return np.where(np.abs(total) > _CANCELLED * size, total, 0.0).reshape(count, *self.jumps.shape[2:])
+        return np.where(np.abs(total) > _CANCELLED * largest, total, 0.0).reshape(count, *self.jumps.shape[2:])
 
     def beyond(self, count: int, base: float) -> tuple[Array, Array]:
         """Return upper bounds of the orders from `count` x base on in the closed form, shape (...) each.
@@ -142,6 +146,11 @@ class SignalKinks:
         zeros = np.zeros((len(self.angles), degrees, *self.jumps.shape[2:]))
         return type(self)(self.angles + angle, np.concatenate([zeros, self.jumps], axis=1))
 
+    def repeated(self, delays: Sequence[float], period: float) -> SignalKinks | None:
+        """Return the kinks of the sum of the signal at these delays [rad], with the angles reduced to `period` [rad]."""
+        angles = np.add.outer(delays, self.angles).ravel()
+        return merge_kinks(_within(angles, period), np.concatenate([self.jumps] * len(delays)))
+
     @property
     def derivative(self) -> SignalKinks | None:
         """Kinks of the derivative of a continuous signal; None if it has no kinks."""
@@ -156,7 +165,7 @@ class SignalKinks:
         steps = math.radians(1.0) ** np.arange(self.jumps.shape[1])
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         selection = np.sort(np.argsort(-size, kind="stable")[:count])
-        return merge_kinks(self.angles[selection], self.jumps[selection])
+        return _left(self.angles[selection], self.jumps[selection])
 
 
 def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
@@ -176,10 +185,15 @@ def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
 
 def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
     """Return the kinks with those at equal angles added up; None if all jumps are zero."""
-    _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
-    total = np.zeros((len(first), *jumps.shape[1:]))
-    np.add.at(total, inverse, jumps)
-    return _left(angles[first], total)
+    first, order = _distinct(angles)
+    return _left(angles[order[first]], np.add.reduceat(jumps[order], first, axis=0)) if len(angles) else None
+
+
+def _distinct(angles: Array) -> tuple[Indices, Indices]:
+    # starts of equal angles in their order
+    steps = np.round(angles / SAME_ANGLE)
+    order = np.argsort(steps, kind="stable")
+    return np.flatnonzero(np.diff(steps[order], prepend=-math.inf)), order
 
 
 def _left(angles: Array, jumps: Array) -> SignalKinks | None:
@@ -189,46 +203,79 @@ def _left(angles: Array, jumps: Array) -> SignalKinks | None:
     return SignalKinks(angles[nonzero], jumps[nonzero]) if nonzero.any() else None
 
 
-def find_kinks(signal: Callable[[Array], Array], breaks: Array, period: float) -> SignalKinks | None:
-    """Return the kinks of a periodic function; None if no derivative jumps.
+@dataclass(frozen=True, eq=False)
+class KinkNodes:
+    """Angles near breaks, at which a signal has to be known for its kinks.
 
-    Derivatives on both sides of a break are those of polynomials through values near it. The parameters are those of
-    `laufruhe.numerics.spectrum.spectrum_with_kinks`, with the period [rad].
+    Derivatives on both sides of a break are those of polynomials through values near it.
+
+    Attributes
+    ----------
+    places
+        Angles where a derivative may jump, shape (k,) [rad], each within one period.
+    intervals
+        Signed length after and before each, over which a polynomial is fitted, shape (k, 2) [rad].
     """
+
+    places: Array
+    intervals: Array
+
+    @property
+    def angles(self) -> Array:
+        """Angles of the nodes, shape (n,) [rad]."""
+        return np.asarray((self.places[:, None, None] + self.intervals[:, :, None] * _PLACES).ravel())
+
+    def kinks(self, values: Array) -> SignalKinks | None:
+        """Return the kinks of a signal from its values at the nodes, shape (n, ...); None if no derivative jumps."""
+        if not len(self.places):
+            return None
+        flat = values.reshape(len(self.places), 2, _NODES, -1)
+        series = _fits()[np.searchsorted(-_SHORTEST, -np.abs(self.intervals))] @ flat
+        powers = _FACTORIALS / self.intervals[:, :, None] ** np.arange(DEGREES)
+        jumps = np.sum(series * (np.sign(self.intervals)[:, :, None] * powers)[..., None], axis=1)
+        # without a jump the polynomials of both sides meet to a rounding error
+        jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
+        return _left(self.places, jumps.reshape(*jumps.shape[:2], *values.shape[1:]))
+
+
+def kink_nodes(breaks: Array, period: float) -> KinkNodes:
+    """Return the nodes of a signal whose derivatives may jump at the angles `breaks`, shape (k,) [rad]."""
     places = _within(breaks, period)
-    places = places[np.unique(np.round(places / SAME_ANGLE), return_index=True)[1]]
-    if not len(places):
-        return None
+    first, order = _distinct(places)
+    places = places[order[first]]
     # an interval ends at the next kink
-    gaps = np.diff(places, append=places[0] + period)
-    intervals = np.minimum(np.stack([gaps, np.roll(gaps, 1)], axis=1), _WIDTH)
-    sides = np.array([1.0, -1.0])
-    angles = places[:, None, None] + (sides * intervals)[:, :, None] * _PLACES
-    values = np.asarray(signal(angles.ravel()))
-    values = values.reshape(len(places), 2, _NODES, *values.shape[1:])
-    derivatives = np.zeros((*intervals.shape, DEGREES, *values.shape[3:]))
-    longest = math.inf
-    for minimum, degree in _DEGREES_OF:
-        selection = (minimum <= intervals) & (intervals < longest)
-        longest, count = minimum, min(degree + 1, DEGREES)
-        series = np.tensordot(values[selection], _fit(degree)[:count], axes=(1, 1))
-        # shape (n, ..., degrees): divided by powers of the interval with the sign of its side
-        signed = (sides * intervals)[selection].reshape(-1, *(1,) * (series.ndim - 1))
-        series *= np.sign(signed) * _FACTORIALS[:count] / signed ** np.arange(count)
-        derivatives[selection, :count] = np.moveaxis(series, -1, 1)
-    jumps = derivatives[:, 0] + derivatives[:, 1]
-    # without a jump the polynomials of both sides meet to a rounding error
-    jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
-    return merge_kinks(places, jumps)
+    gaps = np.diff(places, append=places[:1] + period)
+    return KinkNodes(places, np.minimum(np.stack([gaps, np.roll(gaps, 1)], axis=1), _WIDTH) * [1.0, -1.0])
 
 
 def _within(angles: Array, period: float) -> Array:
     return np.asarray(np.mod(angles + 0.5 * SAME_ANGLE, period) - 0.5 * SAME_ANGLE)
 
 
-@lru_cache(maxsize=8)
-def _fit(degree: int) -> Array:
-    return np.asarray(np.linalg.pinv(np.vander(_PLACES, degree + 1, increasing=True)))
+@lru_cache(maxsize=16)
+def _shares(count: int, base: float, degrees: int) -> tuple[Array, NDArray[np.complex128]]:
+    # (b / pi) / (i j b)^(m + 1) for order j b and degree m, zero at order 0, with its absolute value
+    inverse = np.zeros(count)
+    inverse[1:] = 1.0 / (np.arange(1, count) * base)
+    size = np.asarray(base / math.pi * inverse[:, None] ** np.arange(1, 1 + degrees))
+    return size, size * _QUARTERS[np.arange(degrees) % 4]
+
+
+def _waves(angles: Array, count: int) -> NDArray[np.complex128]:
+    # e^{-i j angle} for j = 0 ... count - 1, as products of two exponentials, shape (count, angles)
+    low = np.exp(-1j * np.outer(np.arange(_RUN), angles))
+    high = np.exp(-1j * np.outer(np.arange(0, count, _RUN), angles))
+    return (high[:, None] * low).reshape(-1, len(angles))[:count]
+
+
+@lru_cache(maxsize=1)
+def _fits() -> Array:
+    # polynomials of each degree from values at the nodes, shape (classes, DEGREES, nodes)
+    fits = np.zeros((len(_DEGREES_OF), DEGREES, _NODES))
+    for k, (_, degree) in enumerate(_DEGREES_OF):
+        count = min(degree + 1, DEGREES)
+        fits[k, :count] = np.linalg.pinv(np.vander(_PLACES, degree + 1, increasing=True))[:count]
+    return fits
 
 
 @lru_cache(maxsize=64)

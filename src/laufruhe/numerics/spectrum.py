@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, lru_cache, reduce
+from functools import cached_property, lru_cache, partial, reduce
 from math import gcd, lcm
+from operator import add
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from laufruhe.numerics.exact_angles import Turn, phasors
-from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, find_kinks, join_kinks
+from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, join_kinks, kink_nodes
 
 MAX_SIGNAL_KINKS = 24
 """Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
@@ -135,6 +136,8 @@ class Spectrum:
         evaluated later than each step by `offset` [rad]. With `JUMP_OFFSET` all terms of a sum take the same side of a
         jump that lies on a step; with zero, rounding decides.
         """
+        if len(self.coefficients) > MAX_WAVES and self.step > 1 and samples % self.step == 0:
+            return _repeated(self.with_base(self.base * self.step).sample(samples // self.step, offset), self.step)
         if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + offset
             return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
@@ -143,6 +146,12 @@ class Spectrum:
             flat = self.coefficients.reshape(len(self.coefficients), -1)
             values = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
             return np.asarray(values.reshape(samples, *self.coefficients.shape[1:]))
+        used = self.components
+        if self.coefficients.ndim == 2 and not used.all():
+            values = np.zeros(self.coefficients.shape[:0:-1] + (samples,)).T
+            if used.any():
+                values[:, used] = Spectrum(self.base, self.coefficients[:, used]).sample(samples)
+            return values
         if len(self.coefficients) <= samples // 2 + 1:
             # no order is over half the number of samples, so none is folded
             half = np.asarray(0.5 * self.coefficients, dtype=complex)
@@ -197,6 +206,11 @@ class Spectrum:
         spread[::step] = self.coefficients
         kinks = None if self.kinks is None else join_kinks([self.kinks.shift(k * self.period) for k in range(step)])
         return Spectrum(base, spread, kinks)
+
+    @cached_property
+    def components(self) -> NDArray[np.bool_]:
+        """Mask of the components that have a nonzero coefficient, shape (...)."""
+        return np.asarray(self.coefficients.any(axis=0))
 
     @cached_property
     def step(self) -> int:
@@ -271,6 +285,13 @@ class Mapped(Spectrum):
         return self._resolved.kinks
 
     @property
+    def components(self) -> NDArray[np.bool_]:
+        """Mask of the components that the map makes of those of the source, shape (...)."""
+        used = self.source.components
+        units = np.eye(used.size)[used.ravel()].reshape(-1, *used.shape)
+        return np.asarray(self.linear(units).any(axis=0))
+
+    @property
     def step(self) -> int:
         """Greatest common divisor of the indices of nonzero coefficients of the source."""
         return self.source.step
@@ -297,6 +318,113 @@ class Mapped(Spectrum):
         return Spectrum, (self.base, self.coefficients, self.kinks)
 
 
+@dataclass(frozen=True, eq=False)
+class Shared(Spectrum):
+    """Signal that many designs contain: its samples, and the signals that follow from it, are cached."""
+
+    _cached: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    @property
+    def series(self) -> Spectrum:
+        """Signal of the listed orders alone, without kinks."""
+        return self._once("series", lambda: shared(Spectrum(self.base, self.coefficients)))
+
+    @property
+    def without_mean(self) -> Spectrum:
+        """Signal less its mean over the period."""
+        return self._once("without mean", lambda: shared(super(Shared, self).without_mean))
+
+    def with_base(self, base: Fraction) -> Spectrum:
+        """Return the same signal with another base order."""
+        return self._once((base.numerator, base.denominator), lambda: shared(super(Shared, self).with_base(base)))
+
+    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
+        """Return samples over one period, which nobody may change."""
+        values: NDArray[np.float64] = self._once((samples, offset), lambda: super(Shared, self).sample(samples, offset))
+        values.setflags(write=False)
+        return values
+
+    def _once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+        if key not in self._cached:
+            self._cached[key] = make()
+        return self._cached[key]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Shared, (self.base, self.coefficients, self.kinks)
+
+
+def shared(signal: Spectrum) -> Shared:
+    """Return the signal with a cache for its samples."""
+    return signal if isinstance(signal, Shared) else Shared(signal.base, signal.coefficients, signal.kinks)
+
+
+class Superposition(Spectrum):
+    """Weighted sum of signals with one base order, each of which is sampled in its own period.
+
+    Attributes
+    ----------
+    parts
+        Pairs (factor, signal).
+    """
+
+    parts: tuple[tuple[float, Spectrum], ...]
+
+    def __init__(self, *parts: tuple[float, Spectrum]) -> None:
+        vars(self).update(base=parts[0][1].base, parts=parts)
+
+    @cached_property
+    def _total(self) -> Spectrum:
+        return reduce(add, (signal.mapped(partial(np.multiply, factor)) for factor, signal in self.parts))
+
+    @property
+    def coefficients(self) -> NDArray[np.complex128]:
+        """Sum of the coefficients of the parts."""
+        return self._total.coefficients
+
+    @property
+    def kinks(self) -> SignalKinks | None:
+        """Kinks of the parts."""
+        return self._total.kinks
+
+    @cached_property
+    def components(self) -> NDArray[np.bool_]:
+        """Mask of the components that have a nonzero coefficient in any part."""
+        return np.asarray(np.any([signal.components for _, signal in self.parts], axis=0))
+
+    @cached_property
+    def step(self) -> int:
+        """Greatest common divisor of the indices of nonzero coefficients of the parts."""
+        return gcd(*(signal.step for _, signal in self.parts))
+
+    @property
+    def series(self) -> Spectrum:
+        """Signal of the listed orders alone, without kinks."""
+        return self._of_parts(lambda signal: signal.series)
+
+    @property
+    def without_mean(self) -> Spectrum:
+        """Signal less its mean over the period."""
+        return self._of_parts(lambda signal: signal.without_mean)
+
+    def with_base(self, base: Fraction) -> Spectrum:
+        """Return the same signal with another base order, whose period must be a period of every part."""
+        return self._of_parts(lambda signal: signal.with_base(base))
+
+    def _of_parts(self, change: Callable[[Spectrum], Spectrum]) -> Superposition:
+        return Superposition(*((factor, change(signal)) for factor, signal in self.parts))
+
+    def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
+        """Return the weighted sum of the samples of the parts."""
+        (factor, first), *others = self.parts
+        total = factor * first.sample(samples, offset)
+        for factor, signal in others:
+            total += factor * signal.sample(samples, offset)
+        return total
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Spectrum, (self.base, self.coefficients, self.kinks)
+
+
 @lru_cache(maxsize=32)
 def _waves(count: int, samples: int) -> NDArray[np.float64]:
     steps = np.outer(np.arange(samples), np.arange(count)) % samples
@@ -310,6 +438,13 @@ def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float
         values = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
     np.fft.irfft(half, samples, axis=0, norm="forward", out=values)
     return values
+
+
+def _repeated(block: NDArray[np.float64], times: int) -> NDArray[np.float64]:
+    # memory holds component by component, as transforms write it
+    columns = block.T[..., None, :]
+    repeated = np.broadcast_to(columns, (*columns.shape[:-2], times, columns.shape[-1]))
+    return np.asarray(repeated.reshape(*columns.shape[:-2], -1).T)
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
@@ -366,17 +501,21 @@ def spectrum_with_kinks(
     """
     period = math.tau / float(base)
     angles = period * np.arange(samples) / samples
-    kinks = find_kinks(signal, breaks, period)
-    if kinks is not None:
-        kinks = kinks.strongest(maximum)
+    # samples on a jump are taken on its later side
+    later, nodes = angles + SAME_ANGLE, kink_nodes(breaks, period)
+    at_nodes, values = np.split(signal(np.concatenate([nodes.angles, later])), [-samples])
+    kinks = nodes.kinks(at_nodes)
     if kinks is None:
         return spectrum_of(signal(angles), base)
-    # samples on a jump are taken on its later side
-    later = angles + SAME_ANGLE
-    remainder = spectrum_of(signal(later) - kinks.values(later, period), base)
-    delay = np.exp(-1j * SAME_ANGLE * remainder.orders).reshape(-1, *(1,) * (remainder.coefficients.ndim - 1))
-    smooth = remainder.coefficients * delay
+    if len(kinks.angles) > maximum:
+        kinks = kinks.strongest(maximum)
+    smooth = (spectrum_of(values - kinks.values(later, period), base).coefficients.T * _delay(samples, base)).T
     return Spectrum(base, smooth + kinks.coefficients(len(smooth), float(base)), kinks)
+
+
+@lru_cache(maxsize=16)
+def _delay(samples: int, base: Fraction) -> NDArray[np.complex128]:
+    return np.asarray(np.exp(-1j * SAME_ANGLE * float(base) * np.arange(samples // 2 + 1)))
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:

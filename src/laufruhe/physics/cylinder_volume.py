@@ -87,17 +87,19 @@ class ChargedCylinder:
 
         There is none but at a dead centre: valves open and close there, and heat is added there at once.
         """
-        values = self._one_sided(closed, angles)
-        ends = (np.mod(angles - centre + math.pi, math.tau) - math.pi for centre in dead_centres(self.part))
-        jumps = np.any([np.abs(since) <= JUMP_WIDTH for since in ends], axis=0)
-        before, after = (self._one_sided(closed, angles[jumps] + by) for by in (-JUMP_WIDTH, JUMP_WIDTH))
+        flat = np.ravel(angles)
+        turns = (flat[:, None] - dead_centres(self.part)) / math.tau
+        jumps = np.flatnonzero(np.any(np.abs(turns - np.rint(turns)) <= JUMP_WIDTH / math.tau, axis=1))
+        sides = np.concatenate([flat, flat[jumps] - JUMP_WIDTH, flat[jumps] + JUMP_WIDTH])
+        values, before, after = np.split(self._one_sided(closed, sides), [len(flat), len(flat) + len(jumps)])
         values[jumps] = 0.5 * (before + after)
-        return values
+        return values.reshape(np.shape(angles))
 
     def _one_sided(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         top, bottom = dead_centres(self.part)
         first = bottom - math.tau
-        local = first + np.mod(angles - first, self.cycle.angle)
+        cycles = (angles - first) / self.cycle.angle
+        local = first + self.cycle.angle * (cycles - np.floor(cycles))
         pressures = np.where(local < top + math.tau, self.gas.exhaust_pressure, self.gas.intake_pressure)
         is_closed = local < bottom
         pressures[is_closed] = closed(local[is_closed])

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Hashable
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache, reduce
+from operator import add
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.exact_angles import Turn, as_turn, star_sum
-from laufruhe.numerics.kinks import join_kinks
-from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
+from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
+from laufruhe.numerics.spectrum import Mapped, Shared, Spectrum, shared, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.rigid_body import ROLL
@@ -21,24 +23,40 @@ from laufruhe.physics.rigid_body import ROLL
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the wrench of the gas: a roll moment, the reaction to its crank torque (L5; eq. 1)."""
-    turns = engine.cycle.turns
+    return Mapped(_roll_moment(engine.cycle, engine.slider_cranks, gas, fidelity), _as_wrench)
+
+
+def _as_wrench(moment: NDArray[Any]) -> NDArray[Any]:
+    return moment[:, None] * ROLL
+
+
+@lru_cache(maxsize=64)
+def _roll_moment(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fidelity: Fidelity) -> Shared:
     # equal mechanisms differ only in their firing angles
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
-    for part in engine.slider_cranks:
+    for part in parts:
         alike[alike_under(gas, part), part.shaft.ratio].append(part)
-    total = Spectrum(engine.cycle.base_order, np.zeros((1, 6), dtype=complex))
-    for parts in alike.values():
-        torque = gas_coefficients(gas, parts[0], engine.cycle, fidelity)
-        delays: list[Turn] = [-as_turn(part.firing_angle) / turns for part in parts]
-        multiples = np.arange(len(torque.coefficients))
-        star = star_sum(np.tile(ROLL, (len(parts), 1)), delays, multiples)
-        load = Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
-        if torque.kinks is not None:
-            rolling = torque.kinks.mapped(lambda jumps: jumps[:, None] * ROLL)
-            kinks = join_kinks([rolling.shift(part.firing_angle) for part in parts] if rolling else [])
-            load = replace(load, kinks=kinks and kinks.folded(load.period, 1))
-        total = total + load
-    return total
+    stars = (_star(gas_coefficients(gas, star[0], cycle, fidelity), cycle, star) for star in alike.values())
+    total = Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
+    return shared(reduce(add, stars, total))
+
+
+def forget_gas() -> None:
+    """Clear the cache of stars of gas torque, for timing."""
+    _roll_moment.cache_clear()
+
+
+def _star(torque: Spectrum, cycle: Cycle, parts: Sequence[SliderCrank]) -> Spectrum:
+    # torque of one cylinder at the firing angles of several
+    firing = tuple(part.firing_angle for part in parts)
+    star = star_orders(np.ones((len(parts), 1)), _delays(firing, cycle.turns), len(torque.coefficients))[:, 0]
+    kinks = torque.kinks and torque.kinks.repeated(firing, cycle.angle)
+    return Spectrum(cycle.base_order, torque.coefficients * star, kinks)
+
+
+@lru_cache(maxsize=256)
+def _delays(firing: tuple[float, ...], turns: int) -> tuple[Turn, ...]:
+    return tuple(-as_turn(angle) / turns for angle in firing)
 
 
 def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: Fidelity = EXACT) -> Spectrum:

@@ -55,6 +55,8 @@ class RigidMounting:
 
     def check_carried(self, wrench: Spectrum) -> None:
         """Refuse a wrench along a direction that no mount carries."""
+        if not self.free[:, wrench.components].any():
+            return
         along = wrench.coefficients @ (self.free / _scales(self.arm)).T
         if not along.any():
             return

@@ -125,7 +125,7 @@ def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, hig
     arm = ratio * _two_sided(acceleration / (1j * np.maximum(np.arange(count + 1), 1)))
     if rod_ratio > 0.0:
         arm[count] += offset_ratio / rod_ratio
-    return _one_sided(-np.convolve(_two_sided(acceleration), arm, mode="full"), highest)
+    return _one_sided(-np.convolve(_two_sided(acceleration), arm, mode="same"), highest)
 
 
 @lru_cache(maxsize=256)
@@ -140,4 +140,4 @@ def rod_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest
     h = np.arange(-count, count + 1)
     swing = ratio * rate
     swing[count] += 1.0
-    return _one_sided(-np.convolve(1j * h * rate, swing, mode="full"), highest)
+    return _one_sided(-np.convolve(1j * h * rate, swing, mode="same"), highest)

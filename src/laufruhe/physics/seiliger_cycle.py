@@ -24,10 +24,11 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Ar
     cut_off = cylinder.smallest * seiliger_cut_off(gas, cycle)
 
     def closed(local: Array) -> Array:
-        volume = cylinder.volume(local)
-        compression = gas.intake_pressure * (cylinder.largest / volume) ** gas.compression_exponent
-        expansion = gas.peak_pressure * np.minimum(1.0, cut_off / volume) ** gas.expansion_exponent
-        return np.where(local < top, compression, expansion)
+        volume, rises = cylinder.volume(local), local < top
+        pressure = np.empty_like(volume)
+        pressure[rises] = gas.intake_pressure * (cylinder.largest / volume[rises]) ** gas.compression_exponent
+        pressure[~rises] = gas.peak_pressure * np.minimum(1.0, cut_off / volume[~rises]) ** gas.expansion_exponent
+        return pressure
 
     return cylinder.pressure(closed, angles)
 
@@ -67,14 +68,14 @@ def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
     """Return the crank angle after the firing dead centre at which the heat ends [rad] (G5)."""
     top, bottom = dead_centres(part)
     ratio, smallest = part.shaft.ratio, ChargedCylinder(gas, part, cycle).smallest
-    wanted = part.travel(np, part.dead_centres[0]) + part.stroke * smallest * (seiliger_cut_off(gas, cycle) - 1.0)
+    wanted = part.travel(math, part.dead_centres[0]) + part.stroke * smallest * (seiliger_cut_off(gas, cycle) - 1.0)
 
     def beyond(angle: float) -> float:
-        return float(part.travel(np, part.fires_at + ratio * angle) - wanted)
+        return float(part.travel(math, part.fires_at + ratio * angle) - wanted)
 
-    if beyond(top) >= 0.0 or beyond(bottom) <= 0.0:
-        return top if beyond(top) >= 0.0 else bottom
-    return rising_root(beyond, top, bottom)
+    if beyond(top) >= 0.0:
+        return top
+    return rising_root(beyond, top, bottom) if beyond(bottom) > 0.0 else bottom
 
 
 def compression_end_pressure(gas: Seiliger) -> float:

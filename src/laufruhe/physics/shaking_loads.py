@@ -17,9 +17,9 @@ import numpy as np
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import cancelling_sums
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Shared, Spectrum, Superposition, shared
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.gas_loads import forget_gas, gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import effects_of
 from laufruhe.physics.rigid_body import plane_parts
@@ -42,33 +42,30 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     """
     if fidelity.is_uneven:
         return uneven_loads(engine, point, fidelity)
-    gas = fidelity.gas_of(point)
-    cycle, speed = engine.cycle, point.speed
-    moving, pins, pin_indices = _slider_crank_loads(cycle, engine.slider_cranks, speed, gas, fidelity)
-    rotors, rotor_indices = _turning(engine.rotors, speed, cycle)
-    total = moving + _summed(pins + rotors, pin_indices + rotor_indices, cycle)
+    gas, cycle, square = fidelity.gas_of(point), engine.cycle, point.speed**2
+    turning = rotor_loads((*engine.pins, *engine.rotors), 1.0, cycle)
+    parts = [(square, _moving_loads(cycle, engine.slider_cranks, fidelity)), (square, turning)]
+    if gas is not None:
+        parts.append((1.0, fidelity.truncated(gas_loads(engine, gas, fidelity))))
+    total = Superposition(*parts)
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
 @lru_cache(maxsize=64)
-def _slider_crank_loads(
-    cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
-) -> tuple[Spectrum, list[_Parts], list[int]]:
-    engine = Engine("pistons, rods and gas", cycle, parts)
-    total = star_loads(engine, speed, lambda part: chain(*effects_of(part, fidelity)))
-    if gas is not None:
-        total = total + gas_loads(engine, gas, fidelity)
-    return fidelity.truncated(total), *_turning(engine.pins, speed, cycle)
+def _moving_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], fidelity: Fidelity) -> Shared:
+    # pistons and rods at unit speed
+    return shared(fidelity.truncated(star_loads(cycle, parts, 1.0, lambda part: chain(*effects_of(part, fidelity)))))
 
 
 def forget() -> None:
-    """Clear the cache of loads, for timing."""
-    _slider_crank_loads.cache_clear()
+    """Clear the caches of loads, for timing."""
+    _moving_loads.cache_clear()
+    forget_gas()
 
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the inertia loads of reciprocating masses: F = -m s'' and its roll moment (L2, L3, L7)."""
-    return star_loads(engine, speed, lambda part: effects_of(part, fidelity)[0])
+    return star_loads(engine.cycle, engine.slider_cranks, speed, lambda part: effects_of(part, fidelity)[0])
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
@@ -76,19 +73,12 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
 
     It is linear in the unbalances and their conjugates.
     """
-    return _summed(*_turning(tuple(rotors), speed, cycle), cycle)
-
-
-def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> tuple[list[_Parts], list[int]]:
-    # the wrench of each rotor, and the index of its order among those of a cycle
-    wrenches = [_wrench(rotor, speed) for rotor in rotors]
-    return wrenches, [order_index(cycle, abs(rotor.shaft.ratio)) for rotor in rotors]
-
-
-def _summed(wrenches: list[_Parts], indices: list[int], cycle: Cycle) -> Spectrum:
-    if not wrenches:
+    turning = tuple(rotors)
+    if not turning:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    return Spectrum(cycle.base_order, cancelling_sums(np.array(wrenches, dtype=complex), tuple(indices)))
+    wrenches = np.array([_wrench(rotor, speed) for rotor in turning], dtype=complex)
+    indices = tuple(order_index(cycle, abs(rotor.shaft.ratio)) for rotor in turning)
+    return Spectrum(cycle.base_order, cancelling_sums(wrenches, indices))
 
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.machine import Cycle, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import as_turn, cis, star_orders
 from laufruhe.numerics.spectrum import Spectrum, as_order
@@ -16,32 +16,31 @@ from laufruhe.physics.mechanism import Direction, Effect
 from laufruhe.physics.rigid_body import ROLL, plane_parts
 
 
-def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
+def star_loads(
+    cycle: Cycle, parts: Sequence[SliderCrank], speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]
+) -> Spectrum:
     """Return the wrench of all cylinders: coefficients of one times phase and weight of each, shape (n, 6) (L6)."""
-    cycle = engine.cycle
-    alike: dict[Hashable, list[tuple[int, Effect]]] = defaultdict(list)
-    for k, part in enumerate(engine.slider_cranks):
+    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
+    for part in parts:
         for effect in effects(part):
-            alike[effect.direction, effect.shape, part.shaft.ratio].append((k, effect))
-    loads = [_load_of_alike(engine, speed, members) for members in alike.values()]
+            alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
+    loads = [_load_of_alike(cycle, speed, members) for members in alike.values()]
     total = np.zeros((max(map(len, loads), default=1), 6), dtype=complex)
     for load in loads:
         total[: len(load)] += load
     return Spectrum(cycle.base_order, total)
 
 
-def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> ComplexArray:
+def _load_of_alike(cycle: Cycle, speed: float, members: Sequence[tuple[SliderCrank, Effect]]) -> ComplexArray:
     # load of equal effects of cylinders, by the orders of the cycle
-    series = members[0][1].series()
-    parts = [engine.slider_cranks[k] for k, _ in members]
-    ratio = parts[0].shaft.ratio
-    sizes = np.array([member.size * (ratio * speed) ** 2 for _, member in members])
-    weights = sizes[:, None] * np.array([_wrench_of(members[0][1].direction, part) for part in parts])
-    turns = tuple([part.star_turn for part in parts])
-    load = star_orders(weights, turns, len(series))
+    (first, effect), *_ = members
+    series, ratio = effect.series(), first.shaft.ratio
+    square = (ratio * speed) ** 2
+    weights = [np.multiply(effect.size * square, _wrench_of(effect.direction, part)) for part, effect in members]
+    load = star_orders(np.array(weights), tuple([part.star_turn for part, _ in members]), len(series))
     load *= series[:, None]
     # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
-    return spread(load if ratio > 0.0 else load.conj(), order_index(engine.cycle, abs(ratio)))
+    return spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)))
 
 
 def spread(load: ComplexArray, step: int) -> ComplexArray:
