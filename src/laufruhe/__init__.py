@@ -7,15 +7,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias, Union
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeAlias, TypeVar, Union
 
 from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_integer, wrong_call
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
+    from numpy.typing import ArrayLike
 
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
@@ -41,6 +44,7 @@ __all__ = [
     "SolverError",
     "__version__",
     "evaluate",
+    "evaluate_many",
     "load",
     "read_result",
     "solve",
@@ -48,6 +52,8 @@ __all__ = [
     "write_result",
 ]
 
+P = ParamSpec("P")
+T = TypeVar("T")
 Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
 """Path of a file, its text, or its tables."""
 
@@ -65,6 +71,19 @@ if not TYPE_CHECKING:
 def __dir__() -> list[str]:
     """Return the public names."""
     return sorted(__all__)
+
+
+def _on_one_thread(call: Callable[P, T]) -> Callable[P, T]:
+    """Return the call with linear algebra on one thread, as commands have it."""
+
+    @wraps(call)
+    def limited(*args: P.args, **kwargs: P.kwargs) -> T:
+        from laufruhe.numerics.cores import one_thread
+
+        with one_thread():
+            return call(*args, **kwargs)
+
+    return limited
 
 
 def load(source: Source) -> Problem:
@@ -85,6 +104,7 @@ def load(source: Source) -> Problem:
     return read(source)
 
 
+@_on_one_thread
 def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     """Solve a problem; the result includes its proof.
 
@@ -114,6 +134,7 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     return decide(replace(_problem(problem), sharply=True), time_limit=time_limit, diagnose=True)
 
 
+@_on_one_thread
 def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint] = ()) -> Result:
     """Evaluate a design as given.
 
@@ -159,6 +180,47 @@ def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem
     return Problem(design.name, design.name, design, tuple(points), objective=(Term(Measure(channel)),))
 
 
+@_on_one_thread
+def evaluate_many(
+    problem: Problem | Source,
+    designs: Mapping[str, ArrayLike] | Sequence[Mapping[str, str | float]] | pd.DataFrame,
+    jobs: int = 1,
+) -> pd.DataFrame:
+    """Evaluate many designs of one problem, and return a table with a row for each.
+
+    Designs that differ in unbalances share one model, and take some 30 microseconds each. Others are evaluated one by
+    one.
+
+    Parameters
+    ----------
+    problem
+        Problem, or an argument of `load`.
+    designs
+        Values of open numbers by their names in results: arrays by name, a mapping for each design, or a table. Numbers
+        are in SI units, angles in radians; texts have a unit. A number that is missing has its start value.
+    jobs
+        Largest number of processes for designs that are evaluated one by one.
+
+    Returns
+    -------
+    Columns: the given numbers, `objective`, each term by the name of its measure, each limit by its name (all in SI
+    units, which `attrs["units"]` names), `feasible` (limits and bounds are kept), and `message`, empty or the reason
+    why a design cannot be evaluated.
+
+    Raises
+    ------
+    InputError
+        If the problem is wrong, or a name or a value.
+    ModelError
+        If throws or firing order are open.
+    """
+    from laufruhe.solvers.many import evaluate_many as tabulate
+
+    check_integer("jobs", jobs, 1)
+    return tabulate(_problem(problem), designs, jobs)
+
+
+@_on_one_thread
 def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     """Run the sweeps and comparisons of a study, and return one dataset a part by its name.
 

@@ -14,8 +14,7 @@ from laufruhe.files.reader import load
 from laufruhe.load_models import batch
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.evaluation import Evaluation, evaluate
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.evaluation import evaluate, objective_value
 from problem_files import PROBLEMS, READY
 from random_decisions import random_decisions
 
@@ -26,17 +25,12 @@ COUNT = 12
 def test_designs_agree_with_evaluations(path: Path) -> None:
     problem = replace(load(path).balance, fidelity=Fidelity(samples=720), phasing=None)
     values = random_decisions(problem, COUNT)
-    # at the steps of the rows: a peak is sought between them too, in one design
-    single = [_at_steps(problem, evaluate(problem, problem.design(list(v)))) for v in values]
+    single = [objective_value(problem, evaluate(problem, problem.design(list(v)))) for v in values]
     for prune in (True, False):
         designs = prepare(problem, prune)
         assert designs.objective(values) == pytest.approx(single, rel=1e-11)
         features = np.concatenate([np.ones((COUNT, 1)), _columns(designs, values)], axis=1)
         assert designs.objective_from_features(features) == pytest.approx(single, rel=1e-11)
-
-
-def _at_steps(problem: Problem, found: Evaluation) -> float:
-    return sum(term.weight * found.rows(term.measure).value for term in problem.objective)
 
 
 def _columns(designs: Designs, values: np.ndarray) -> np.ndarray:

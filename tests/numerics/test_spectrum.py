@@ -15,8 +15,10 @@ from laufruhe.numerics.spectrum import (
     JUMP_OFFSET,
     Mapped,
     Spectrum,
+    Superposition,
     common_base,
     orders_equal,
+    shared,
     spectrum_of,
     spectrum_with_kinks,
 )
@@ -216,3 +218,45 @@ def test_a_step_on_a_jump_is_read_behind_it_wherever_the_signal_was_moved(steps:
         assert there.sample(steps, JUMP_OFFSET) == pytest.approx(
             np.roll(saw.sample(steps, JUMP_OFFSET), moved), abs=1e-6
         )
+
+
+class TestSuperposition:
+    """A weighted sum of signals has the samples of the signal that it is added up to."""
+
+    @staticmethod
+    def parts() -> tuple[Spectrum, Spectrum]:
+        random = np.random.default_rng(3)
+        coefficients = random.normal(size=(80, 3)) + 1j * random.normal(size=(80, 3))
+        coefficients[np.arange(80) % 4 != 0] = 0.0
+        coefficients[:, 1] = 0.0
+        kinked = spectrum_with_kinks(
+            lambda angles: np.abs(np.sin(angles))[:, None] * [0.0, 1.0, 2.0], 1440, Fraction(1, 2),
+            np.array([0.0, math.pi, 2 * math.pi, 3 * math.pi]),
+        )  # fmt: skip
+        return Spectrum(Fraction(1, 2), coefficients), kinked
+
+    @pytest.mark.parametrize("offset", [0.0, 1e-3])
+    def test_samples(self, offset: float) -> None:
+        smooth, kinked = self.parts()
+        total = smooth.mapped(lambda values: 3.0 * values) + kinked
+        angles = 4.0 * math.pi * np.arange(720) / 720
+        for _ in range(2):
+            sampled = Superposition((3.0, shared(smooth)), (1.0, shared(kinked))).sample(720, offset)
+            assert kinked.kinks is not None
+            steps = total.smooth.values(angles) + kinked.kinks.values(angles + offset, kinked.period)
+            assert sampled == pytest.approx(steps, abs=1e-11)
+
+    def test_derived_signals(self) -> None:
+        smooth, kinked = self.parts()
+        total = smooth.mapped(lambda values: 3.0 * values) + kinked
+        parts = Superposition((3.0, shared(smooth)), (1.0, shared(kinked)))
+        assert parts.step == total.step
+        assert list(parts.components) == list(total.components)
+        for change in (lambda s: s.series, lambda s: s.without_mean, lambda s: s.with_base(Fraction(2))):
+            assert change(parts).sample(360) == pytest.approx(change(total).sample(360), abs=1e-11)
+            assert change(parts).coefficients == pytest.approx(change(total).coefficients, abs=1e-13)
+
+    def test_cached_samples_cannot_be_changed(self) -> None:
+        values = shared(self.parts()[0]).sample(96)
+        with pytest.raises(ValueError, match="read-only"):
+            values[0] = 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Annotated, Any, TypeAlias, get_args, get_origin
 
 import numpy as np
@@ -57,21 +58,22 @@ def plain(raw: Any, depth: int) -> Any:
     return raw.tolist() if isinstance(raw, np.ndarray | np.generic) else raw
 
 
-def number_at(model: type[BaseModel], path: Sequence[str | int]) -> f.Number | None:
+@lru_cache(maxsize=4096)
+def number_at(model: type[BaseModel], path: Place) -> f.Number | None:
     """Return the field that reads the number at a path of a model; None for a text, count, list or choice."""
     leaves = (leaf for annotation in annotations_at(model, path) for leaf in _leaves(annotation))
     return next((leaf for leaf in leaves if isinstance(leaf, f.Number)), None)
 
 
-def annotations_at(model: type[BaseModel], path: Sequence[str | int]) -> list[Any]:
+@lru_cache(maxsize=4096)
+def annotations_at(model: type[BaseModel], path: Place) -> tuple[Any, ...]:
     """Return the type annotations of the key at a path of a pydantic model; empty if there is no such key."""
-    annotations: list[Any] = [model]
-    for part in path:
-        annotations = [inner for annotation in annotations for inner in _inside(annotation, part)]
-    return annotations
+    if not path:
+        return (model,)
+    return tuple(inner for annotation in annotations_at(model, path[:-1]) for inner in _inside(annotation, path[-1]))
 
 
-def tables_on(model: type[BaseModel], path: Sequence[str | int]) -> list[type[f.Table]]:
+def tables_on(model: type[BaseModel], path: Place) -> list[type[f.Table]]:
     """Return the models of all tables that contain a path, the outermost first."""
     leaves = (leaf for k in range(len(path)) for note in annotations_at(model, path[:k]) for leaf in _leaves(note))
     return [leaf for leaf in leaves if isinstance(leaf, type) and issubclass(leaf, f.Table)]

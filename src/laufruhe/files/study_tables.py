@@ -158,7 +158,7 @@ def _options(node: Any) -> dict[str, Any]:
 
 def field_at(where: str) -> f.Number | None:
     """Return the field that reads the number at a path; None for a text, a list or a choice."""
-    return number_at(file_model(), parts_of(where))
+    return number_at(file_model(), tuple(parts_of(where)))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Evaluate the objective of many designs of one problem in one call (F12).
+"""Evaluate objective and limits of many designs of one problem in one call (F12).
 
 The feature vector of a design is 1 followed by its decision vector. The load rows of all norms are linear in it. The
 work is one matrix product and two passes over its result. Designs are processed in blocks that fit in the cache. The
@@ -7,7 +7,7 @@ size of a block depends on the shapes only, so results do not depend on the numb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,8 +16,9 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm
-from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms import Grid, Norm
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 
 CACHE_BYTES = 1 << 19
@@ -98,24 +99,23 @@ class BatchNorm:
 
 @dataclass(frozen=True, eq=False)
 class Designs:
-    """Problem prepared for many designs: pairs (weight, norm) of the terms, and (maximum, norm) of the limits."""
+    """Problem prepared for many designs: the norms of the loads and masses that it minimises or limits."""
 
     model: AffineModel
-    terms: tuple[tuple[float, BatchNorm], ...]
-    limits: tuple[tuple[float, BatchNorm], ...] = ()
+    norms: Mapping[Measure, BatchNorm]
 
-    def objective(self, values: Array, threads: int = 1) -> Array:
+    def objective(self, values: Array | ComplexArray, threads: int = 1) -> Array:
         """Return the objective of each design, shape (designs,), from complex values (designs, decisions) (C4)."""
-        return self.objective_from_features(self._features(values), threads)
+        return self.objective_from_features(self.features(values), threads)
 
-    def are_feasible(self, values: Array) -> Mask:
-        """Return the mask of designs that keep the limits on loads and masses within `FEASIBLE`, shape (designs,)."""
-        features, feasible = self._features(values), np.ones(len(values), dtype=bool)
-        for maximum, norm in self.limits:
-            feasible &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
-        return feasible
+    def are_feasible(self, values: Array | ComplexArray) -> Mask:
+        """Return the mask of designs that keep all limits within `FEASIBLE`, shape (designs,)."""
+        features = self.features(values)
+        slack = [self.slack(limit, self.values(limit.measure, features)) for limit in self.model.problem.limits]
+        return np.asarray(np.all(np.reshape(slack, (len(slack), len(values))) >= -FEASIBLE, axis=0))
 
-    def _features(self, values: Array) -> Array:
+    def features(self, values: Array | ComplexArray) -> Array:
+        """Return the feature vectors of complex values (designs, decisions), shape (designs, 1 + columns)."""
         columns = [
             (values[:, k] * direction.conjugate()).real
             for k, domain in enumerate(self.model.domains)
@@ -129,9 +129,21 @@ class Designs:
         `features` has the vector (1, decision vector) of each design, shape (designs, 1 + columns).
         """
         total = np.zeros(len(features))
-        for weight, norm in self.terms:
-            total += weight * norm.values(features, threads)
+        for term in self.model.problem.objective:
+            total += term.weight * self.values(term.measure, features, threads)
         return total
+
+    def values(self, measure: Measure, features: Array, threads: int = 1) -> Array:
+        """Return a measure of each design [SI], shape (designs,); numbers of the mounting are equal for all."""
+        if measure in self.norms:
+            return self.norms[measure].values(features, threads)
+        return np.full(len(features), self.model.bare.value(measure))
+
+    def slack(self, limit: Limit, values: Array) -> Array:
+        """Return the relative slack of a limit from the values of its measure, shape (designs,) (E15)."""
+        if limit.measure in self.norms:
+            return np.array([limit.slack(value)[0] for value in values.tolist()])
+        return np.full(len(values), -self.model.bare.check_limit(limit).violation)
 
     @property
     def columns(self) -> int:
@@ -156,19 +168,19 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
             f"designs that are evaluated together may differ in unbalances alone; fix {', '.join(nonlinear)}"
         )
     model = AffineModel(problem, whole_cycle=not prune)
-    affine = model.at(model.full_samples if prune else problem.fidelity.samples)
+    samples = model.full_samples if prune else problem.fidelity.samples
 
-    def batched(norm: AffineNorm) -> BatchNorm:
+    def batched(measure: Measure) -> BatchNorm:
+        # peaks have the finer samples of the exact evaluation (M6)
+        norm = model.norm(measure, samples * (measure.norm.refinement if measure.is_load else 1))
         rows, grid = feature_rows(norm), norm.grid
         if prune and norm.norm.is_monotone_in_lengths:
             rows, weights = _merged(rows, grid.weights)
             grid = Grid(weights, len(weights))
         return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)
 
-    terms, limits = (
-        tuple((number, batched(norm)) for number, norm in pairs) for pairs in (affine.terms, affine.limits)
-    )
-    return Designs(model, terms, limits)
+    measures = [term.measure for term in problem.load_terms] + [limit.measure for limit in problem.load_limits]
+    return Designs(model, {measure: batched(measure) for measure in measures})
 
 
 def feature_rows(norm: AffineNorm) -> Array:

@@ -147,7 +147,7 @@ class SignalKinks:
         return type(self)(self.angles + angle, np.concatenate([zeros, self.jumps], axis=1))
 
     def repeated(self, delays: Sequence[float], period: float) -> SignalKinks | None:
-        """Return the kinks of the sum of the signal at these delays [rad], with the angles reduced to `period` [rad]."""
+        """Return the kinks of the sum of the signal at these delays [rad], with angles reduced to `period` [rad]."""
         angles = np.add.outer(delays, self.angles).ravel()
         return merge_kinks(_within(angles, period), np.concatenate([self.jumps] * len(delays)))
 
@@ -160,12 +160,12 @@ class SignalKinks:
         """Return the kinks of a signal averaged over `times` shifts, with the angles reduced to `period` [rad]."""
         return merge_kinks(_within(self.angles, period), self.jumps / times)
 
-    def strongest(self, count: int) -> SignalKinks | None:
+    def strongest(self, count: int) -> Self:
         """Return the `count` kinks with the largest effect within one degree."""
         steps = math.radians(1.0) ** np.arange(self.jumps.shape[1])
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         selection = np.sort(np.argsort(-size, kind="stable")[:count])
-        return _left(self.angles[selection], self.jumps[selection])
+        return type(self)(self.angles[selection], self.jumps[selection])
 
 
 def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
@@ -265,7 +265,7 @@ def _waves(angles: Array, count: int) -> NDArray[np.complex128]:
     # e^{-i j angle} for j = 0 ... count - 1, as products of two exponentials, shape (count, angles)
     low = np.exp(-1j * np.outer(np.arange(_RUN), angles))
     high = np.exp(-1j * np.outer(np.arange(0, count, _RUN), angles))
-    return (high[:, None] * low).reshape(-1, len(angles))[:count]
+    return np.asarray((high[:, None] * low).reshape(-1, len(angles))[:count])
 
 
 @lru_cache(maxsize=1)

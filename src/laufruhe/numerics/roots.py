@@ -44,8 +44,8 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
                 opposite - newest
             ) * value / (of_older - value) * of_opposite / (of_older - of_opposite)
         # the other end follows to the last digits
-        least = min(2.0 * math.ulp(middle) / (above - below), 0.5)
-        share = min(max(share, least), 1.0 - least)
+        inset = min(2.0 * math.ulp(middle) / (above - below), 0.5)
+        share = min(max(share, inset), 1.0 - inset)
     return below
 
 

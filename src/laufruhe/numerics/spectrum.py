@@ -9,7 +9,7 @@ from fractions import Fraction
 from functools import cached_property, lru_cache, partial, reduce
 from math import gcd, lcm
 from operator import add
-from typing import Any
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from laufruhe.numerics.exact_angles import Turn, phasors
 from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, join_kinks, kink_nodes
 
+S = TypeVar("S")
 MAX_SIGNAL_KINKS = 24
 """Largest number of kinks of one signal that are kept in closed form; its orders contain all others."""
 JUMP_OFFSET = 1e-3 * SAME_ANGLE
@@ -148,7 +149,7 @@ class Spectrum:
             return np.asarray(values.reshape(samples, *self.coefficients.shape[1:]))
         used = self.components
         if self.coefficients.ndim == 2 and not used.all():
-            values = np.zeros(self.coefficients.shape[:0:-1] + (samples,)).T
+            values = np.zeros((*self.coefficients.shape[:0:-1], samples)).T
             if used.any():
                 values[:, used] = Spectrum(self.base, self.coefficients[:, used]).sample(samples)
             return values
@@ -340,14 +341,14 @@ class Shared(Spectrum):
 
     def sample(self, samples: int, offset: float = 0.0) -> NDArray[np.float64]:
         """Return samples over one period, which nobody may change."""
-        values: NDArray[np.float64] = self._once((samples, offset), lambda: super(Shared, self).sample(samples, offset))
+        values = self._once((samples, offset), lambda: super(Shared, self).sample(samples, offset))
         values.setflags(write=False)
         return values
 
-    def _once(self, key: Hashable, make: Callable[[], Any]) -> Any:
+    def _once(self, key: Hashable, make: Callable[[], S]) -> S:
         if key not in self._cached:
             self._cached[key] = make()
-        return self._cached[key]
+        return cast(S, self._cached[key])
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Shared, (self.base, self.coefficients, self.kinks)

@@ -27,7 +27,7 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
 
 
 def _as_wrench(moment: NDArray[Any]) -> NDArray[Any]:
-    return moment[:, None] * ROLL
+    return np.asarray(moment[:, None] * ROLL)
 
 
 @lru_cache(maxsize=64)

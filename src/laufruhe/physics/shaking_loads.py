@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.exact_angles import cancelling_sums
 from laufruhe.numerics.spectrum import Shared, Spectrum, Superposition, shared

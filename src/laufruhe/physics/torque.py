@@ -82,7 +82,9 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the torque of gas, pistons and rods that drives the output at even speed, shape (n,) [N m] (T1)."""
     gas = fidelity.gas_of(point)
-    masses = fidelity.truncated(star_loads(engine.cycle, engine.slider_cranks, point.speed, lambda part: (_of_masses(part, fidelity),)))
+    masses = fidelity.truncated(
+        star_loads(engine.cycle, engine.slider_cranks, point.speed, lambda part: (_of_masses(part, fidelity),))
+    )
     total = masses if gas is None else masses + fidelity.truncated(gas_loads(engine, gas, fidelity))
     return total.mapped(lambda wrench: wrench @ ROLL)
 
