@@ -35,6 +35,8 @@ MAXIMUM = NORMS["maximum"]
 UNIT_MARGIN, MIN_UNIT = 1e3, 1e-9
 FEASIBLE = 1e-6
 """Relative violation of a limit that counts as none."""
+MANY_COLUMNS, FREE = 16, 1e-12
+"""Number of columns from which fewer free columns are looked for, and relative size of a load that counts as none."""
 MAX_NUMBERS = 60_000_000
 """Largest number of coefficients of one measure; a solver needs about ten times that memory."""
 
@@ -55,6 +57,27 @@ class AffineNorm:
     constant: Array
     slope: Array
     grid: Grid
+
+    @cached_property
+    def free_slope(self) -> tuple[Array, Array]:
+        """Slope B' in few free columns basis x, with B = B' basis; shapes (k, d, r) and (r, n) (P21).
+
+        Many columns often change the rows in few directions only. Otherwise r = n, and the basis is the identity.
+        """
+        n, rows = self.slope.shape[-1], self.slope.reshape(self.constant.size, -1)
+        if n >= MANY_COLUMNS:
+            sizes = np.maximum(rows.max(axis=0), -rows.min(axis=0))
+            sizes = np.where(sizes > 0.0, sizes, 1.0)
+            # few rows suggest the directions, and all rows confirm them
+            sample = rows[np.random.default_rng(n).integers(len(rows), size=8 * n)] / sizes
+            _, values, directions = np.linalg.svd(sample, full_matrices=False)
+            directions = directions[values > FREE * values[0]]
+            if 0 < 2 * len(directions) <= n:
+                slope, basis = rows @ (directions / sizes).T, directions * sizes
+                errors = (np.abs(slope @ basis[:, k] - rows[:, k]).max() for k in range(n))
+                if all(error <= FREE * size for error, size in zip(errors, sizes, strict=True)):
+                    return slope.reshape(*self.constant.shape, len(basis)), basis
+        return self.slope, np.eye(n)
 
     def rows(self, x: Array) -> Array:
         """Return the load rows V0 + B x, shape (k, d)."""
@@ -360,7 +383,8 @@ def _loads(
 
 
 def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
-    used = np.any([keep_all | np.any(rows != 0.0, axis=0) for rows in (bare.vectors, *slopes)], axis=0)
+    parts = (bare.vectors, *slopes)
+    used = np.array([keep_all or any(rows[:, k].any() for rows in parts) for k in range(bare.vectors.shape[1])])
     used[:1] |= not used.any()
     # rows contiguous in memory, which products with them need
     constant, *moved = (np.compress(used, rows, axis=1) for rows in (bare.vectors, *slopes))

@@ -13,6 +13,8 @@ from laufruhe.numerics.arrays import Array
 
 Value: TypeAlias = complex | float
 
+SAME_ANGLE = 1e-12
+"""Difference of angles that is a rounding error [rad]."""
 EDGE = 1e-6
 """Fraction of a size within which a point counts as lying on a bound."""
 
@@ -113,7 +115,9 @@ class Sector:
     def split(self, u: Value) -> tuple[float, float]:
         """Return the size and angle [rad] of a value, the angle within one turn above its lower bound."""
         low = self.angles[0]
-        return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
+        turn = (cmath.phase(u) - low) % math.tau if u != 0 else 0.0
+        # a rounding error below the lower bound is no turn
+        return abs(u), low + (turn if turn < math.tau - SAME_ANGLE else 0.0)
 
     def minimum(self, g: Array) -> float:
         """Return the minimum of g . x over the set, g of shape (2,): minus the support function of -g (P4)."""

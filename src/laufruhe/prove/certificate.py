@@ -31,7 +31,7 @@ def gap_of(value: float, bound: float, zero_level: float) -> float:
 ROUNDING = 1e-12
 """Relative rounding error of a sum."""
 # rounds of `flatten_interior`, and the relative gap from which a round pays
-CORRECTIONS, WORTHWHILE_GAP = 2, 1e-6
+CORRECTIONS, WORTHWHILE_GAP = 2, 1e-7
 
 
 def gap_tolerance_of(value: float, tolerance: float, zero_level: float) -> float:

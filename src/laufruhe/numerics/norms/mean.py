@@ -36,7 +36,7 @@ class Mean(Norm):
 
     name = "mean"
     averages = True
-    sums_lengths = is_convex = is_monotone_in_lengths = is_pointwise = True
+    sums_lengths = is_convex = is_smooth = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return the weighted sum of row lengths, sum_k w_k |v_k|."""
@@ -47,10 +47,11 @@ class Mean(Norm):
         size = lengths(rows)
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
 
-    def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
-        """Return w_k / |v_k| of each row, with a small length in place of zero."""
+    def second_derivative(self, grid: Grid, rows: Array) -> tuple[Array, Array, float]:
+        """Return w_k / |v_k| and -w_k / |v_k|^3 of each row, with a small length in place of zero."""
         size = lengths(rows)
-        return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
+        size = np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0)
+        return grid.weights / size, -grid.weights / size**3, 0.0
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return all subgradients of the mean: w_k v_k / |v_k| as base, and indices of zero rows, which are free."""

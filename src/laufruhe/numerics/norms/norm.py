@@ -161,6 +161,8 @@ class Norm(ABC):
         True if it is the largest diameter of the enclosing balls of the signals, at most twice the longest row.
     is_convex
         True if it is convex, with cones and a dual norm: norm(V) >= <Z, V> for every Z with dual norm one.
+    is_smooth
+        True if it has a second derivative wherever no row vanishes.
     is_monotone_in_lengths
         True if it depends only on the lengths of the rows and their weights, and never falls when a row gets longer.
     is_pointwise
@@ -177,6 +179,7 @@ class Norm(ABC):
     is_largest_mean: ClassVar[bool] = False
     is_diameter: ClassVar[bool] = False
     is_convex: ClassVar[bool] = False
+    is_smooth: ClassVar[bool] = False
     is_monotone_in_lengths: ClassVar[bool] = False
     is_pointwise: ClassVar[bool] = False
 
@@ -202,12 +205,13 @@ class Norm(ABC):
         """
         raise self._unclaimed("subgradient")
 
-    def second_derivative(self, grid: Grid, rows: Array) -> Array | None:
-        """Return the second derivative of the norm across the direction of each row, shape (k,) (P10).
+    def second_derivative(self, grid: Grid, rows: Array) -> tuple[Array, Array, float]:
+        """Return coefficients a and b, shape (k,), and c of the second derivative at rows V, shape (k, d) (P10).
 
-        The result is None if the norm is not a sum over rows.
+        A change dV of the rows has the second derivative sum_k a_k |dv_k|^2 + b_k (v_k . dv_k)^2 - c <Z, dV>^2 with the
+        subgradient Z at V.
         """
-        return None
+        raise self._unclaimed("second derivative")
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return the dual norm of Z, shape (k, d): the smallest t with <Z, V> <= t norm(V) for every V (P3).

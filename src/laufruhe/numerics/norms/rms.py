@@ -17,7 +17,7 @@ class RootMeanSquare(Norm):
     """Euclidean norm of rows v_k with weights w_k."""
 
     name = "rms"
-    is_euclidean = is_convex = is_monotone_in_lengths = is_pointwise = True
+    is_euclidean = is_convex = is_smooth = is_monotone_in_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return the weighted root mean square of the row lengths, sqrt(sum_k w_k |v_k|^2)."""
@@ -31,6 +31,11 @@ class RootMeanSquare(Norm):
         """Return the dual rows w_k v_k / norm(V), zero if the norm is."""
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
+
+    def second_derivative(self, grid: Grid, rows: Array) -> tuple[Array, Array, float]:
+        """Return w_k / N, zero and 1 / N for the norm N."""
+        norm = self.value(grid, rows) or 1.0
+        return grid.weights / norm, np.zeros(len(rows)), 1.0 / norm
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return the gradient as base, or Z at zero rows: the norm is smooth except at zero."""

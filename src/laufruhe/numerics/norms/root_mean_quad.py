@@ -26,7 +26,7 @@ class RootMeanQuad(Norm):
     """Fourth root of the weighted mean of the fourth powers of row lengths."""
 
     name = "rmq"
-    is_convex = is_monotone_in_lengths = True
+    is_convex = is_smooth = is_monotone_in_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return (sum_k w_k |v_k|^4)^(1/4) over rows v_k with weights w_k."""
@@ -41,6 +41,12 @@ class RootMeanQuad(Norm):
             return np.zeros_like(rows)
         share = np.where(grid.weights > 0.0, lengths(rows) / value, 0.0)
         return np.asarray((grid.weights * share**2)[:, None] * (rows / value))
+
+    def second_derivative(self, grid: Grid, rows: Array) -> tuple[Array, Array, float]:
+        """Return w_k |v_k|^2 / N^3, 2 w_k / N^3 and 3 / N for the norm N."""
+        norm = self.value(grid, rows) or 1.0
+        weights = grid.weights / norm
+        return weights * (lengths(rows) / norm) ** 2, 2.0 * weights / norm**2, 3.0 / norm
 
     def subdifferential(self, grid: Grid, rows: Array, z: Array) -> Subdifferential:
         """Return the gradient as base, or Z at zero rows: the norm is smooth except at zero."""

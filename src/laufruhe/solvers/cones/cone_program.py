@@ -38,6 +38,8 @@ class ConicSolution:
         Multiplier of every sum of terms, if the largest of several is minimised; they add up to one. Else empty.
     prices
         Dual values of the program's rows in the unit of the objective, those of the equations first.
+    by_newton
+        True if Newton's method proved the optimum without a cone program.
     """
 
     x: Array | None
@@ -45,6 +47,7 @@ class ConicSolution:
     solver_seconds: float
     shares: Array = field(default_factory=lambda: np.zeros(0))
     prices: Array = field(default_factory=lambda: np.zeros(0))
+    by_newton: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -228,9 +231,20 @@ def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
     """
     import clarabel
 
-    norm, cones, start = block.norm, block.cones, rows.count
+    norm, cones = block.norm, block.cones
     k, d = norm.constant.shape
-    slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
+    slope, basis = norm.free_slope
+    columns, units = np.arange(problem.size), problem.units
+    if len(basis) < problem.size:
+        # free columns basis x, in the unit of the block (P21)
+        decisions, columns = columns, rows.columns + np.arange(len(basis))
+        rows.columns += len(columns)
+        values = np.concatenate([basis * units / block.unit, -np.eye(len(columns))], axis=1)
+        rows.add(np.arange(len(columns))[:, None], np.append(decisions, columns), values, np.zeros(len(columns)))
+        rows.cones.append(clarabel.ZeroConeT(len(columns)))
+        units = np.full(len(columns), block.unit)
+    start = rows.count
+    slope = slope * (units / block.unit) * cones.factors[:, None, None]
     constant = norm.constant / block.unit * cones.factors[:, None]
     # rows of the program in the order of its cones: the head, then the numbers that it bounds
     width = k * d + 1 if cones.is_single else d + 1
@@ -239,11 +253,10 @@ def _add_norm(rows: ConeRows, block: RowBlock, problem: AffineProblem) -> int:
     right = np.zeros(width * len(heads))
     right[body] = constant
     positions = np.broadcast_to(body[:, :, None], slope.shape)
-    columns = np.broadcast_to(np.arange(problem.size), slope.shape)
     centres = block.centres.ravel()
     rows.add(
         np.concatenate([heads, positions.ravel(), body.ravel()[: len(centres)]]),
-        np.concatenate([block.first + cones.head, columns.ravel(), centres]),
+        np.concatenate([block.first + cones.head, np.broadcast_to(columns, slope.shape).ravel(), centres]),
         np.concatenate([np.full(len(heads), -1.0), -slope.ravel(), np.ones(len(centres))]),
         right,
     )

@@ -27,6 +27,7 @@ from laufruhe.solvers.cones.cone_program import (
     run_clarabel,
 )
 from laufruhe.solvers.cones.equations import equations_of
+from laufruhe.solvers.cones.newton import newton_solution
 
 # at flat optima, decisions are accurate only if the gap is small
 TIGHT = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10}
@@ -69,7 +70,10 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
         terms=tuple((problem.terms[k][0] / weight_unit, problem.terms[k][1]) for k in term_indices),
         limits=tuple(problem.limits[k] for k in limit_indices),
     )
-    solution = _solve_with_few_rows(scaled, equations)
+    newton = newton_solution(scaled) if equations is None else None
+    solution = (
+        _solve_with_few_rows(scaled, equations) if newton is None else ConicSolution(*newton, 0.0, by_newton=True)
+    )
     solution = replace(solution, prices=weight_unit * solution.prices)
     # multipliers of a term that no decision changes are its subgradient
     rows = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
@@ -168,34 +172,3 @@ def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> Con
     best = min(points, key=rank)
     is_contradiction = len(points) <= len(unconfirmed) and rank(best)[0] > 0.0
     return replace(best, x=None) if is_contradiction else best
-
-
-def solve_quadratic(
-    problem: AffineProblem, gradient: Array, curvature: Array, x: Array, damping: float
-) -> tuple[Array, tuple[Array, ...]] | None:
-    """Minimise gradient . (y - x) + (y - x)' curvature (y - x) / 2 over designs y within sets and limits (P10).
-
-    Parameters
-    ----------
-    gradient, curvature, x
-        Shapes (n,), (n, n) and (n,).
-    damping
-        Share of the trace of the curvature that is added to each diagonal element.
-
-    Returns
-    -------
-    y, shape (n,), and the dual rows of the limits; None if Clarabel does not confirm a solution.
-    """
-    without_terms = replace(problem, terms=(), groups=())
-    blocks, starts, rows, _ = build_program(without_terms, None)
-    units, n = without_terms.units, without_terms.size
-    size = float(np.abs(gradient * units).max(initial=0.0)) or 1.0
-    scaled = curvature * np.outer(units, units) / size
-    scaled = scaled + damping * float(np.trace(scaled)) * np.eye(n)
-    quadratic, cost = np.zeros((rows.columns, rows.columns)), np.zeros(rows.columns)
-    quadratic[:n, :n], cost[:n] = np.triu(scaled), gradient * units / size - scaled @ (x / units)
-    raw = run_clarabel(rows, cost, {}, quadratic)
-    if str(raw.status) != "Solved":
-        return None
-    solution = read_solution(without_terms, blocks, starts, raw)
-    return None if solution.x is None else (solution.x, tuple(size * z for z in solution.multipliers.limits))

@@ -32,7 +32,7 @@ from laufruhe.solvers.conclusion import (
 )
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
-from laufruhe.solvers.cones.newton_polish import Optimum, polish
+from laufruhe.solvers.cones.newton_polish import REFINEMENT, Optimum, polish
 from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
@@ -102,7 +102,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
             return failed_result(problem, initial, names, timing)
         return infeasible_result(problem, initial, smallest_conflict(relaxed, names), timing)
     if polished:
-        optimum = polish(model, optimum)
+        optimum = polish(model, optimum, REFINEMENT * optimum.problem.samples)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = evaluate_design(problem, values, cycle_samples)
@@ -117,10 +117,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         bound=bound.value,
         strength=ProofStrength.EXACT,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
-        method=(
-            f"second-order cones at {optimum.samples} angles{optimum.refinement}, "
-            f"dual bound at {optimum.problem.samples}"
-        ),
+        method=f"{optimum.method}, dual bound at {optimum.problem.samples}",
         prices=dict.fromkeys([(limit, "at most") for limit in fixed], Price(0.0, math.inf)) | prices,
         bounds=bounds,
     )
@@ -152,7 +149,10 @@ def _refine(problem: Problem, model: AffineModel, zero_level: float, start_sampl
     # a limit close to the smallest possible mean needs many samples
     maximum = max(MAX_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in until_time_limit(range(maximum + 1)):
-        optimum = allowed_optimum(problem, model, samples, zero_level)
+        # Newton's method on the grid of the next bound may save the larger program
+        optimum = polish(model, best, 2 * samples) if best is not None else None
+        if optimum is None or optimum.gap > problem.tolerance:
+            optimum = allowed_optimum(problem, model, samples, zero_level)
         if optimum is None:
             if _is_feasible(problem, best):
                 return best, samples
@@ -216,7 +216,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, zero_level: flo
     has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
     peak_model = model.at(fine.samples, finer=True) if has_peaks else fine
     gap = gap_of(peak_model.objective(x), bound.value, zero_level)
-    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level)
+    return Optimum(x, bound, fine, gap, peak_model.violation(x), samples, zero_level, solution.by_newton)
 
 
 def tighten_limits(affine: AffineProblem, margin: float) -> AffineProblem:
