@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 from laufruhe.numerics.norms import Norm
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, open_kinds
@@ -21,6 +23,11 @@ OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.val
 """Channels for which programs of mounts have formulas or a simulation."""
 OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.size_value is not None)
 """Channels that depend on the sizes of an engine only."""
+
+
+def imported(address: str) -> Callable[[Problem], Result]:
+    """Return a solver by its address `module:function`, which is imported when the solver is called."""
+    return partial(call_by_name, address)
 
 
 def is_no_number(channel: Channel) -> bool:
@@ -52,7 +59,7 @@ class Method:
     strength
         Kind of proof that its lower bounds can give.
     solver
-        Return the best design with its certificate. The function imports its module when it is called.
+        Return the best design with its certificate; `imported` returns one whose module is imported when it is called.
     refines_fidelity
         True if a better fidelity is chosen when the design needs it (F11).
     known_channels

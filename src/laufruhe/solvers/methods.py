@@ -30,11 +30,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, ProofStrength
-from laufruhe.solvers.attainable_limits import with_attainable_limits
-from laufruhe.solvers.boxes.flywheel import solve_flywheel
-from laufruhe.solvers.boxes.leads import solve_leads, solve_shared_leads
 from laufruhe.solvers.boxes.place_boxes import without_places
-from laufruhe.solvers.boxes.places import solve_places, solve_places_with
 from laufruhe.solvers.conclusion import (
     FEASIBILITY_TOL,
     ProofData,
@@ -46,25 +42,22 @@ from laufruhe.solvers.conclusion import (
     with_constant_limits,
     without_proof,
 )
-from laufruhe.solvers.cones.equal_designs import free_decisions
-from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_polished
 from laufruhe.solvers.decomposition import is_separable, solve_decomposed
-from laufruhe.solvers.general import solve_by_local_programs
-from laufruhe.solvers.lexicographic import solve_lexicographic
-from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, imported, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
-from laufruhe.solvers.stars.even_search import refuse_long
-from laufruhe.solvers.stars.phasing_solver import solve_phasing
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
-from laufruhe.solvers.walk import check_by_walk
 
 OPTIONAL_PACKAGES = ("casadi", "clarabel", "cvxpy")
 """Optional packages that some methods import."""
 TIME_LIMIT_NOTE = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
+_HERE = "laufruhe.solvers"
+_SOLVE_CONES = imported(f"{_HERE}.cones.unbalances:solve_polished")
+_SOLVE_STARS = imported(f"{_HERE}.stars.phasing_solver:solve_phasing")
+_SOLVE_JOINT = imported(f"{_HERE}.mounts.nonlinear:solve_joint")
 
 
 def solve_separable(problem: Problem) -> Result:
@@ -74,6 +67,8 @@ def solve_separable(problem: Problem) -> Result:
 
 def solve_with_places(problem: Problem) -> Result:
     """Return the best positions of shafts, with a bound by the method that decides all other numbers."""
+    from laufruhe.solvers.boxes.places import solve_places_with
+
     method = _method(without_places(problem))
     # `Method.solve` refines the fidelity, so the inner solver does not
     return solve_places_with(problem, method.solver, method.name, solve_all_numbers)
@@ -85,19 +80,9 @@ def _closes_without_places(problem: Problem) -> bool:
 
 def solve_all_numbers(problem: Problem, starts: Sequence[Sequence[Value]] = ()) -> Result:
     """Return the best local optimum of all open numbers, with cone programs for those in which loads are affine."""
-    return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is solve_polished, starts)
+    from laufruhe.solvers.general import solve_by_local_programs
 
-
-def _solve_joint(problem: Problem) -> Result:
-    from laufruhe.solvers.mounts.nonlinear import solve_joint
-
-    return solve_joint(problem)
-
-
-def _solve_star_mounts(problem: Problem) -> Result:
-    from laufruhe.solvers.mounts.stars import solve_star_mounts
-
-    return solve_star_mounts(problem)
+    return solve_by_local_programs(problem, _solve_reduced, lambda part: _method(part).solver is _SOLVE_CONES, starts)
 
 
 def _distinguishes_stars(problem: Problem) -> bool:
@@ -121,23 +106,25 @@ _CORE: tuple[Method, ...] = (
         proves="the value itself",
     ),
     Method(
-        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT, solve_flywheel,
+        "boxes of the flywheel", {Kind.FLYWHEEL: ()}, ProofStrength.EXACT,
+        imported(f"{_HERE}.boxes.flywheel:solve_flywheel"),
         known_channels=frozenset(OF_FLYWHEEL),
         accepts_constant=lambda _: False,
         proves="the optimum",
     ),
     Method(
-        "second-order cones", {**_UNBALANCES, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, solve_polished,
+        "second-order cones", {**_UNBALANCES, Kind.SHARE: _AFFINE}, ProofStrength.EXACT, _SOLVE_CONES,
         refines_fidelity=True,
         proves="the optimum",
     ),
     Method(
-        "second-order cones of pistons", {**_UNBALANCES, Kind.PISTON: _AFFINE}, ProofStrength.EXACT, solve_polished,
+        "second-order cones of pistons", {**_UNBALANCES, Kind.PISTON: _AFFINE}, ProofStrength.EXACT, _SOLVE_CONES,
         refines_fidelity=True,
         proves="the optimum",
     ),
     Method(
-        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT, solve_leads,
+        "boxes of leads", {**_UNBALANCES, Kind.LEAD: _SHIFT}, ProofStrength.EXACT,
+        imported(f"{_HERE}.boxes.leads:solve_leads"),
         refines_fidelity=True,
         known_channels=frozenset({IRREGULARITY}),
         accepts_norm=is_pointwise,
@@ -145,7 +132,8 @@ _CORE: tuple[Method, ...] = (
         proves="the optimum, as far as the boxes go (P13)",
     ),
     Method(
-        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT, solve_shared_leads,
+        "boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.EXACT,
+        imported(f"{_HERE}.boxes.leads:solve_shared_leads"),
         refines_fidelity=True,
         known_channels=frozenset({MOUNT_FORCE, *OF_BLOCK}),
         accepts_norm=is_pointwise,
@@ -154,14 +142,15 @@ _CORE: tuple[Method, ...] = (
         proves="the optimum, as far as the boxes go (P15)",
     ),
     Method(
-        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT, solve_places,
+        "cones over boxes of places", {**_UNBALANCES, Kind.PLACE: _PLACED}, ProofStrength.EXACT,
+        imported(f"{_HERE}.boxes.places:solve_places"),
         refines_fidelity=True,
         known_channels=OF_SHAFT_PLACES,
         accepts_norm=is_pointwise,
         proves="the optimum, as far as the boxes go (P8)",
     ),
     Method(
-        "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, solve_phasing,
+        "stars, each with cones", {Kind.STAR: BUILT, **_UNBALANCES}, ProofStrength.EXACT, _SOLVE_STARS,
         refines_fidelity=True,
         accepts_norm=is_pointwise,
         proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
@@ -174,13 +163,13 @@ _CORE: tuple[Method, ...] = (
         proves="the optimum",
     ),
     Method(
-        "smooth program, boxes of stiffness", {Kind.STIFFNESS: ()}, ProofStrength.PARTIAL, _solve_joint,
+        "smooth program, boxes of stiffness", {Kind.STIFFNESS: ()}, ProofStrength.PARTIAL, _SOLVE_JOINT,
         known_channels=OF_MOUNTS,
         accepts_norm=is_pointwise,
         proves="mostly the optimum of up to four numbers, often of six; else a bound",
     ),
     Method(
-        "smooth program", _MOUNTS, ProofStrength.RELAXED, _solve_joint,
+        "smooth program", _MOUNTS, ProofStrength.RELAXED, _SOLVE_JOINT,
         known_channels=OF_MOUNTS,
         accepts_norm=is_pointwise,
         proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound",
@@ -193,7 +182,8 @@ _CORE: tuple[Method, ...] = (
         proves="what each of them proves",
     ),
     Method(
-        "stars, each with a smooth program", {Kind.STAR: BUILT, **_MOUNTS}, ProofStrength.RELAXED, _solve_star_mounts,
+        "stars, each with a smooth program", {Kind.STAR: BUILT, **_MOUNTS}, ProofStrength.RELAXED,
+        imported(f"{_HERE}.mounts.stars:solve_star_mounts"),
         known_channels=OF_MOUNTS,
         accepts_norm=is_pointwise,
         accepts_problem=_distinguishes_stars,
@@ -262,11 +252,17 @@ def solve(
         result = replace(result, problem=replace(result.problem, origin=problem.origin))
         if reports:
             return without_proof(result, reports[0])
+        from laufruhe.solvers.walk import check_by_walk
+
         result = check_by_walk(problem, result, time.thread_time() - spent)
         if not diagnose or result.status is Status.FEASIBLE:
             return result
         if result.status is Status.OPTIMAL:
+            from laufruhe.solvers.cones.equal_designs import free_decisions
+
             return replace(result, free=free_decisions(result))
+        from laufruhe.solvers.attainable_limits import with_attainable_limits
+
         result = with_attainable_limits(
             result, problem, open_kinds(problem), time.perf_counter() - started, _solve_reduced
         )
@@ -322,7 +318,9 @@ def refuse(problem: Problem) -> None:
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open, but there is no objective; add [objective] or [mounts]")
-    if problem.phasing is not None and _method(problem).solver is solve_phasing:
+    if problem.phasing is not None and _method(problem).solver is _SOLVE_STARS:
+        from laufruhe.solvers.stars.even_search import refuse_long
+
         refuse_long(problem)
 
 
@@ -337,9 +335,11 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
             return reduction.solve(problem, _solve_reduced, partial(_solve_reduced, remaining=remaining[k + 1 :]))
     method, kinds = _method(problem), open_kinds(problem)
     report_progress(method.name)
-    conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS} else ()
-    if conflict:
-        return infeasible_result(problem, evaluate_start(problem), conflict, {})
+    if Kind.MOUNT in method.kinds and kinds <= {*_MOUNTS}:
+        from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
+
+        if conflict := conflict_on_any_mounts(problem):
+            return infeasible_result(problem, evaluate_start(problem), conflict, {})
     closing = _exact_part(problem, kinds, method)
     if closing is None:
         return method.solve(problem)
@@ -350,6 +350,12 @@ def _solve_reduced(problem: Problem, remaining: Sequence[Reduction] | None = Non
 def _refuse_ranks(problem: Problem) -> None:
     for rank in problem.ranks:
         refuse(problem.changed(ranks=(), objective=rank.terms))
+
+
+def _solve_ranks(problem: Problem, decide: Decide, _: Decide) -> Result:
+    from laufruhe.solvers.lexicographic import solve_lexicographic
+
+    return solve_lexicographic(problem, decide)
 
 
 def _constant_limits(problem: Problem) -> list[Limit]:
@@ -412,8 +418,7 @@ class Reduction:
 
 REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("refined sampling", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
-    Reduction("lexicographic objectives", lambda p: bool(p.ranks), lambda p, decide, _: solve_lexicographic(p, decide),
-              _refuse_ranks),
+    Reduction("lexicographic objectives", lambda p: bool(p.ranks), _solve_ranks, _refuse_ranks),
     Reduction("constant limits", lambda p: bool(_constant_limits(p)), _without_constant_limits),
     Reduction("constant objective", _has_constant_objective, _solve_without_decisions),
 )  # fmt: skip

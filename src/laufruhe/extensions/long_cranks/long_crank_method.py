@@ -6,8 +6,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import ProofStrength
-from laufruhe.solvers.method import BUILT, Method, is_pointwise
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.method import BUILT, Method, imported, is_pointwise
 
 
 def _is_long(problem: Problem) -> bool:
@@ -16,17 +15,11 @@ def _is_long(problem: Problem) -> bool:
     return is_long(problem)
 
 
-def _solve_long_cranks(problem: Problem) -> Result:
-    from laufruhe.extensions.long_cranks.long_crank_search import solve_long_cranks
-
-    return solve_long_cranks(problem)
-
-
 LONG_CRANKS = Method(
     "stars of long cranks, each with cones",
     {Kind.STAR: BUILT, Kind.UNBALANCE: (Dependence.AFFINE,)},
     ProofStrength.EXACT,
-    _solve_long_cranks,
+    imported("laufruhe.extensions.long_cranks.long_crank_search:solve_long_cranks"),
     refines_fidelity=True,
     accepts_norm=is_pointwise,
     accepts_problem=_is_long,

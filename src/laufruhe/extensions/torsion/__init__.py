@@ -19,7 +19,7 @@ EXTENSION = Extension(
         "degree of irregularity  torsion=-",
         "flywheel inertia  torsion=+",
     ),
-    methods=(f"{_HERE}.solver:METHOD",),
+    methods=(f"{_HERE}.method:METHOD",),
     sections=(f"{_HERE}.section:SECTION",),
     pictures=(f"{_HERE}.section:MODES", f"{_HERE}.section:RESPONSE"),
 )

@@ -1,4 +1,4 @@
-"""Method for discs, shafts and absorbers of the crankshaft: multistart search and branch and bound (V13)."""
+"""Solver for discs, shafts and absorbers of the crankshaft: multistart search and branch and bound (V13)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.extensions.torsion.boxes import TwistBoxes
-from laufruhe.extensions.torsion.channels import ABSORBER_HEAT, FACTORS, RESONANCES
-from laufruhe.extensions.torsion.machine import TORSION
-from laufruhe.problem.channels import FLYWHEEL_INERTIA, IRREGULARITY
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.branch_and_bound import BoxResult, bisect_box
 from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import FEASIBILITY_TOL, Design, build_result, infeasible_result, witness_of
-from laufruhe.solvers.method import Method, is_pointwise
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import (
     LocalProgram,
@@ -65,14 +61,3 @@ def solve_torsion(problem: Problem) -> Result:
         program, outcome.design, bound, ProofStrength.PARTIAL if is_near else ProofStrength.RELAXED, method
     )
     return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
-
-
-METHOD = Method(
-    "boxes of discs and shafts", {TORSION: ()}, ProofStrength.PARTIAL,
-    solve_torsion,
-    refines_fidelity=True,
-    known_channels=frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}),
-    accepts_norm=is_pointwise,
-    proves="the optimum of root mean squares of two or three; else a local one",
-    before="flywheel, crankshaft and other decisions separately",
-)  # fmt: skip

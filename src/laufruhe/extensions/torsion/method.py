@@ -1,0 +1,19 @@
+"""Method for discs, shafts and absorbers of the crankshaft, one row of the table of methods."""
+
+from __future__ import annotations
+
+from laufruhe.extensions.torsion.channels import ABSORBER_HEAT, FACTORS, RESONANCES
+from laufruhe.extensions.torsion.machine import TORSION
+from laufruhe.problem.channels import FLYWHEEL_INERTIA, IRREGULARITY
+from laufruhe.prove.certificate import ProofStrength
+from laufruhe.solvers.method import Method, imported, is_pointwise
+
+METHOD = Method(
+    "boxes of discs and shafts", {TORSION: ()}, ProofStrength.PARTIAL,
+    imported("laufruhe.extensions.torsion.solver:solve_torsion"),
+    refines_fidelity=True,
+    known_channels=frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}),
+    accepts_norm=is_pointwise,
+    proves="the optimum of root mean squares of two or three; else a local one",
+    before="flywheel, crankshaft and other decisions separately",
+)  # fmt: skip
