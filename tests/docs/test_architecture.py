@@ -6,9 +6,11 @@ import ast
 import inspect
 import re
 import tomllib
+from functools import partial
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
+from pkgutil import resolve_name
 
 import pytest
 
@@ -42,7 +44,9 @@ def test_methods_say_what_they_prove() -> None:
 @pytest.mark.slow
 def test_every_method_imports_a_function_that_exists() -> None:
     for method in METHODS:
-        assert callable(method.solver)
+        if isinstance(method.solver, partial):
+            assert callable(resolve_name(*method.solver.args))
+            continue
         for node in ast.walk(ast.parse(inspect.getsource(method.solver))):
             if isinstance(node, ast.ImportFrom):
                 assert all(callable(getattr(import_module(node.module), alias.name)) for alias in node.names)

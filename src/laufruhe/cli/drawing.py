@@ -67,6 +67,14 @@ def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Cal
     """
     if not kinds:
         return dict
+    from laufruhe.present.measures import evaluations_with_loads, places_of
+    from laufruhe.problem.evaluation import place_measures
+
+    # both processes need these measures, and the copy has what is computed
+    for places in places_of(result):
+        for design in evaluations_with_loads(result):
+            for k in range(len(design.loads)):
+                place_measures(design, k, places.channel)
     # functions that read and solve have no pickle
     problem = replace(result.problem, origin=None)
     if problem.phasing is not None:

@@ -51,8 +51,9 @@ def write_results(
         files.write(stage / files.PAGE, as_html(document, pictures, live))
         with timed(result.timing, "tables"):
             tables()
+    text = as_json(result, request.series)
     for place in filter(None, (stage / files.RESULT, copy)):
-        files.write(place, as_json(result, request.series))
+        files.write(place, text)
 
 
 def show(request: Request, result: Result, folder: Path) -> None:

@@ -37,7 +37,7 @@ class Waves:
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
         smallest = np.argsort(size, kind="stable")
         left_out = smallest[np.cumsum(size[smallest]) <= ZERO * size.max(initial=0.0)]
-        used = np.setdiff1d(np.arange(len(size)), left_out)
+        used = np.delete(np.arange(len(size)), left_out)
         return cls(used, coefficients[used])
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import platform
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi")
 
 
+@cache
 def version_of(package: str) -> str:
     """Return the installed version of a package."""
     try:
