@@ -65,12 +65,12 @@ def test_init_with_nobody_to_ask_says_what_to_do(here: Path) -> None:
     ("typed", "cylinders"),
     [
         ("\nMy four\n\n\n\n\n\n\n\n\n\n", 4),
-        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n0.4 kg\n", 2),
-        ("\nMy six\nvee\n\n6\n60\n60\n1-6-3-5-2-4\n\n\n\n\n\n", 6),
+        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n\n\n0.4 kg\n", 2),
+        ("\nMy six\nvee\n\n6\n60\n60\none bank after the other\nleft\n1-6-3-5-2-4\n\n\n\n\n\n", 6),
         ("\nMy single\n\n\n1\n\n\n\n\n", 1),
         # two cylinders on one throw have no neighbours
-        ("\nMy two\nboxer\n\n2\n\n1-2\n\n\n0.3\n0.4 kg\n", 2),
-        ("\nMy ten\nvee\n\n10\n\n\n-\n0, 144, 216, 288, 72\n-\n\n\n\n\n\n", 10),
+        ("\nMy two\nboxer\n\n2\n\n\n\n1-2\n\n\n0.3\n0.4 kg\n", 2),
+        ("\nMy ten\nvee\n\n10\n\n\n\nleft\n-\n0, 144, 216, 288, 72\n-\n\n\n\n\n\n", 10),
     ],
 )
 def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cylinders: int) -> None:
@@ -84,10 +84,10 @@ def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cyli
     ("typed", "said", "count"),
     [
         # an odd number of cylinders in two banks, then an even one
-        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n", "is no multiple of the 2 banks", 4),
+        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n\n\n", "is no multiple of the 2 banks", 4),
         # no even firing of ten cylinders at 90 degrees, nothing in its place, then throws and an order that they allow
-        ("\n\nvee\n\n10\n\n\n1-10-5-7-2-8-3-9-4-6\n\n\n45, 117, 333, 189, 261\n1-2-3-4-5-6-7-8-9-10\n\n\n\n\n\n\n",
-         "cannot be even with these pins and banks", 10),
+        ("\n\nvee\n\n10\n\n\n\nleft\n1-10-5-7-2-8-3-9-4-6\n\n\n45,117,333,189,261\n1-2-3-4-5-6-7-8-9-10\n\n\n\n\n\n\n",
+         "cannot be even: cylinders 1 and 6", 10),
         ("\n\nw\n\n\n\n\n\n\n\n\n\n", "is none of these; use one of", 4),
         ("bmw-b49\n\n\n\n\n\n\n\n\n\n\n\n", "did you mean 'bmw-b48'?", 4),
         ("\n\n\n\nfive\n3\n1-2\n\n\n\n\n\n\n", "must be a whole number", 3),

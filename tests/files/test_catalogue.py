@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.problem import Problem
 from problem_files import loaded
 
+PRINTED = tomllib.loads(Path(__file__).with_name("makers_engines.toml").read_text(encoding="utf-8"))
 POINT = '[[operating_points]]\nspeed = "3000 rpm"\n'
 
 
@@ -58,9 +60,59 @@ def test_cranks_fire_as_their_makers_say(key: str, intervals: list[float], tmp_p
 
 def test_cross_plane_engines_of_three_makers_have_one_crank(tmp_path: Path) -> None:
     """Their firing orders differ, and were published in three ways of numbering."""
-    stars = [[part.throw for part in _problem(tmp_path, key).engine.cylinders] for key in (
-        "chevrolet-350", "chevrolet-ls1", "ford-302", "ford-modular-4-6", "mercedes-m113-5-0")]  # fmt: skip
+    stars = []
+    for key in ("chevrolet-350", "chevrolet-ls1", "ford-302", "ford-modular-4-6", "mercedes-m113-5-0"):
+        parts = sorted(_problem(tmp_path, key).engine.cylinders, key=lambda part: (-part.x, part.bank))
+        stars.append([math.degrees(part.throw - parts[0].throw) % 360.0 for part in parts])
     assert all(star == pytest.approx(stars[0]) for star in stars)
+
+
+@pytest.mark.parametrize(
+    ("key", "printed"),
+    [
+        ("chevrolet-350", "gm_chevysbg1_v8_350_l31"),
+        ("chevrolet-ls1", "gm_chevysbg3_v8_ls1"),
+        ("ford-modular-4-6", "ford_modularv8_2v46_mustangpi"),
+        ("buick-231-odd-fire", "gm_buickv6f1_225"),
+        ("buick-3800", "gm_buickv6s2_l36_fbody"),
+        ("porsche-911-2-0", "porsche_h6_m64_21"),
+        ("ferrari-f136", "ferrari_v8_f136_e"),
+        ("rolls-royce-merlin", "hand-merlin"),
+        ("yamaha-trx850", "hand-yamaha-trx"),
+        ("bmw-m52-2-8", "bmw_m54b30"),
+        ("cummins-6bt", "cummins_isb"),
+        ("mercedes-om605", "gm_atlas5_llr"),
+    ],
+)
+def test_numbers_banks_and_firings_are_those_that_makers_print(key: str, printed: str, tmp_path: Path) -> None:
+    """Every cylinder has the bank of its printed number, and fires as far after cylinder 1 (makers_engines.toml)."""
+    engine = PRINTED[printed]
+    parts, order = _problem(tmp_path, key).engine.cylinders, engine["order"]
+    intervals = engine.get("intervals", [720.0 / len(order)] * len(order))
+    for place, number in enumerate(order):
+        part = parts[number - 1]
+        fires = math.degrees(part.firing_angle - parts[order[0] - 1].firing_angle)
+        assert math.remainder(fires - sum(intervals[:place]), 720.0) == pytest.approx(0.0, abs=1e-6)
+        assert part.bank == 0.0 or math.copysign(1.0, part.bank) == math.copysign(1.0, engine["banks"][number - 1])
+
+
+@pytest.mark.parametrize("key", ["subaru-ej20", "subaru-ee20", "lycoming-o-320"])
+def test_flat_fours_fire_1_3_2_4_with_opposed_pistons_in_step(key: str, tmp_path: Path) -> None:
+    """Odd numbers stand on one side; 1 and 2, 3 and 4 are opposed and have dead centres at once."""
+    parts = _problem(tmp_path, key).engine.cylinders
+    fires = [math.degrees(part.firing_angle) for part in parts]
+    assert [round(angle - fires[0]) % 720 for angle in fires] == [0, 360, 180, 540]
+    assert parts[0].bank == parts[2].bank == -parts[1].bank == -parts[3].bank
+    assert abs(parts[0].x - parts[1].x) < abs(parts[0].x - parts[3].x)
+    # the propeller is at the flywheel end
+    front = key != "lycoming-o-320"
+    assert (parts[0].x > parts[2].x) == front
+
+
+def test_no_engine_of_the_catalogue_warns_about_its_order(tmp_path: Path) -> None:
+    for key in engines():
+        warnings = _problem(tmp_path, key).plausibility_warnings
+        assert not [warning for warning in warnings if warning.where == "engine.firing_order"], key
 
 
 def test_what_a_problem_says_itself_counts(tmp_path: Path) -> None:

@@ -111,13 +111,13 @@ class TestFiringIntervals:
             ((0, 180), Cycle.FOUR_STROKE, (180, 540)),
             ((0, 360), Cycle.FOUR_STROKE, (360, 360)),
             ((0,), Cycle.TWO_STROKE, (360,)),
-            ((450, 0, 270, 180), Cycle.FOUR_STROKE, (180, 90, 180, 270)),
+            ((450, 0, 270, 180), Cycle.FOUR_STROKE, (270, 180, 90, 180)),
         ],
     )
     def test_from_each_firing_to_the_next(
         self, fires: tuple[int, ...], cycle: Cycle, intervals: tuple[int, ...]
     ) -> None:
-        """In the order of firing, back to the first: they add up to the cycle."""
+        """In the order of firing from cylinder 1, back to it: they add up to the cycle."""
         parts = tuple(
             replace(PART, name=f"{k}", x=float(k), throw=math.radians(-f), firing_angle=math.radians(f))
             for k, f in enumerate(fires)

@@ -17,6 +17,7 @@ from laufruhe.files.catalogue import as_text as written
 from laufruhe.files.catalogue import engines
 from laufruhe.files.complaints import nearest
 from laufruhe.files.drafts import engine_of_table
+from laufruhe.files.numbering import ALTERNATING, BY_BANK
 from laufruhe.machine.layouts import LAYOUTS
 
 Answers: TypeAlias = Mapping[str, Any]
@@ -42,6 +43,8 @@ _QUESTIONS = (
     _Question("bank_angle", "Angle between the banks [deg]", "90"),
     _Question("split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0"),
     _Question("bank_stagger", "Distance between opposed cylinders along the crank", "40 mm"),
+    _Question("numbering", "Numbers of the cylinders", BY_BANK, choices=(BY_BANK, ALTERNATING)),
+    _Question("first_bank", "Bank of cylinder 1, seen from the flywheel", "left", choices=("left", "right")),
     _Question("firing_order", "Firing order (or - to enter the angles of the throws)"),
     _Question("throws", "Angles of the throws from front to rear [deg], as in 0, 180, 180, 0"),
     _Question("firing_order", "Firing order of these throws, or - for each cylinder at its first dead centre"),
@@ -60,10 +63,8 @@ def ask_engine() -> tuple[str, dict[str, Any]]:
     for question in _QUESTIONS:
         if _applies(question.key, answers):
             hint, usual = f" ({', '.join(question.choices)})" if question.choices else "", question.usual
-            if question.key == "firing_order":
-                usual = _usual_order(answers)
-                if LAYOUTS[answers["layout"]].takes("bank_stagger"):
-                    hint = f" (1 to {answers['cylinders'] // 2} are the left bank, front to rear)"
+            if question.key in ("numbering", "first_bank", "firing_order"):
+                usual = _usual_in_catalogue(question, answers)
             answers[question.key] = ask(f"{question.words}{hint}", usual, partial(_read, question, dict(answers)))
     return title, {key: value for key, value in answers.items() if value != []}
 
@@ -94,6 +95,8 @@ def _applies(key: str, answers: Answers) -> bool:
     return {
         "bank_angle": kind.takes(key),
         "split_pin_angle": kind.takes(key),
+        "numbering": kind.banks > 1,
+        "first_bank": kind.banks > 1,
         # banks on common throws may lie in one plane
         "bank_stagger": kind.takes(key) and kind.cylinders_per_throw == 1,
         "firing_order": several and ("firing_order" not in answers or (unordered and "throws" in answers)),
@@ -135,12 +138,15 @@ def _check(answers: Answers) -> None:
             raise InputError(error.source, tuple(blamed)) from None
 
 
-def _usual_order(answers: Answers) -> str:
-    # the order is that of the first possible engine of the catalogue
-    for engine in engines().values():
-        order = engine.engine.get("firing_order", ())
-        if engine.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:
+def _usual_in_catalogue(question: _Question, answers: Answers) -> str:
+    """Return the answer of the first possible engine of the catalogue, or the usual one."""
+    numbers = {key: answers[key] for key in ("numbering", "first_bank") if key in answers}
+    usual = {other.key: other.usual for other in _QUESTIONS}
+    for engine in (entry.engine for entry in engines().values()):
+        is_alike = engine["layout"] == answers["layout"] and len(engine.get("firing_order", ())) == answers["cylinders"]
+        value = engine.get(question.key, question.usual)
+        if is_alike and value and all(engine.get(key, usual[key]) == answer for key, answer in numbers.items()):
             with suppress(InputError):
-                _check({**answers, "firing_order": order})
-                return written(order)
-    return ""
+                _check({**answers, question.key: value})
+                return written(value) if not question.choices or value in question.choices else question.usual
+    return question.usual

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field
@@ -13,16 +14,27 @@ from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, nearest, refuse_keys, require_one_of
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
+from laufruhe.files.numbering import REVERSED, Scheme, place_order
 from laufruhe.files.rotors import CounterweightTable, check_factors
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.engine import parts_with_leads
 from laufruhe.machine.facing import minimum_room, with_shared_chambers
-from laufruhe.machine.layouts import LAYOUTS, Layout, LayoutInput, LayoutKind, Mechanism, Throw, even_throws, rod_of
-from laufruhe.numerics.exact_angles import direction
+from laufruhe.machine.layouts import (
+    LAYOUTS,
+    Layout,
+    LayoutInput,
+    LayoutKind,
+    Mechanism,
+    Throw,
+    angles_in_order,
+    even_throws,
+    rod_of,
+)
+from laufruhe.numerics.exact_angles import as_turn, direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
-FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
+FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrWord(list[CylinderNumber], "[1, 3, 4, 2]")]
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
 _OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(option.name for option in k.keys), *k.lists)))
@@ -99,6 +111,10 @@ _KINDS: dict[str, Any] = {
     "cylinder": CylinderNumber,
     "sign": Literal[1, -1],
     "rod": RodTable,
+    "numbering": Scheme,
+    "bank": Literal["left", "right"],
+    "end": Literal["front", "flywheel"],
+    "rotation": Literal["clockwise", "counter-clockwise"],
 }
 
 
@@ -123,10 +139,14 @@ class EngineTable(Table):
     cycle: Literal["two-stroke", "four-stroke"]
     cylinders: CylinderNumber | None = f.optional("Number of cylinders; by default that of throws or firing order.")
     bore: f.PositiveLength | None = f.optional("Diameter of the cylinder; needed with gas.")
-    stroke: f.PositiveLength | None = None
+    stroke: f.PositiveLength | None = f.optional(
+        "Travel of the piston; with an offset a little more than twice the crank radius."
+    )
     rod_ratio: f.NonNegative | None = f.optional("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.OpenPositiveLength | None = None
-    offset: f.Length = f.optional("Distance of the piston pin's path from the crank axis.", 0.0)
+    offset: f.Length = f.optional(
+        "Distance of the piston pin's path from the crank axis; with row_angle to the outer side of every row.", 0.0
+    )
     reciprocating_mass: f.OpenMass | None = f.optional(
         "Reciprocating mass of a cylinder, with the rod's share unless [engine.rod] is given."
     )
@@ -136,6 +156,10 @@ class EngineTable(Table):
     rod_inertia_deficit: f.Inertia = f.optional("Inertia of the rod less that of two masses at its ends.", 0.0)
     throws: f.Throws | None = f.optional('Angles of the throws at phi = 0, or "open"; by default those of even firing.')
     firing_order: FiringOrder | None = None
+    firing_intervals: list[f.Angle] | None = f.optional(
+        "Crank angles from each firing of firing_order to the next; by default each cylinder fires at its first dead "
+        "centre after the one before."
+    )
     fires_together: bool = f.optional("Whether cylinders are meant to fire at once; else you are asked.", False)
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
@@ -219,17 +243,20 @@ def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: boo
 def _check_pistons(table: EngineTable) -> None:
     if table.kind.has_pistons:
         for key in ("stroke", "reciprocating_mass"):
-            if getattr(table, key) is None:
+            values = [getattr(part, key) for part in table.slider_cranks] or [None]
+            if getattr(table, key) is None and None in values:
                 raise Refused(f"engine.{key}", None, "is missing", "add it")
     else:
         refuse_keys(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
 
 
 def layout_of(table: EngineTable) -> Layout:
-    """Return the layout of [engine]: positions, banks and pins, without masses."""
+    """Return the layout of [engine]: positions, banks and pins by the cylinder numbers of the file, without masses."""
     _check_pistons(table)
     with errors_at_key("engine.cylinders"):
-        return table.kind.place(_layout_input(table))
+        inputs = _layout_input(table)
+        layout = table.kind.place(inputs)
+        return layout if list(inputs.places) == sorted(inputs.places) else layout.renumbered(inputs.places)
 
 
 def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
@@ -252,7 +279,30 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
             raise Refused(f"engine.{key}", None, rule, "make the two numbers agree")
     check_order(table.listed_order, count)
     mechanism, rod = _mechanism(table, numbers)
-    return LayoutInput(cycle_of(table), count, mechanism, numbers | rods, order, table.piston_mass, rod, gas)
+    stagger = numbers.get("bank_stagger")
+    if stagger and table.value_of("rotation") == REVERSED:
+        # the layout is the mirror image of the engine
+        numbers["bank_stagger"] = -stagger
+    cycle, places = cycle_of(table), place_order(table, table.kind, count)
+    intervals = _intervals(table, cycle)
+    return LayoutInput(cycle, count, mechanism, numbers | rods, places, order, intervals, table.piston_mass, rod, gas)
+
+
+def _intervals(table: EngineTable, cycle: Cycle) -> tuple[float, ...]:
+    """Return the firing intervals of the file [rad]; empty if it gives none."""
+    intervals, where = table.firing_intervals, "engine.firing_intervals"
+    if intervals is None:
+        return ()
+    degrees = [round(math.degrees(angle), 6) for angle in intervals]
+    if table.listed_order is None or len(intervals) != len(table.listed_order):
+        rule = "needs a firing_order with as many cylinders, whose firings it lies between"
+        raise Refused(where, degrees, rule, "give one interval for each cylinder")
+    if min(intervals) < 0.0 or abs(sum(intervals) - cycle.angle) > 1e-9:
+        rule = f"adds up to {sum(degrees):g} deg" if min(intervals) >= 0.0 else "has a negative interval"
+        raise Refused(
+            where, degrees, rule, f"give intervals that make the {math.degrees(cycle.angle):g} deg of a cycle"
+        )
+    return tuple(intervals)
 
 
 def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
@@ -283,8 +333,9 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
         if len(layout.throw_positions) == 1:
             return (layout.banks[0] - layout.pin_offsets[0],)
         raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
+    cycle = cycle_of(table)
     with errors_at_key("engine.firing_order"):
-        return even_throws(cycle_of(table), layout, table.listed_order)
+        return even_throws(cycle, layout, table.listed_order, _intervals(table, cycle))
 
 
 def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
@@ -378,7 +429,23 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             first = (part.bank_angle - part.throw) / carrying_shaft.ratio % (math.tau / abs(carrying_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
             parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, carrying_shaft))
+    parts = _in_order(table, parts)
     return parts_with_leads(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
+
+
+def _in_order(table: EngineTable, parts: list[SliderCrank]) -> list[SliderCrank]:
+    # a firing order counts the slider-cranks of a free list as they stand
+    if table.listed_order is None:
+        return parts
+    check_order(table.listed_order, len(parts))
+    for k, row in enumerate(table.slider_cranks, 1):
+        if row.firing_angle is not None:
+            rule = "is given twice, also by engine.firing_order"
+            raise Refused(f"engine.slider_cranks[{k}].firing_angle", None, rule, "leave one of the two out")
+    cycle, centres = cycle_of(table), [as_turn(part.firing_angle) for part in parts]
+    with errors_at_key("engine.firing_order"):
+        angles = angles_in_order(cycle, centres, table.listed_order, _intervals(table, cycle))
+    return [replace(part, firing_angle=angle) for part, angle in zip(parts, angles, strict=True)]
 
 
 def piston_masses(

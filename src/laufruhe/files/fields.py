@@ -192,28 +192,32 @@ def _without_note(text: str) -> str:
 
 
 @dataclass(frozen=True)
-class OrOpen:
-    """Pydantic field that reads a list of the type `inner`, the word "open", or the name of a list in `named`."""
+class OrWord:
+    """Pydantic field that reads a list of the type `inner`, one of some words, or the name of a list in `named`."""
 
     inner: Any
     example: str
     named: tuple[tuple[str, tuple[float, ...]], ...] = ()
+    words: tuple[str, ...] = ("open",)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_wrap_validator_function(self._read, handler.generate_schema(self.inner))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"enum": ["open", *dict(self.named)]} if self.named else {"const": "open"}]}
+        words = [*self.words, *dict(self.named)]
+        return {"anyOf": [handler(schema), {"enum": words} if len(words) > 1 else {"const": words[0]}]}
 
     def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
         if isinstance(raw, str):
-            if raw == "open":
+            if raw in self.words:
                 return raw
             if raw in dict(self.named):
                 return inner(list(dict(self.named)[raw]))
-            names = ", ".join(f'"{name}"' for name, _ in self.named)
-            alternatives = f', "open" or a name: {names}' if names else ' or "open"'
-            raise refusal(f'is neither a list nor "open"; write for example {self.example}{alternatives}')
+            words, names = [f'"{word}"' for word in self.words], ", ".join(f'"{name}"' for name, _ in self.named)
+            alternatives = f", {' or '.join(words)} or a name: {names}" if names else f" or {' or '.join(words)}"
+            raise refusal(
+                f"is neither a list nor {' nor '.join(words)}; write for example {self.example}{alternatives}"
+            )
         return inner(raw)
 
 
@@ -308,7 +312,7 @@ Side: TypeAlias = Annotated[
     str | float, PlainValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
 ]
 Throws: TypeAlias = Annotated[
-    list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]", tuple(CRANKS.items()))
+    list[float | Open] | Literal["open"], OrWord(list[OpenAngle], "[0, 180, 180, 0]", tuple(CRANKS.items()))
 ]
 _LINE, _SLUG, _SHARE, _FORMAT = r"^[^\t\n]+$", "^[a-z0-9][a-z0-9-]*$", r"^\d+(\.\d+)? ?%$", r"^(#?(\.\d)?[efg])?$"
 FORMS = {

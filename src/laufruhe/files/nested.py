@@ -89,7 +89,7 @@ def _inside(annotation: Any, part: str | int) -> list[Any]:
     if isinstance(annotation, f.ListOrSingle):
         # the value is a list, or a single table without a list
         return [annotation.inner, *_inside(annotation.inner, part)]
-    if isinstance(annotation, f.OrOpen):
+    if isinstance(annotation, f.OrWord):
         return _inside(annotation.inner, part)
     # the members are those of a union, or an annotated type and its notes
     return [inner for member in get_args(annotation) for inner in _inside(member, part)]

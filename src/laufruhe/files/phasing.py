@@ -84,6 +84,12 @@ def open_phasing(
         if key not in engine.kind.openable and _has_open(engine.value_of(key)):
             allowed = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
             raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {allowed}")
+    if engine.firing_intervals is not None:
+        rule, remedy = "cannot stand beside open throws, orders, angles or shafts", "give intervals in [phasing]"
+        raise Refused("engine.firing_intervals", None, rule, remedy)
+    if engine.kind.takes("row_angle") and engine.value_of("row_angle") and engine.listed_throws is None:
+        rule, remedy = "cannot stand beside open throws, whose rows would differ", "give throws, or leave it out"
+        raise Refused("engine.row_angle", None, rule, remedy)
     counts = [count for _, count in cylinder_counts(engine)]
     counts += [len(engine.slider_cranks)] if engine.kind.is_free else []
     if not counts:
@@ -155,6 +161,8 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
 
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
     # the order is that of the file, or that of the first dead centres of given throws
+    if engine.kind.is_free:
+        return None
     if engine.listed_order is not None:
         return tuple(engine.listed_order)
     throws = engine.listed_throws

@@ -23,11 +23,13 @@ from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, complaints_of, errors_in_file, key_path, nearest_file
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import with_fidelity
+from laufruhe.files.firing_orders import explained_orders, order_warnings
 from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.measures import MeasureContext, limits_of, objectives_of
 from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import plain, walk, with_value_at
+from laufruhe.files.numbering import sense_of
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, open_phasing
 from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
@@ -91,7 +93,10 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             for note in reversed(notes()):
                 closed, parts[note] = note.part(closed)
             file = file_model().model_validate(with_followers(closed))
-            problem = _of_file(file, path)
+            with explained_orders(file.engine):
+                problem = _of_file(file, path)
+            if problem.phasing is None:
+                problem = replace(problem, warnings=order_warnings(file.engine))
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
                 problem_of_star = replace(problem_of_star, rebuild=partial(_rebuilt, closed, path, candidate))
@@ -261,7 +266,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         points=points,
         decisions=(*loads, *on_mounts.decisions, *wheel_decisions),
         source=file.source,
-        assumptions=(*file.assumptions, *(brake.said if brake else ())),
+        assumptions=(*file.assumptions, *sense_of(table), *(brake.said if brake else ())),
         tolerance=file.tolerance,
         mount_numbers=on_mounts.numbers,
         search=Search(**file.search.model_dump()),

@@ -161,9 +161,10 @@ class Engine:
 
     @property
     def firing_intervals(self) -> tuple[float, ...]:
-        """Crank angles from each firing to the next over a cycle [rad]."""
+        """Crank angles from each firing to the next over a cycle [rad], the first from that of cylinder 1."""
         cycle_turns = self.cycle.turns
-        turns = sorted(reduced_turn(as_turn(part.firing_angle), cycle_turns) for part in self.cylinders)
+        fires = [as_turn(part.firing_angle) for part in self.cylinders]
+        turns = sorted(reduced_turn(turn - fires[0], cycle_turns) for turn in fires)
         following = [*turns[1:], turns[0] + cycle_turns] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
 

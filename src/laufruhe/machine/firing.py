@@ -95,7 +95,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     """
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
-    if len(set(pins)) > 1:
+    if len({tuple(sorted(pin)) for pin in pins}) > 1:
         raise NoEvenStarError(
             "open throws need the same arrangement of cylinders on every throw; use layout inline or vee"
         )

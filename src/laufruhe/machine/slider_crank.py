@@ -291,6 +291,16 @@ class SliderCrank:
         return 4.0 * self.rod_length * self.crank_radius / (top + bottom)
 
 
+@dataclass(frozen=True)
+class OffsetCrank(SliderCrank):
+    """Slider-crank with an offset that fires at its true dead centre, as in a row of a narrow-angle bank."""
+
+    @property
+    def fires_at(self) -> float:
+        """Local crank angle of the highest piston position [rad] (G2)."""
+        return self.dead_centres[0]
+
+
 def as_kind(kind: type[P], part: SliderCrank, **numbers: Any) -> P:
     """Return a slider-crank as a mechanism of another class, with the fields that only this has."""
     return kind(**{shared.name: getattr(part, shared.name) for shared in fields(part)}, **numbers)

@@ -154,6 +154,8 @@ class Problem:
         Objectives in order of priority, the first equal to `objective`; empty for a single objective.
     fires_together
         True if cylinders are meant to fire at once.
+    warnings
+        Warnings about the file, which stop nothing.
     friction
         Friction measurements that turn loads at the brake into indicated loads.
     known_rows
@@ -181,6 +183,7 @@ class Problem:
     sharply: bool = False
     ranks: tuple[PriorityLevel, ...] = ()
     fires_together: bool = False
+    warnings: tuple[Complaint, ...] = ()
     friction: tuple[FrictionTest, ...] = ()
     known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)
     rebuild: Rebuild = field(default=no_file, compare=False, repr=False)
@@ -218,8 +221,9 @@ class Problem:
 
     @property
     def plausibility_warnings(self) -> tuple[Complaint, ...]:
-        """Plausibility warnings about unusual numbers, which stop nothing."""
-        return plausibility_warnings(self.engine, self.points, self.fires_together or self.phasing is not None)
+        """Warnings about the file and about unusual numbers, which stop nothing."""
+        allowed = self.fires_together or self.phasing is not None
+        return (*self.warnings, *plausibility_warnings(self.engine, self.points, allowed))
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:

@@ -103,7 +103,8 @@ def fired(result: Result) -> str:
     if len(engine.cylinders) < 2:
         return ""
     firing = has_firing(result)
-    turns = [float(reduced_turn(as_turn(part.firing_angle), engine.cycle.turns)) for part in engine.cylinders]
+    fires = [as_turn(part.firing_angle) for part in engine.cylinders]
+    turns = [float(reduced_turn(turn - fires[0], engine.cycle.turns)) for turn in fires]
     order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"

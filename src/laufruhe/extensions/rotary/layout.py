@@ -11,7 +11,7 @@ from laufruhe.errors import KeyedError
 from laufruhe.extensions.rotary.unit import FLANKS, RotaryUnit
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.banks import Inline
-from laufruhe.machine.layouts.base import SPACING, LayoutKey
+from laufruhe.machine.layouts.base import LayoutKey
 from laufruhe.machine.layouts.build import Mechanism
 
 
@@ -21,7 +21,7 @@ class Rotary(Inline):
     name = "rotary"
     has_pistons = False
     keys = (
-        SPACING,
+        *Inline.keys,
         LayoutKey("eccentricity", "positive length", "Eccentricity of the shaft under every rotor."),
         LayoutKey("rotor_radius", "positive length", "Distance from a rotor's centre to its apexes."),
         LayoutKey("rotor_width", "positive length", "Width along the shaft."),

@@ -174,12 +174,15 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     """Return the discs of the torsional chain, one for each throw from the front, with reduced inertias."""
     places = sorted({throw.x for throw in throws}, reverse=True)
     at = [[k for throw in throws if throw.x == x for k in throw.cylinders] for x in places]
+    # a throw has the number that the file counts it by, which may go from the rear
+    first = [next(k for k, throw in enumerate(throws) if throw.x == x) for x in places]
+    numbers = [sorted(first).index(k) for k in first]
     # the mass of a throw that turns, without its rods
     turning = [sum(abs(throw.unbalance) for throw in throws if throw.x == x) for x in places]
     inertias = _for_each(table.throw_inertia, len(places), "torsion.throw_inertia", "throws")
     dampings = _for_each(table.cylinder_damping, len(places), "torsion.cylinder_damping", "throws")
     discs = []
-    for n, (names, unbalance) in enumerate(zip(at, turning, strict=True)):
+    for n, names, unbalance in zip(numbers, at, turning, strict=True):
         radius = max((parts[k].crank_radius for k in names), default=0.0)
         total = inertias[n] + unbalance * radius + sum(reduced_inertia(parts[k]) for k in names)
         with errors_at_key("torsion.throw_inertia"):

@@ -8,7 +8,15 @@ from collections.abc import Mapping
 from laufruhe.extension import extended
 from laufruhe.machine.layouts.banks import Boxer, Inline, Vee, XEngine, boxer, inline, vee
 from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, Parts, rod_of
-from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
+from laufruhe.machine.layouts.build import (
+    Mechanism,
+    Throw,
+    angles_in_order,
+    build,
+    even_throws,
+    firing_angles,
+    throw_rotors,
+)
 from laufruhe.machine.layouts.delta import Delta
 from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_pistons
 from laufruhe.machine.layouts.places import Layout, stations
@@ -26,6 +34,7 @@ __all__ = [
     "LayoutKind",
     "Mechanism",
     "Throw",
+    "angles_in_order",
     "boxer",
     "build",
     "even_throws",

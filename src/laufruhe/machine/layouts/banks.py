@@ -8,8 +8,18 @@ from dataclasses import replace
 from typing import ClassVar
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKey, LayoutKind
+from laufruhe.machine.layouts.base import (
+    FIRST_BANK,
+    FIRST_END,
+    NUMBERING,
+    ROW_ANGLE,
+    SPACING,
+    LayoutInput,
+    LayoutKey,
+    LayoutKind,
+)
 from laufruhe.machine.layouts.places import Layout, stations
+from laufruhe.machine.slider_crank import SliderCrank
 
 STAGGER = LayoutKey("bank_stagger", "length")
 X_BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
@@ -57,15 +67,37 @@ def boxer(cylinders: int, spacing: float, bank_stagger: float) -> Layout:
     return replace(layout, pins=tuple(range(cylinders)), throw_positions=layout.positions)
 
 
+def in_rows(layout: Layout, inputs: LayoutInput) -> Layout:
+    """Return the layout with the cylinders of every bank alternately in two rows.
+
+    A row leans by half of the angle between rows. An offset lies on the outer side of every row, so that pistons reach
+    their dead centre later than the axis says.
+    """
+    angle, mechanism = inputs.options["row_angle"], inputs.mechanism
+    if not angle:
+        return layout
+    # throws are still counted from the front
+    leans = [0.5 * angle * (-1.0) ** pin for pin in layout.pins]
+    layout = replace(layout, banks=tuple(bank + lean for bank, lean in zip(layout.banks, leans, strict=True)))
+    if mechanism.offset == 0.0:
+        return layout
+    if mechanism.kind is not SliderCrank:
+        raise KeyedError("row_angle", "with an offset needs a slider-crank; leave the offset out")
+    offsets = tuple(math.copysign(mechanism.offset, lean * mechanism.offset) for lean in leans)
+    parts = [replace(mechanism, offset=offset).cylinder(1, 0.0, 0.0, 0.0, 0.0) for offset in offsets]
+    return replace(layout, offsets=offsets, firing_delays=tuple(part.dead_centres[0] for part in parts))
+
+
 class Inline(LayoutKind):
     """Single bank with a throw for every cylinder."""
 
     name = "inline"
+    keys: ClassVar[tuple[LayoutKey, ...]] = (SPACING, ROW_ANGLE, *NUMBERING, FIRST_END)
     openable: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
 
     def place(self, inputs: LayoutInput) -> Layout:
         """Return a single upright bank."""
-        return inline(inputs.cylinders, inputs.spacing(inputs.cylinders))
+        return in_rows(inline(inputs.cylinders, inputs.spacing(inputs.cylinders)), inputs)
 
 
 class Vee(LayoutKind):
@@ -77,6 +109,10 @@ class Vee(LayoutKind):
         LayoutKey("bank_angle", "open angle", "Angle between the banks of a vee."),
         LayoutKey("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
         STAGGER,
+        ROW_ANGLE,
+        *NUMBERING,
+        FIRST_BANK,
+        FIRST_END,
     )  # fmt: skip
     openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")
     cylinders_per_throw = 2
@@ -88,14 +124,15 @@ class Vee(LayoutKind):
         if options["bank_angle"] is None:
             raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
         split, stagger = options["split_pin_angle"] or 0.0, options["bank_stagger"] or 0.0
-        return vee(count, inputs.spacing(count // self.banks), options["bank_angle"], split, stagger)
+        layout = vee(count, inputs.spacing(count // self.banks), options["bank_angle"], split, stagger)
+        return in_rows(layout, inputs)
 
 
 class Boxer(LayoutKind):
     """Opposed banks with a throw for every cylinder."""
 
     name = "boxer"
-    keys = (SPACING, STAGGER)
+    keys = (SPACING, STAGGER, *NUMBERING, FIRST_BANK, FIRST_END)
     banks = 2
 
     def place(self, inputs: LayoutInput) -> Layout:
@@ -110,6 +147,7 @@ class XEngine(LayoutKind):
     """Four banks at right angles, a throw for four cylinders: upper left, upper right, lower left, lower right."""
 
     name = "x-engine"
+    keys = (SPACING, *NUMBERING, FIRST_BANK, FIRST_END)
     cylinders_per_throw = 4
     banks = 4
 

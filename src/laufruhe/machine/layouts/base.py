@@ -24,7 +24,8 @@ class LayoutKey:
     ----------
     kind
         "length", "positive length", "non-negative length", "angle", "open angle", "open lead", "angles", "cylinder",
-        "sign", "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
+        "sign", "inertia", "ratio", "mass", "open mass", "rod" of a mass, centre of gravity and inertia, or "numbering",
+        "bank", "end" or "rotation" of cylinder numbers.
     default
         Value if the file leaves the key out.
     """
@@ -40,6 +41,25 @@ SPACING = LayoutKey(
     "positive length",
     "Distance between neighbouring throws; in a boxer between neighbours of a bank.",
 )
+NUMBERING = (
+    LayoutKey(
+        "numbering",
+        "numbering",
+        "Numbers of the cylinders in this file: by bank, alternating between banks, or the number of each cylinder in "
+        "a list, bank by bank from the front, the left bank first.",
+    ),
+    LayoutKey("rotation", "rotation", "Sense of rotation of the crank, seen from the front; clockwise by default."),
+)
+ROW_ANGLE = LayoutKey(
+    "row_angle",
+    "angle",
+    "Angle between the two rows of a bank whose cylinders lean alternately to the left and right (VR and W engines); "
+    "negative if the front cylinder leans to the right.",
+)
+FIRST_END = LayoutKey("first_end", "end", "End of the engine at which cylinder 1 stands; the front by default.")
+FIRST_BANK = LayoutKey(
+    "first_bank", "bank", "Bank of cylinder 1, seen from the flywheel towards the front; left by default."
+)
 CRANK_DISTANCE = LayoutKey("crank_distance", "positive length", "Distance of the two cranks of opposed pistons.")
 
 
@@ -51,6 +71,10 @@ class LayoutInput:
     ----------
     options
         Values of the keys of this layout alone in SI; None for a key that is left out or open.
+    places
+        Index of the place of each cylinder by its number, where places are counted as in C3.
+    firing_intervals
+        Crank angles from each firing of the order to the next [rad]; empty if each is at the first dead centre.
     piston_mass
         Reciprocating mass without the share of `rod` [kg].
     rod
@@ -63,7 +87,9 @@ class LayoutInput:
     cylinders: int
     mechanism: Mechanism
     options: Mapping[str, Any]
+    places: tuple[int, ...]
     firing_order: tuple[int, ...] | None = None
+    firing_intervals: tuple[float, ...] = ()
     piston_mass: float = 0.0
     rod: Rod | None = None
     gas: bool = False
@@ -103,7 +129,7 @@ class LayoutKind(ABC):
     keys
         Keys of [engine] in addition to those of every layout.
     lists
-        Keys among `throws`, `firing_order`, `slider_cranks` and `shafts` that the layout takes.
+        Keys among `throws`, `firing_order`, `firing_intervals`, `slider_cranks` and `shafts` that the layout takes.
     openable
         Keys that may be left open.
     banks
@@ -120,7 +146,7 @@ class LayoutKind(ABC):
 
     name: ClassVar[str]
     keys: ClassVar[tuple[LayoutKey, ...]] = (SPACING,)
-    lists: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
+    lists: ClassVar[tuple[str, ...]] = ("throws", "firing_order", "firing_intervals")
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1
     banks: ClassVar[int] = 1
@@ -158,7 +184,7 @@ class LayoutKind(ABC):
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks and the throws that they work on."""
-        return build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order)
+        return build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order, inputs.firing_intervals)
 
 
 class Parts(LayoutKind):
@@ -166,7 +192,7 @@ class Parts(LayoutKind):
 
     name = "parts"
     keys = ()
-    lists = ("slider_cranks", "shafts")
+    lists = ("slider_cranks", "shafts", "firing_order", "firing_intervals")
     is_free = True
 
     def place(self, inputs: LayoutInput) -> Layout:

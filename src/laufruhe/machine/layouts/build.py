@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,7 +12,7 @@ from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
-from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.machine.slider_crank import OffsetCrank, SliderCrank, as_kind
 from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, cis, reduced_turn
 
 
@@ -80,42 +80,71 @@ class Mechanism:
         )
 
 
-def firing_angles(
-    cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
+def angles_in_order(
+    cycle: Cycle, centres: Sequence[Turn], firing_order: Sequence[int], intervals: Sequence[float] = ()
 ) -> tuple[float, ...]:
-    """Return the crank angles at which cylinders fire [rad], each at its first dead centre after the one before."""
-    previous: Turn = Fraction(-1)
-    angles = [0.0] * len(layout.positions)
-    start: Turn | None = None
-    for number in firing_order:
-        k = number - 1
-        centre = reduced_turn(layout.dead_centre(throws, k), 1)
-        while centre <= previous + SAME_TURN:
-            centre += 1
-        start = centre if start is None else start
+    """Return the crank angles at which cylinders fire [rad], from a dead centre of each in turns.
+
+    Each fires at its first dead centre after the one before, or after the interval that is given [rad].
+    """
+    turns = [reduced_turn(centre, 1) for centre in centres]
+    start = previous = turns[firing_order[0] - 1]
+    angles = [angle_of(start)] * len(turns)
+    for place, number in enumerate(firing_order[1:], 1):
+        if intervals:
+            centre = start + sum(map(as_turn, intervals[:place]))
+            if abs(math.remainder(float(centre - turns[number - 1]), 1.0)) > SAME_TURN:
+                first = reduced_turn(turns[number - 1] - start, 1)
+                after = " or ".join(f"{360.0 * float(first + turn):.6g}" for turn in range(cycle.turns))
+                raise ModelError(
+                    f"order {list(firing_order)} cannot have these intervals: cylinder {number} would fire "
+                    f"{360.0 * float(centre - start):.6g} deg after cylinder {firing_order[0]}, and its dead centre is "
+                    f"{after} deg after it"
+                )
+        else:
+            centre = turns[number - 1]
+            while centre <= previous + SAME_TURN:
+                centre += 1
         if centre >= start + cycle.turns - SAME_TURN:
             raise ModelError(
-                f"throws {[round(math.degrees(t), 3) for t in throws]} deg cannot fire in the order "
-                f"{list(firing_order)} within {counted(cycle.turns, 'turn')}: cylinder {number} would come after "
-                f"{math.degrees(angle_of(centre)):.6g} deg"
+                f"the throws cannot fire in the order {list(firing_order)} within {counted(cycle.turns, 'turn')}: "
+                f"cylinder {number} would come after {math.degrees(angle_of(centre - start)):.6g} deg"
             )
-        angles[k] = angle_of(centre)
+        angles[number - 1] = angle_of(centre)
         previous = centre
     return tuple(angles)
 
 
-def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tuple[float, ...]:
-    """Return the throw angles of even firing in this order [rad], cylinder 1 at its dead centre at phi = 0."""
-    step = Fraction(cycle.turns, len(firing_order))
+def firing_angles(
+    cycle: Cycle,
+    layout: Layout,
+    throws: Sequence[float],
+    firing_order: Sequence[int],
+    intervals: Sequence[float] = (),
+) -> tuple[float, ...]:
+    """Return the crank angles at which the cylinders of a layout fire [rad]; see `angles_in_order`."""
+    centres = [layout.dead_centre(throws, k) for k in range(len(layout.positions))]
+    return angles_in_order(cycle, centres, firing_order, intervals)
+
+
+def even_throws(
+    cycle: Cycle, layout: Layout, firing_order: Sequence[int], intervals: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Return the throw angles of even firing in this order, or of these intervals [rad].
+
+    The first cylinder of the order has its dead centre at phi = 0.
+    """
+    step, upright = Fraction(cycle.turns, len(firing_order)), [0.0] * len(layout.throw_positions)
     inputs: dict[int, Turn] = {}
     for place, number in enumerate(firing_order):
         k = number - 1
-        turn = (layout.dead_centre_turn(k) - place * step) % 1
+        fires = sum(map(as_turn, intervals[:place])) if intervals else place * step
+        turn = (layout.dead_centre(upright, k) - fires) % 1
         first = inputs.setdefault(layout.pins[k], turn)
         if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
             raise ModelError(
-                f"firing order {list(firing_order)} cannot be even with these pins and banks: cylinder {number} "
-                f"wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
+                f"firing order {list(firing_order)} cannot be {'so' if intervals else 'even'} with these pins and "
+                f"banks: cylinder {number} wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
                 f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
             )
     return tuple(angle_of(inputs[pin]) for pin in range(len(layout.throw_positions)))
@@ -155,16 +184,18 @@ def build(
     mechanism: Mechanism,
     angles: Sequence[float],
     firing_order: Sequence[int] | None = None,
+    intervals: Sequence[float] = (),
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
     """Return the slider-cranks, and the throws that they work on, at these angles when phi = 0 [rad] (C3).
 
-    Without a firing order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone.
+    Without firing intervals [rad] each cylinder fires at its first dead centre after the one before. Without a firing
+    order every cylinder is taken to fire at its first dead centre, which matters to gas loads alone.
     """
     if len(angles) != len(layout.throw_positions):
         raise ModelError(f"{counted(len(angles), 'throw')} given, but the layout has {len(layout.throw_positions)}")
     cylinders = range(len(layout.positions))
     fires = (
-        firing_angles(cycle, layout, angles, firing_order)
+        firing_angles(cycle, layout, angles, firing_order, intervals)
         if firing_order
         else tuple(angle_of(reduced_turn(layout.dead_centre(angles, k), 1)) for k in cylinders)
     )
@@ -178,6 +209,11 @@ def build(
         )
         for k in cylinders
     )
+    if layout.offsets:
+        slider_cranks = tuple(
+            as_kind(OffsetCrank, replace(part, offset=offset))
+            for part, offset in zip(slider_cranks, layout.offsets, strict=True)
+        )
     unbalance = mechanism.rotating_mass * mechanism.crank_radius
     throws = tuple(
         Throw(

@@ -84,6 +84,7 @@ class Delta(LayoutKind):
             "crank_leads", "angles", "Angles by which the first pistons of the first two banks of a triangle lead."
         ),
     )
+    lists = ("throws", "firing_order")
     openable = ("throws",)
     cylinders_per_throw = 3
     banks = 3

@@ -9,7 +9,7 @@ from dataclasses import replace
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.layouts.banks import Inline
-from laufruhe.machine.layouts.base import CRANK_DISTANCE, SPACING, LayoutInput, LayoutKey
+from laufruhe.machine.layouts.base import CRANK_DISTANCE, LayoutInput, LayoutKey
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import Shaft
@@ -47,7 +47,7 @@ class OpposedPiston(Inline):
 
     name = "opposed-piston"
     keys = (
-        SPACING,
+        *Inline.keys,
         CRANK_DISTANCE,
         LayoutKey(
             "crank_ratio",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from laufruhe.numerics.exact_angles import Turn, as_turn
 
@@ -27,6 +27,8 @@ class Layout:
         split pins' angle the other way. Empty without such banks.
     firing_delays
         Crank angle from alpha = 0 to the dead centre that every cylinder fires at [rad]; empty if all are zero.
+    offsets
+        Offset of every cylinder [m], each fired at its true dead centre; empty if all have that of the engine.
     throws
         Angle of every throw [rad] where the layout leaves no choice.
     """
@@ -39,6 +41,7 @@ class Layout:
     throw_positions: tuple[float, ...]
     sides: tuple[float, ...] = ()
     firing_delays: tuple[float, ...] = ()
+    offsets: tuple[float, ...] = ()
     throws: tuple[float, ...] | None = None
 
     def dead_centre_turn(self, k: int) -> Turn:
@@ -54,6 +57,28 @@ class Layout:
     def spread(self) -> float:
         """Largest deviation from even firing, because the dead centres of some cylinders come later [rad]."""
         return max(self.firing_delays) - min(self.firing_delays) if self.firing_delays else 0.0
+
+    def on_throw(self, throw: int) -> list[int]:
+        """Return the cylinders of a throw; those that lean alike come in one order on all throws."""
+        sides = [self.side(k) for k, pin in enumerate(self.pins) if pin == 0]
+        return sorted((k for k, pin in enumerate(self.pins) if pin == throw), key=lambda k: sides.index(self.side(k)))
+
+    def renumbered(self, places: Sequence[int]) -> Layout:
+        """Return the layout whose cylinder k stands at place `places[k]`; throws go by their first cylinder."""
+        pins = [self.pins[place] for place in places]
+        throws = list(dict.fromkeys(pins))
+        return replace(
+            self,
+            positions=tuple(self.positions[place] for place in places),
+            banks=tuple(self.banks[place] for place in places),
+            pins=tuple(throws.index(pin) for pin in pins),
+            pin_offsets=tuple(self.pin_offsets[place] for place in places),
+            throw_positions=tuple(self.throw_positions[throw] for throw in throws),
+            sides=self.sides and tuple(self.sides[place] for place in places),
+            firing_delays=self.firing_delays and tuple(self.firing_delays[place] for place in places),
+            offsets=self.offsets and tuple(self.offsets[place] for place in places),
+            throws=self.throws and tuple(self.throws[throw] for throw in throws),
+        )
 
     def side(self, k: int) -> float:
         """Return the share of the bank angle at which cylinder k leans: 1/2 left, -1/2 right."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
-from laufruhe.machine.layouts.base import LayoutInput, LayoutKey, LayoutKind, rod_of
+from laufruhe.machine.layouts.base import NUMBERING, LayoutInput, LayoutKey, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Throw, build
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.slider_crank import SliderCrank, as_kind
@@ -37,8 +37,9 @@ class Radial(LayoutKind):
         ),
         LayoutKey("articulated_rod", "rod", "Articulated rod as a rigid body, counted from its knuckle pin."),
         LayoutKey("knuckle_mass", "mass", "Mass at every knuckle pin, beside the share of articulated_rod.", 0.0),
+        *NUMBERING,
     )
-    lists = ("firing_order",)
+    lists = ("firing_order", "firing_intervals")
     openable = ("firing_order",)
     needs_rod = True
 
@@ -49,26 +50,30 @@ class Radial(LayoutKind):
         """
         count, none = inputs.cylinders, (0.0,) * inputs.cylinders
         _check(inputs)
-        banks = tuple(math.tau * k / count for k in range(count))
+        banks, places = tuple(math.tau * k / count for k in range(count)), inputs.places
         try:
-            on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, bank, 0.0) for k, bank in enumerate(banks)]
-            delays = tuple(part.fires_at for part in _hinged(inputs, on_crank))
+            # master rod and knuckle pins go by number
+            on_crank = [inputs.mechanism.cylinder(k + 1, 0.0, 0.0, banks[at], 0.0) for k, at in enumerate(places)]
+            by_number = _hinged(inputs, on_crank)
         except KeyedError:
             raise
         except ModelError as error:
             key = "articulated_rod_length" if inputs.options["articulated_rod_length"] else "knuckle_radius"
             raise KeyedError(key, str(error)) from None
-        return Layout(
-            "radial", none, banks, (0,) * count, none, (0.0,), firing_delays=delays, throws=(banks[0] + delays[0],)
-        )
+        delays = tuple(by_number[places.index(at)].fires_at for at in range(count))
+        throw = banks[places[0]] + by_number[0].fires_at
+        return Layout("radial", none, banks, (0,) * count, none, (0.0,), firing_delays=delays, throws=(throw,))
 
     def parts(
         self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks of master and articulated rods; on four strokes every second one fires."""
-        turns, count = inputs.cycle.turns, inputs.cylinders
-        order = [k + 1 for start in range(turns) for k in range(start, count, turns)]
-        on_crank, cranks = build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order or order)
+        turns, count, places = inputs.cycle.turns, inputs.cylinders, inputs.places
+        order = [
+            1 + places.index((places[0] + k) % count) for start in range(turns) for k in range(start, count, turns)
+        ]
+        order = list(inputs.firing_order or order)
+        on_crank, cranks = build(inputs.cycle, layout, inputs.mechanism, throws, order, inputs.firing_intervals)
         return _hinged(inputs, on_crank), cranks
 
 

@@ -85,12 +85,13 @@ def _side_view(axes: Axes, star: RankedStar, places: Sequence[float], colour: st
     """Draw journals on the axis, webs and pins at the height z = cos theta; a pin that points away is open."""
     axes.axis("off")
     count = len(places)
-    x = np.arange(count, dtype=float)
+    from_front = np.argsort(np.argsort(-np.array(places), kind="stable"))
+    x = from_front.astype(float)
     axes.set(xlim=(-0.9, count - 0.1), ylim=(-1.4, 1.4))
     axes.axhline(0.0, color=FAINT, linewidth=0.6, linestyle=(0, (6, 2, 1, 2)))
     line = [(-0.75, 0.0)]
-    for k, angle in enumerate(star.throws):
-        height = math.cos(angle)
+    for k in np.argsort(from_front):
+        height = math.cos(star.throws[k])
         line += [(x[k] - 0.28, 0.0), (x[k] - 0.28, height), (x[k] + 0.28, height), (x[k] + 0.28, 0.0)]
     line.append((count - 0.25, 0.0))
     axes.plot(*zip(*line, strict=True), color=colour, linewidth=2.2, solid_joinstyle="round")

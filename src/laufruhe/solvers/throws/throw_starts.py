@@ -105,19 +105,16 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
 def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
     """Return patterns of firing angles within the bounds of intervals, most even first, and True if complete."""
     layout = phasing.layout(*phasing.minimum_geometry)
-    first = [k for k, pin in enumerate(layout.pins) if pin == 0]
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
     slots = FiringSlots(
-        phasing.cycle, len(layout.throw_positions), tuple(layout.side(k) for k in first), (low, high),
+        phasing.cycle, len(layout.throw_positions), tuple(layout.side(k) for k in layout.on_throw(0)), (low, high),
         max(phasing.intervals.minimum, SOONEST), phasing.intervals.maximum,
     )  # fmt: skip
     members = None
     if phasing.firing_order is not None:
         # slots of every throw's cylinders
         slot = {number - 1: s for s, number in enumerate(phasing.firing_order)}
-        members = [
-            [slot[k] for k, pin in enumerate(layout.pins) if pin == throw] for throw in range(max(layout.pins) + 1)
-        ]
+        members = [[slot[k] for k in layout.on_throw(throw)] for throw in range(max(layout.pins) + 1)]
     return slots.patterns(members)
 
 
@@ -165,8 +162,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
         # cylinder of every slot
         cylinder = {}
         for pin, share in enumerate(orders[k]):
-            cylinders = [c for c, cylinder_pin in enumerate(layout.pins) if cylinder_pin == pin]
-            cylinder.update(dict(zip(pattern.members[share], cylinders, strict=True)))
+            cylinder.update(dict(zip(pattern.members[share], layout.on_throw(pin), strict=True)))
         order = from_one([cylinder[slot] + 1 for slot in range(len(cylinder))])
         crank = Candidate(tuple(float(a) % math.tau for a in throws[k]), order, bank, split)
         if objective is not None:

@@ -1,0 +1,233 @@
+"""Firing orders that do not fit their crank: the cylinders at fault, and the numbering that is probably meant."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, TypeAlias
+
+from laufruhe.errors import Complaint, ModelError
+from laufruhe.files.complaints import Refused
+from laufruhe.files.engine import EngineTable, cycle_of, layout_of
+from laufruhe.files.numbering import ALTERNATING, BY_BANK, KEYS, USUAL, place_order
+from laufruhe.files.toml_text import toml_value
+from laufruhe.machine import Cycle
+from laufruhe.machine.firing import from_one, intervals_of
+from laufruhe.machine.layouts import Layout, even_throws, firing_angles
+from laufruhe.numerics.exact_angles import Turn, as_turn, reduced_turn
+
+Pair: TypeAlias = tuple[int, int]
+_WHERE = "engine.firing_order"
+# smallest difference of intervals that counts [rad], and largest difference of typed angles that does not [turns]
+_CLEAR, _SAME = math.radians(1.0), 1e-4
+_NUMBERINGS: tuple[Mapping[str, Any], ...] = tuple(
+    {key: value for key, value in zip(KEYS, (scheme, bank, end), strict=False) if value is not None}
+    for end in (None, "flywheel")
+    for scheme, bank in ((ALTERNATING, None), (None, "right"), (ALTERNATING, "right"), (None, None))
+)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Firing intervals from cylinder 1 [rad], and pairs of cylinders that should be in step but are not."""
+
+    intervals: tuple[float, ...]
+    pairs: tuple[Pair, ...]
+
+    @property
+    def spread(self) -> float:
+        """Difference between the longest and the shortest interval [rad]."""
+        return max(self.intervals) - min(self.intervals)
+
+
+@contextmanager
+def explained_orders(table: EngineTable) -> Iterator[None]:
+    """Replace the refusal of a firing order in the block by one that names cylinders and a numbering that fits."""
+    try:
+        yield
+    except Refused as refusal:
+        order = table.listed_order
+        is_order = refusal.complaint.where == _WHERE and table.kind.takes("numbering") and not table.firing_intervals
+        if order is None or not is_order or sorted(order) != list(range(1, len(order) + 1)):
+            raise
+        if not (fault := _fault(table, order)):
+            raise
+        raise Refused(_WHERE, order, fault, _remedy(table, order)) from None
+
+
+def order_warnings(table: EngineTable) -> tuple[Complaint, ...]:
+    """Return a warning about a firing order that its crank allows, but that other numbers of the cylinders explain."""
+    order = table.listed_order
+    fit = None if order is None or table.firing_intervals or not table.kind.takes("numbering") else _fit(table)
+    if order is None or fit is None or len(order) < 3:
+        return ()
+    if fit.pairs and table.kind.banks > 1:
+        rule = f"moves opposed pistons in one direction, not against each other: cylinders {_pairs(fit.pairs)}"
+        return (Complaint(_WHERE, _text(order), rule, _remedy(table, order)),)
+    if fit.pairs:
+        rule = f"makes a crank that differs from its mirror image: cylinders {_pairs(fit.pairs)} are not in step"
+        return (Complaint(_WHERE, _text(order), rule, _exchange(table, order)),)
+    is_stated = any(table.value_of(key) is not None for key in KEYS if table.kind.takes(key))
+    reading = None if is_stated or table.throws is None else _reading(table)
+    if reading is None or reading[1].spread > fit.spread - _CLEAR:
+        return ()
+    now, then = _degrees(fit.intervals), _degrees(reading[1].intervals)
+    rule = f"fires after {now} deg, and in another numbering after {then} deg"
+    keep = f'if the numbers are meant as they are, write numbering = "{BY_BANK}"'
+    return (Complaint(_WHERE, _text(order), rule, f"{_advice(table, order, reading[0])}; {keep}"),)
+
+
+def _fault(table: EngineTable, order: Sequence[int]) -> str:
+    """Return the rule that a refused order breaks, with the cylinders at fault; empty if it is off by rounding."""
+    layout, cycle = layout_of(table), cycle_of(table)
+    step = Fraction(cycle.turns, len(order))
+    fires = {number: place * step for place, number in enumerate(order)}
+    throws = table.listed_throws or layout.throws
+    if throws is not None:
+        first = layout.dead_centre(throws, order[0] - 1)
+        late = {n: _turned(layout.dead_centre(throws, n - 1) - first - turn) for n, turn in fires.items()}
+        far = {n: turn for n, turn in late.items() if 2.0 * abs(turn) > step} or late
+        named = ", ".join(f"{n} ({360.0 * turn:+.4g} deg)" for n, turn in far.items() if abs(turn) > _SAME)
+        return f"does not fit the throws: if it is to fire evenly, cylinders {named} are out of place" if named else ""
+    faults = []
+    for pin in range(len(layout.throw_positions)):
+        first_one, *others = (k for k, own_pin in enumerate(layout.pins) if own_pin == pin)
+        for k in others:
+            due = layout.dead_centre_turn(k) - layout.dead_centre_turn(first_one)
+            distance = fires[k + 1] - fires[first_one + 1]
+            if not _is_whole(distance - due):
+                faults.append(f"{first_one + 1} and {k + 1} ({_degree(distance % 1)}, not {_degree(due % 1)} deg)")
+    return f"cannot be even: cylinders {', '.join(faults)} are out of place for their common throw" if faults else ""
+
+
+def _remedy(table: EngineTable, order: Sequence[int]) -> str:
+    reading = _reading(table)
+    return _exchange(table, order) if reading is None else _advice(table, order, reading[0])
+
+
+def _advice(table: EngineTable, order: Sequence[int], keys: Mapping[str, Any]) -> str:
+    """Return the keys of a numbering that fits, and the order in the present numbers."""
+    degrees = [round(math.degrees(angle), 6) % 360.0 for angle in keys.get("throws", ())]
+    angles = [int(angle) if angle.is_integer() else angle for angle in degrees]
+    own_keys = {key: table.value_of(key) for key in USUAL if table.kind.takes(key)}
+    is_list = isinstance(keys.get("numbering"), list)
+    written = [
+        f"{key} = {toml_value(keys.get(key, USUAL[key]))}"
+        for key, value in own_keys.items()
+        if keys.get(key, USUAL[key]) != (value or USUAL[key]) and not (is_list and key not in keys)
+    ]
+    written += [f"throws = {toml_value(angles)}"] if angles else []
+    if keys.keys() == {"throws"}:
+        return f"if the angles of the throws count against the rotation, write {written[-1]}"
+    gone = [key for key in ("first_bank", "first_end") if is_list and own_keys.get(key)]
+    written_text = ", ".join(written) + (f" without {' and '.join(gone)}" if gone else "")
+    now, then = (place_order(t, t.kind, len(order)) for t in (table, _renumbered(table, keys)))
+    here = from_one([1 + now.index(then[number - 1]) for number in order])
+    return f"if these are its maker's numbers, write {written_text}; in the present numbers the order is {_text(here)}"
+
+
+def _exchange(table: EngineTable, order: Sequence[int]) -> str:
+    # an exchange of two cylinders may make it fit
+    for a, b in itertools.combinations(order[1:], 2):
+        changed = [b if n == a else a if n == b else n for n in order]
+        fit = _fit(table.model_copy(update={"firing_order": changed}))
+        if fit is not None and not fit.pairs and fit.spread < _CLEAR:
+            return f"check the order; with {a} and {b} exchanged it fits: {_text(changed)}"
+    return "check the order, which no usual numbering makes fit"
+
+
+def _reading(table: EngineTable) -> tuple[Mapping[str, Any], _Fit] | None:
+    # keys of [engine] with which the order fires most evenly
+    fits = [(keys, _fit(_renumbered(table, keys))) for keys in _readings(table)]
+    fitting = [(keys, fit) for keys, fit in fits if fit is not None and not fit.pairs]
+    return min(fitting, key=lambda pair: round(pair[1].spread, 6), default=None)
+
+
+def _readings(table: EngineTable) -> Iterator[Mapping[str, Any]]:
+    """Yield the keys of usual numberings, also with throws whose angles count the other way."""
+    kind, count = table.kind, len(table.listed_order or [])
+    possible = {key for key in KEYS if kind.takes(key) and (key != "numbering" or kind.banks > 1)}
+    numberings = [keys for keys in _NUMBERINGS if keys.keys() <= possible]
+    if kind.banks == kind.cylinders_per_throw == 2:
+        near, far = list(range(1, count // 2 + 1)), list(range(count, count // 2, -1))
+        numberings += [{"numbering": numbers} for numbers in (near + far, far + near)]
+    if table.listed_throws is None:
+        yield from numberings
+        return
+    reversed_throws = {"throws": [-angle % math.tau for angle in table.listed_throws]}
+    # of engines with one bank the sense of the throws is less certain than the numbers
+    yield from (reversed_throws, *numberings) if kind.banks == 1 else (*numberings, reversed_throws)
+    yield from ({**keys, **reversed_throws} for keys in numberings)
+
+
+def _renumbered(table: EngineTable, keys: Mapping[str, Any]) -> EngineTable:
+    return table.model_copy(update={**dict.fromkeys(key for key in KEYS[:-1] if table.kind.takes(key)), **keys})
+
+
+def _fit(table: EngineTable) -> _Fit | None:
+    """Return how the order of a table fires; None if its crank does not allow the order."""
+    cycle, order = cycle_of(table), table.listed_order or []
+    try:
+        layout = layout_of(table)
+        throws = table.listed_throws or layout.throws or even_throws(cycle, layout, order)
+        angles = firing_angles(cycle, layout, throws, order)
+    except (ModelError, Refused):
+        return None
+    start = as_turn(angles[from_one(order)[0] - 1])
+    turns = sorted(float(reduced_turn(as_turn(angle) - start, cycle.turns)) for angle in angles)
+    is_row = table.throws is None and cycle is Cycle.FOUR_STROKE and len({*layout.pins}) == len(order)
+    due = _opposed(layout) or (_mirrored(layout) if is_row else ())
+    centres = [layout.dead_centre(throws, k) for k in range(len(order))]
+    return _Fit(
+        intervals_of(cycle, turns), tuple(pair for pair in due if not _is_whole(centres[pair[0]] - centres[pair[1]]))
+    )
+
+
+def _opposed(layout: Layout) -> tuple[Pair, ...]:
+    # cylinders side by side on opposed banks, each on a throw of its own
+    sides = [[k for k in _from_front(layout) if layout.banks[k] == bank] for bank in dict.fromkeys(layout.banks)]
+    if len(sides) != 2 or len(sides[0]) != len(sides[1]):
+        return ()
+    pairs = list(zip(*sides, strict=True))
+    is_flat = _is_whole(as_turn(layout.banks[pairs[0][0]]) - as_turn(layout.banks[pairs[0][1]]) - Fraction(1, 2))
+    return tuple(sorted(pairs)) if is_flat and all(layout.pins[a] != layout.pins[b] for a, b in pairs) else ()
+
+
+def _mirrored(layout: Layout) -> tuple[Pair, ...]:
+    # cylinders at equal distances from the middle of a single row
+    row = _from_front(layout)
+    is_row = len(set(layout.banks)) == 1 and len(set(layout.positions)) == len(row) > 2 and len(row) % 2 == 0
+    return tuple(zip(row[: len(row) // 2], row[::-1], strict=False)) if is_row else ()
+
+
+def _from_front(layout: Layout) -> list[int]:
+    return sorted(range(len(layout.positions)), key=lambda k: -layout.positions[k])
+
+
+def _is_whole(turn: Turn) -> bool:
+    return abs(_turned(turn)) < _SAME
+
+
+def _turned(turn: Turn) -> float:
+    # between -1/2 and 1/2
+    return math.remainder(float(turn), 1.0)
+
+
+def _degree(turn: Turn) -> str:
+    return f"{360.0 * float(turn):.5g}"
+
+
+def _degrees(angles: Iterable[float]) -> str:
+    return ", ".join(f"{math.degrees(angle):.5g}" for angle in angles)
+
+
+def _pairs(pairs: Iterable[Pair]) -> str:
+    return ", ".join(f"{a + 1} and {b + 1}" for a, b in pairs)
+
+
+def _text(order: Iterable[int]) -> str:
+    return "-".join(map(str, order))
