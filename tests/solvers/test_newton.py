@@ -166,6 +166,22 @@ def test_loads_that_cancel(name: str) -> None:
     assert problem.objective(solution.x) <= 1e-12 * problem.objective(np.zeros(problem.size))
 
 
+def test_a_mass_in_the_objective_where_nothing_is_to_be_gained() -> None:
+    """Forces of another order than those of the weights: the gradient of the mean is a rounding error."""
+    angle = 2.0 * np.pi * np.arange(ROWS) / ROWS
+    constant = np.stack([np.cos(3.0 * angle), np.sin(3.0 * angle)], axis=1)
+    turn = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    slope = np.stack([turn, turn @ np.array([[0.0, 1.0], [-1.0, 0.0]])], axis=2)
+    norm = AffineNorm(NORMS["mean"], constant, slope, Grid(np.full(ROWS, 1.0 / ROWS), ROWS))
+    weights = AffineNorm(NORMS["mean"], np.zeros((1, 2)), np.eye(2)[None], Grid(np.ones(1), 1))
+    domain = Domain(Decision("d", "kg m", Sector(100.0), 0.0, ()), 0)
+    problem = AffineProblem(((1.0, norm), (0.1, weights)), (), (domain,), ROWS)
+    found = newton_solution(problem)
+    assert found is not None
+    assert np.abs(found[0]).max() <= 1e-9
+    assert lower_bound(problem, found[1]).value == pytest.approx(1.0, rel=1e-8)
+
+
 def test_derivatives_are_those_of_differences() -> None:
     problem = AffineModel(load(PROBLEMS / "tractor-four-lanchester.toml")).at(360)
     for name in ("mean", "rms", "rmq"):

@@ -217,7 +217,7 @@ class NewtonProgram:
             return None
         blocks, starts, rows, cost = build_program(problem, None)
         units = problem.units
-        size = float(np.abs(gradient * units).max(initial=0.0)) or 1.0
+        size = max(float(np.abs(gradient * units).max(initial=0.0)), self.problem.objective(x)) or 1.0
         scale = (blocks[0].unit if problem.terms else 1.0) / size
         scaled = curvature * np.outer(units, units) / size
         scaled += DAMPING * np.diag(np.diag(scaled))
