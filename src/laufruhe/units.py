@@ -15,7 +15,9 @@ LONGEST = 100
 """Largest number of characters of a number with its unit."""
 MAX_FACTORS = 12
 """Largest number of names in one unit."""
-_QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
+_QUANTITY = re.compile(
+    r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .·-]*|(?:1 ?)?/ ?min)?\s*$"
+)
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """Number with a decimal comma."""
 THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
@@ -35,18 +37,37 @@ _DEFINITIONS = (
     "pferdestaerke = 75 * kilogram_force * meter / second = PS",
 )
 
+_SPELLINGS: dict[str, dict[str, str]] = {
+    "m": {"Zoll": "inch"},
+    "kg m": {"kgm": "kg m", "kgcm": "kg cm", "kgmm": "kg mm", "gcm": "g cm", "gmm": "g mm", "oz-in": "oz in"},
+    "kg m^2": {"kgm^2": "kg m^2", "kgm2": "kg m^2", "kgcm^2": "kg cm^2", "kgcm2": "kg cm^2", "kgmm^2": "kg mm^2"},
+    "Pa": {"PSI": "psi"},
+    "N m": {
+        **dict.fromkeys(("lb ft", "ft lb", "lb-ft", "ft-lb", "lbft"), "lbf ft"),
+        "lb in": "lbf in",
+        "in lb": "lbf in",
+    },
+    "N/m": {"lb/in": "lbf/in"},
+    "rad": dict.fromkeys(("Grad", "°KW", "°CA"), "deg"),
+    "rad/s": {
+        **dict.fromkeys(("RPM", "U/min", "r/min", "rev/min", "1/min", "/min", "min^-1", "min-1", "Upm"), "rpm"),
+        "Hz": "turn/s",
+    },
+}
+"""Spellings of units in the trade, by SI unit: those that the registry does not know or reads as another unit."""
+
 COMMON = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
     "kg": {"kg": 1.0, "g": 1e-3},
     "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g cm": 1e-5, "g mm": 1e-6},
     "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4},
-    "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5},
+    "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "psi": 6894.7572931683635},
     "N": {"N": 1.0, "kN": 1e3, "kp": 9.80665},
     "N m": {"N m": 1.0},
     "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
     "Hz": {"Hz": 1.0},
     "rad": {"rad": 1.0, "deg": math.radians(1.0)},
-    "rad/s": {"rad/s": 1.0, "rpm": math.tau / 60.0},
+    "rad/s": {"rad/s": 1.0, "rpm": math.tau / 60.0, "Hz": math.tau},
     "m/s": {"m/s": 1.0},
     "s": {"s": 1.0},
     "": {"%": 1e-2},
@@ -72,7 +93,7 @@ def _registry() -> pint.UnitRegistry[Any]:
 @cache
 def _factor(unit: str, si_unit: str) -> float:
     """Return the SI value of one `unit`, in the dimension of `si_unit`."""
-    unit = _POWER.sub(r"^\1", unit)
+    unit = _SPELLINGS.get(si_unit, {}).get(unit) or _POWER.sub(r"^\1", unit).replace("·", "*")
     if si_unit == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would pass for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(si_unit)}")
@@ -195,7 +216,7 @@ def dimension_of(text: str) -> str | None:
     return None
 
 
-_LENGTH, _MASS, _FORCE = "(?:[nµumcdk]?m|in|inch|ft)", "(?:[mkM]?g|t|lb)", "(?:[mkM]?N|k?p|kgf|lbf)"
+_LENGTH, _MASS, _FORCE = "(?:[nµumcdk]?m|in|inch|ft)", "(?:[mkM]?g|t|lb|oz)", "(?:[mkM]?N|k?p|kgf|lbf)"
 _BY, _OVER, _SQUARE = r"(?: ?[*·.] ?| )", " ?/ ?", r"(?:\^|\*\*)?2"
 _WRITTEN = {
     "m": _LENGTH,
@@ -224,7 +245,8 @@ _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
 
 def pattern(unit: str) -> str:
     """Return the regular expression of a number with a unit in the dimension of an SI unit, for editors."""
-    return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}) *$"
+    spellings = "".join(f"|{re.escape(spelling)}" for spelling in _SPELLINGS.get(unit, ()))
+    return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}{spellings}) *$"
 
 
 _UNITS = {

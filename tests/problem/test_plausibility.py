@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
+import numpy as np
 import pytest
 
 from laufruhe import InputError, load
@@ -9,6 +13,7 @@ from laufruhe.files.catalogue import engines
 from laufruhe.files.drafts import draft_of_engine
 from laufruhe.units import DECIMAL_COMMA
 from problem_files import READY
+from recorded_cycle import cycle_pressure
 
 SINGLE = """
 title = "Single"
@@ -114,3 +119,53 @@ def test_a_number_without_quotes_is_told_from_other_toml() -> None:
 def test_a_choice_of_two_names_both() -> None:
     with pytest.raises(InputError, match="use one of: two-stroke, four-stroke"):
         load(SINGLE.replace("four-stroke", "4-stroke"))
+
+
+TRACE = """
+[gas]
+model = "trace"
+file = "f.csv"
+"""
+
+
+def of_gas(
+    folder: Path, factor: float = 1.0, late: float = 0.0, shift: float = 0.0, speed: str = "3000 rpm"
+) -> list[str]:
+    angles = np.arange(-360.0, 360.0)
+    pressures = factor * cycle_pressure(angles - late) + shift
+    (folder / "f.csv").write_text("".join(f"{a},{p:.5f}\n" for a, p in zip(angles, pressures, strict=True)))
+    (folder / "p.toml").write_text(SINGLE.replace("3000 rpm", speed) + TRACE)
+    return [str(doubt) for doubt in load(folder / "p.toml").plausibility_warnings]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({}, []),
+        ({"factor": 9.0}, []),
+        (
+            {"factor": 10.0},
+            ["peak pressure of the gas = 310.4 bar: is more than 300 bar; diesel engines reach 250 bar; check"],
+        ),
+        ({"late": 35.0}, []),
+        (
+            {"late": 60.0},
+            ["peak of the gas: the peak of 31.04 bar lies 79 deg after the firing dead centre; check angle_zero"],
+        ),
+        (
+            {"late": 180.0},
+            ["mean torque of the gas: is -20.", "lies 199 deg after the firing dead centre; check angle_zero"],
+        ),
+        ({"late": -30.0}, ["mean torque of the gas: is -"]),
+        ({"factor": 4.0, "speed": "4000 rpm"}, []),
+        ({"shift": -0.95}, ["least pressure of the gas = 0.05 bar: is nearly a vacuum; check gauge and peg"]),
+        (
+            {"factor": 90.0},
+            ["peak pressure of the gas = 2794 bar", "power of the gas = 716.5 kW", "kW for each litre; racing engines"],
+        ),
+    ],
+)
+def test_gas_that_no_engine_has(change: dict[str, Any], said: list[str], tmp_path: Path) -> None:
+    doubts = of_gas(tmp_path, **change)
+    assert bool(doubts) == bool(said)
+    assert all(part in " ".join(doubts) for part in said), doubts

@@ -60,6 +60,23 @@ class TestParse:
             ("25 µm", "m", 25e-6),
             ("1 kp/cm²", "Pa", 1e4 * GRAVITY),
             ("1 N/mm²", "Pa", 1e6),
+            *(
+                (f"2500{unit}", "rad/s", 2500 * math.tau / 60)
+                for unit in (" 1/min", "/min", " U/min", " RPM", " min^-1", " r/min")
+            ),
+            ("25 Hz", "rad/s", 25 * math.tau),
+            ("3 oz in", "kg m", 3 * 0.45359237 / 16 * 0.0254),
+            ("3 oz·in", "kg m", 3 * 0.45359237 / 16 * 0.0254),
+            ("300 gcm", "kg m", 3e-3),
+            ("300 gmm", "kg m", 3e-4),
+            ("3 kg cm", "kg m", 0.03),
+            ("100 lb ft", "N m", 100 * 0.45359237 * GRAVITY * 0.3048),
+            ("100 ft-lb", "N m", 100 * 0.45359237 * GRAVITY * 0.3048),
+            ("100 psi", "Pa", 100 * 0.45359237 * GRAVITY / 0.0254**2),
+            ("100 PSI", "Pa", 100 * 0.45359237 * GRAVITY / 0.0254**2),
+            ("100 kPa", "Pa", 1e5),
+            ("10 °KW", "rad", math.radians(10)),
+            ("90 Grad", "rad", math.pi / 2),
         ],
     )
     def test_units_of_the_field(self, text: str, unit: str, value: float) -> None:
@@ -138,6 +155,25 @@ class TestParse:
         """Turns a second are either read as turns or refused, never taken for radians."""
         with contextlib.suppress(UnitError):
             assert parse(text, "rad/s") == pytest.approx(50 * math.tau)
+
+    @pytest.mark.parametrize("text", ["50 s^-1", "50 1/s"])
+    def test_a_number_a_second_is_refused(self, text: str) -> None:
+        """It may be turns or radians."""
+        with pytest.raises(UnitError):
+            parse(text, "rad/s")
+
+    def test_spellings_have_their_own_dimension_only(self) -> None:
+        """A torque in lb ft is no unbalance of so many pounds, and rpm are no frequency of mounts."""
+        assert parse("1 lb ft", "kg m") == pytest.approx(0.45359237 * 0.3048)
+        for text, unit in (
+            ("1500 1/min", "Hz"),
+            ("1500 U/min", "Hz"),
+            ("5 1/min", "s"),
+            ("1 gcm", "N m"),
+            ("3 psi", "N"),
+        ):
+            with pytest.raises(UnitError):
+                parse(text, unit)
 
     def test_newton_metres_in_one_word(self) -> None:
         """As engineers write them; a registry may take them for a count of yarn."""

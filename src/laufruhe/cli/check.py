@@ -11,6 +11,7 @@ from pathlib import Path
 from laufruhe.cli.screen import complain, is_quiet
 from laufruhe.errors import printed
 from laufruhe.files.reader import load
+from laufruhe.present.recorded_gas import gas_lines
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -36,7 +37,7 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
         return as_json(evaluate_only(problem, allow_resonance=True))
 
-    return f"ok: {problem.summary}\n", initial_as_json
+    return "".join(f"{line}\n" for line in (f"ok: {problem.summary}", *gas_lines(drawing))), initial_as_json
 
 
 def warn(problem: Problem, path: Path) -> None:

@@ -21,6 +21,7 @@ from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, pr
 from laufruhe.extension import HOMES, INSTALL, Tables, missing_extension
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
+from laufruhe.files.trade_words import meanings
 
 Loc: TypeAlias = tuple[str | int, ...]
 MAX_COMPLAINTS = 20
@@ -58,6 +59,7 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
     for loc, tables, detail in details:
         # a missing key may be present in another spelling, which is a complaint of its own
         words = [str(loc_unknown[-1]) for loc_unknown in unknown if loc_unknown[:-1] == loc[:-1]]
+        words += [key for word in words for key, _ in meanings(word)]
         if detail["type"] == "missing" and difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE):
             continue
         complaints.setdefault(key_path(loc), _complaint(detail, loc, tables, model))
@@ -148,12 +150,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
         return Complaint(where, "", *missing_extension(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        homes = [
-            f"[[{name}]]" if "list[" in str(field.annotation) else f"[{name}]"
-            for name, field in model.model_fields.items()
-            if any(str(loc[-1]) in inner.model_fields for inner in _tables_in(field.annotation))
-        ]
+        homes = _homes(str(loc[-1]), model)
         remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")
+        remedy = remedy if homes else _of_trade(str(loc[-1]), keys, model) or remedy
         if loc[-1] == "unit":
             remedy = 'write the unit with its number, as in "120 mm"'
         return Complaint(where, value_text(detail["input"]), "is not a key here", remedy)
@@ -183,6 +182,34 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: 
     form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None
     rule, _, remedy = (form or _RULES.get(kind, message)).partition("; ")
     return Complaint(where, value_text(detail["input"]), rule, remedy or "correct it")
+
+
+def _homes(key: str, model: type[BaseModel]) -> list[str]:
+    # tables of a file that have a key, as they are written
+    fields = model.model_fields
+    return [
+        _head(name, model) for name in fields if any(key in t.model_fields for t in _tables_in(fields[name].annotation))
+    ]
+
+
+def _head(name: str, model: type[BaseModel]) -> str:
+    return f"[[{name}]]" if "list[" in str(model.model_fields[name].annotation) else f"[{name}]"
+
+
+def _of_trade(word: str, keys: Sequence[str], model: type[BaseModel]) -> str:
+    """Return the remedy for a word of the trade: its key in this table, else a table or its key in the only other one.
+
+    It is empty for other words.
+    """
+    for key, note in sorted(meanings(word), key=lambda meaning: meaning[0] not in keys):
+        what = f", {note}" if note else ""
+        if key in keys:
+            return f"did you mean '{key}'{what}?"
+        if key in model.model_fields:
+            return f"did you mean the table {_head(key, model)}?"
+        if len(homes := _homes(key, model)) == 1:
+            return f"did you mean '{key}' of {homes[0]}{what}?"
+    return ""
 
 
 class Refused(LaufruheError):

@@ -4,45 +4,40 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from laufruhe.files.complaints import Refused
+import numpy as np
 
-MAX_ROWS, MAX_BYTES = 100_000, 10_000_000
+from laufruhe.files.complaints import Refused, errors_at_key
+from laufruhe.files.number_tables import NumberTable, number_table
+
+MAX_ROWS, MAX_BYTES = 100_000, 100_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
-    """Return the numbers in the first columns of a CSV file, one tuple for each row.
+    """Return the numbers in the first columns of a file, one tuple for each row; complaints name the columns."""
+    table, count = table_of(file, path, key), len(columns)
+    if len(table.lines) > MAX_ROWS:
+        raise Refused(key, file, f"has more than {MAX_ROWS} rows", "remove rows")
+    rows = np.full((len(table.lines), count), np.nan)
+    rows[:, : table.values.shape[1]] = table.values[:, :count]
+    for line, row in zip(table.lines, rows, strict=True):
+        if np.isnan(row).any():
+            rule = f"line {line} is no {'pair' if count == 2 else 'row'} of numbers"
+            raise Refused(key, file, rule, "write: " + ", ".join(columns))
+    return [tuple(row) for row in rows.tolist()]
 
-    Columns are separated by commas, semicolons or tabs; with the latter two a comma may be the decimal sign. The first
-    row may be a heading, and rows that begin with # are skipped. Complaints are about the key of the problem file and
-    name the columns.
-    """
-    remedy, row_name = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
+
+def table_of(file: str, path: Path, key: str, sheet: str | None = None) -> NumberTable:
+    """Return the table of numbers in a text file, a spreadsheet or a MATLAB file; complaints are about the key."""
+    remedy = "give a file beside the problem"
     try:
         if path.exists() and not path.is_file():
             raise Refused(key, file, "is no file", remedy)
         with path.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
-        if len(content) > MAX_BYTES:
-            raise Refused(key, file, f"is larger than {MAX_BYTES // 1_000_000} MB", "remove rows")
-        text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
-        reason = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
+        reason = error.strerror or "error" if isinstance(error, OSError) else "its name is none"
         raise Refused(key, file, f"cannot be read ({reason})", remedy) from None
-    separator = next((sign for sign in ";\t" if sign in text), ",")
-    rows: list[tuple[float, ...]] = []
-    heading = True
-    for number, line in enumerate(text.splitlines(), 1):
-        cells = [cell.strip().strip('"') for cell in line.split(separator, len(columns))]
-        if not line.strip() or cells[0].startswith("#"):
-            continue
-        try:
-            numbers = [cells[k] if separator == "," else cells[k].replace(",", ".") for k in range(len(columns))]
-            rows.append(tuple(map(float, numbers)))
-        except (ValueError, IndexError):
-            if not heading:
-                rule = f"line {number} is no {row_name} of numbers"
-                raise Refused(key, file, rule, "write: " + ", ".join(columns)) from None
-        heading = False
-        if len(rows) > MAX_ROWS:
-            raise Refused(key, file, f"has more than {MAX_ROWS} rows", "remove rows")
-    return rows
+    if len(content) > MAX_BYTES:
+        raise Refused(key, file, f"is larger than {MAX_BYTES // 1_000_000} MB", "remove rows")
+    with errors_at_key(key, file):
+        return number_table(content, path.suffix.lower(), sheet)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal, TypeAlias
 
@@ -12,14 +11,13 @@ from pydantic import Field
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, errors_at_key, require_distinct, si_value
-from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
+from laufruhe.files.recorded_trace import RecordedTable, recorded_trace
 from laufruhe.machine import (
     Chamber,
     Chambers,
     Cycle,
     GasModel,
-    PressureTrace,
     Pump,
     Seiliger,
     SliderCrank,
@@ -27,7 +25,7 @@ from laufruhe.machine import (
     Wiebe,
 )
 from laufruhe.machine.gas import AMBIENT_PRESSURE
-from laufruhe.physics.gas_cycle import check_chamber
+from laufruhe.physics.gas_cycle import chamber_cycle_of, check_chamber
 
 
 class ChargeTable(Table):
@@ -63,13 +61,13 @@ class WiebeTable(ChargeTable):
     heat_ratio: f.Positive | None = None
 
 
-class TraceTable(Table):
-    """A measured trace: a CSV file of crank angle after the firing dead centre and absolute pressure."""
+class TraceTable(RecordedTable):
+    """A recorded cylinder pressure."""
 
     model: Literal["trace"]
-    file: str
-    pressure_unit: str = "bar"
-    angle_unit: str = "deg"
+    angle_zero: f.Side | None = f.optional(
+        'Crank angle after firing at which the file counts zero, or its dead centre: "firing" or "gas exchange".'
+    )
     crankcase_pressure: f.PositivePressure | None = None
 
 
@@ -99,14 +97,6 @@ class PumpTable(Table):
     delivery: f.PositivePressure
 
 
-class SideTraceTable(Table):
-    """A measured trace of one side: crank angle from where its chamber is smallest, and absolute pressure."""
-
-    file: str
-    pressure_unit: str = "bar"
-    angle_unit: str = "deg"
-
-
 class ChamberTable(Table):
     """A space on one side of a piston, or of a further piston on the same rod."""
 
@@ -119,7 +109,9 @@ class ChamberTable(Table):
     rod: f.NonNegativeLength = f.optional("Diameter of the piston rod where it passes through this end.", 0.0)
     steam: SteamTable | None = None
     pump: PumpTable | None = None
-    trace: SideTraceTable | None = None
+    trace: RecordedTable | None = f.optional(
+        "Recorded pressure; its crank angles count from where the chamber is smallest."
+    )
 
 
 class ChambersTable(Table):
@@ -148,9 +140,10 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
     with errors_at_key("gas"):
         if isinstance(table, ChambersTable):
-            return Chambers(_chambers(table, folder, cycle, parts), air)
+            return Chambers(_chambers(table, folder, cycle, parts, air), air)
         if isinstance(table, TraceTable):
-            return replace(_trace(table, folder, "gas"), crankcase_pressure=air)
+            chamber_cycle, pace = chamber_cycle_of(parts[0], cycle) if parts else (cycle, 1.0)
+            return recorded_trace(table, folder, "gas", chamber_cycle, pace, air, _angle_zero(table, chamber_cycle))
         gas: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
     with errors_at_key("gas.compression_ratio"):
         for part in parts:
@@ -158,7 +151,21 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
     return gas
 
 
-def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> tuple[Chamber, ...]:
+def _angle_zero(table: TraceTable, cycle: Cycle) -> str | float | None:
+    # a name, or a crank angle after firing [rad]
+    zero, key = table.angle_zero, "gas.angle_zero"
+    if zero == "gas exchange" and cycle is Cycle.TWO_STROKE:
+        raise Refused(key, zero, "does not suit a two-stroke cycle, whose dead centres all fire", "leave it out")
+    if zero is None or zero in ("firing", "gas exchange"):
+        return zero
+    if isinstance(zero, str) and not any(character.isdigit() for character in zero):
+        raise Refused(key, zero, "is no dead centre", 'write "firing", "gas exchange" or a crank angle after firing')
+    return si_value(f"{zero} deg" if isinstance(zero, float | int) else zero, "rad", key)
+
+
+def _chambers(
+    table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank], air: float
+) -> tuple[Chamber, ...]:
     if cycle is not Cycle.TWO_STROKE:
         rule = "does not suit gas chambers, which work once a turn"
         raise Refused("engine.cycle", str(cycle), rule, 'write "two-stroke"')
@@ -171,12 +178,14 @@ def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[
         raise Refused(
             "engine.layout", None, rule, "give each piston its own cylinder, or use another gas model such as seiliger"
         )
-    chambers = tuple(_chamber(chamber_table, k, folder, parts) for k, chamber_table in enumerate(table.chambers, 1))
+    chambers = tuple(
+        _chamber(chamber_table, k, folder, parts, air) for k, chamber_table in enumerate(table.chambers, 1)
+    )
     require_distinct([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
     return chambers
 
 
-def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank]) -> Chamber:
+def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank], air: float) -> Chamber:
     where = f"gas.chambers[{k}]"
     diagrams = {key: table_of for key in ("steam", "pump", "trace") if (table_of := getattr(table, key)) is not None}
     if len(diagrams) != 1:
@@ -189,15 +198,11 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
             rule = f"is not among {counted(len(parts), 'cylinder')}"
             raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
     with errors_at_key(f"{where}.{key}"):
-        is_trace = key == "trace"
-        model = _trace(diagram, folder, f"{where}.trace") if is_trace else diagram.makes(**diagram.model_dump())
+        model = (
+            recorded_trace(diagram, folder, f"{where}.trace", Cycle.TWO_STROKE, 1.0, air, 0.0)
+            if key == "trace"
+            else diagram.makes(**diagram.model_dump())
+        )
     names = tuple(parts[number - 1].name for number in numbers)
     with errors_at_key(f"{where}.rod"):
         return Chamber(table.name or f"chamber {k}", names, table.end, table.bore, table.rod, model)
-
-
-def _trace(table: TraceTable | SideTraceTable, folder: Path, key: str) -> PressureTrace:
-    angle = si_value(f"1 {table.angle_unit}", "rad", f"{key}.angle_unit", table.angle_unit)
-    pressure = si_value(f"1 {table.pressure_unit}", "Pa", f"{key}.pressure_unit", table.pressure_unit)
-    pairs = rows_of(table.file, folder / table.file, f"{key}.file", ("crank angle", "pressure"))
-    return PressureTrace(tuple(a * angle for a, _ in pairs), tuple(p * pressure for _, p in pairs))

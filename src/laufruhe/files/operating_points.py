@@ -79,10 +79,10 @@ class Brake:
         names = ("speed", "load", "fuel")[: 3 if self.table.kind == "fuel" else 2]
         speed = si_value(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
         text, unit = f"1 {self.table.load_unit}", self.table.load_unit
-        if units.dimension_of(text) == "N m":
-            load = self.pressure(si_value(text, "N m", "friction.load_unit", unit))
-        else:
+        if units.dimension_of(text) == "Pa":
             load = si_value(text, "Pa", "friction.load_unit", unit)
+        else:
+            load = self.pressure(si_value(text, "N m", "friction.load_unit", unit))
         rows = rows_of(file, folder / file, "friction.file", names)
         for k, row in enumerate(rows, 1):
             if not all(map(math.isfinite, row)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from laufruhe.errors import ModelError
 
@@ -137,11 +137,14 @@ class PressureTrace:
         Ascending crank angles of one cycle after the firing dead centre [rad]; the end may repeat the beginning.
     pressures, crankcase_pressure
         Absolute pressures in the cylinder, and on the underside of the piston [Pa].
+    recording
+        Sentences about how the trace was read from its file.
     """
 
     angles: tuple[float, ...]
     pressures: tuple[float, ...]
     crankcase_pressure: float = AMBIENT_PRESSURE
+    recording: tuple[str, ...] = field(default=(), compare=False)
 
     def __post_init__(self) -> None:
         check_pressures(self, "crankcase_pressure")

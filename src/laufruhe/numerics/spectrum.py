@@ -502,6 +502,11 @@ def spectrum_with_kinks(
     """
     period = math.tau / float(base)
     angles = period * np.arange(samples) / samples
+    if len(breaks) > samples:
+        # pieces between breaks are shorter than a step: finer samples, and no kinks
+        finer = samples * math.ceil(len(breaks) / samples)
+        whole = spectrum_of(signal(period * np.arange(finer) / finer), base)
+        return Spectrum(base, whole.coefficients[: samples // 2 + 1])
     # samples on a jump are taken on its later side
     later, nodes = angles + SAME_ANGLE, kink_nodes(breaks, period)
     at_nodes, values = np.split(signal(np.concatenate([nodes.angles, later])), [-samples])

@@ -48,7 +48,12 @@ def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChambe
     swept = part.swept
     if isinstance(gas, Wiebe) and swept.pace != 1.0:
         gas = replace(gas, start=swept.pace * gas.start, duration=swept.pace * gas.duration)
-    return gas, swept.chamber, Cycle.FOUR_STROKE if swept.four_strokes else cycle, swept.pace
+    return gas, swept.chamber, *chamber_cycle_of(part, cycle)
+
+
+def chamber_cycle_of(part: SliderCrank, cycle: Cycle) -> tuple[Cycle, float]:
+    """Return the cycle of a chamber in an engine with a cycle, and its crank angle over that of the engine (Y3)."""
+    return Cycle.FOUR_STROKE if part.swept.four_strokes else cycle, part.swept.pace
 
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:

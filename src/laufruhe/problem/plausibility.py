@@ -10,6 +10,7 @@ from laufruhe.errors import Complaint
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.exact_angles import as_turn, reduced_turn
+from laufruhe.physics.recorded_gas import gas_facts
 from laufruhe.units import quantity_text
 
 FASTEST = 30.0
@@ -27,6 +28,14 @@ _PAIR = 2
 MAX_SAG, MIN_SAG = 0.1, 1e-6
 """Usual range of the static sag of a block on its mounts [m]; soft mounts sag about 10 mm."""
 
+MAX_PEAK, MIN_GAS = 300e5, 0.1e5
+"""Largest usual peak pressure, and least usual absolute pressure in a cylinder [Pa]; diesel engines reach 250 bar."""
+LATEST_PEAK = math.radians(60.0)
+"""Largest usual angle between firing and peak pressure."""
+MAX_POWER = 250e6
+"""Largest usual power over displacement [W/m^3]; racing engines without a supercharger reach 230 kW/l."""
+_ROUNDING = 1e-6
+
 
 def plausibility_warnings(
     engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False
@@ -36,7 +45,7 @@ def plausibility_warnings(
     `fires_together` is True if cylinders may fire at the same time without a warning.
     """
     warnings = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
-    warnings += [] if fires_together else _of_firing(engine)
+    warnings += [*([] if fires_together else _of_firing(engine)), *_of_gas(engine, points)]
     first: dict[str, Complaint] = {}
     for warning in warnings:
         first.setdefault(warning.where, warning)
@@ -114,3 +123,32 @@ def _of_firing(engine: Engine) -> Iterator[Complaint]:
     if len(fires) > _PAIR and fires[-1] - fires[0] < math.tau <= engine.cycle.angle - math.tau:
         rule = f"takes place in all {len(fires)} cylinders within one of the two turns of the cycle"
         yield Complaint("firing", "", rule, remedy)
+
+
+def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Complaint]:
+    for point in points:
+        facts = gas_facts(engine, point)
+        if facts is None:
+            continue
+        peak = quantity_text(1e-5 * facts.peak_pressure, "bar")
+        if facts.peak_pressure > MAX_PEAK:
+            rule = "is more than 300 bar; diesel engines reach 250 bar"
+            yield Complaint("peak pressure of the gas", peak, rule, "check pressure_unit; it may be kPa")
+        if facts.least_pressure < MIN_GAS:
+            lowest = quantity_text(1e-5 * facts.least_pressure, "bar")
+            rule = "is nearly a vacuum"
+            yield Complaint(
+                "least pressure of the gas", lowest, rule, "check gauge and peg; pressures must be absolute"
+            )
+        lies_late = abs(facts.peak_angle) > LATEST_PEAK and facts.peak_pressure > 2.0 * abs(facts.least_pressure)
+        place = f"the peak of {peak} lies {math.degrees(facts.peak_angle) % 720.0:.4g} deg after the firing dead centre"
+        if facts.imep < -_ROUNDING * facts.peak_pressure:
+            rule = f"is {quantity_text(facts.torque, 'N m')}, so the gas takes work" + f", and {place}" * lies_late
+            remedy = "check angle_zero" if lies_late else "check angle_zero, unless the engine was motored"
+            yield Complaint("mean torque of the gas", "", rule, remedy)
+        elif lies_late:
+            yield Complaint("peak of the gas", "", place, "check angle_zero")
+        if facts.power > MAX_POWER * facts.displacement:
+            power = quantity_text(1e-3 * facts.power, "kW")
+            rule = f"is {1e-6 * facts.power / facts.displacement:.3g} kW for each litre; racing engines reach 230 kW"
+            yield Complaint("power of the gas", power, rule, "check pressure_unit, bore, stroke and speed")

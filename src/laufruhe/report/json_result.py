@@ -14,6 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.recorded_gas import gas_facts
 from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.physics.static_cases import settled
 from laufruhe.physics.torque import torque_facts
@@ -43,7 +44,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
     points = [_point(result, k) for k in range(len(problem.points))]
     # a single operating point is at the top level
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
-    keys = ("name", "speed", "weight", "torque", *((*places, "shaking") if len(points) > 1 else ()))
+    keys = ("name", "speed", "weight", "torque", "gas", *((*places, "shaking") if len(points) > 1 else ()))
     if series:
         keys += ("series",)
         points = [{**point, "series": _series(result, k)} for k, point in enumerate(points)]
@@ -77,7 +78,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
             (point["shaking"] for point in points),
             key=lambda shaking: [max(shaking[load], default=0.0) for load in ("force", "moment")],
         ),
-        "points": [{key: point[key] for key in keys} for point in points],
+        "points": [{key: point[key] for key in keys if key in point} for point in points],
         **(_on_mounts(result) if is_elastic(result) else {}),
         **{
             name: section.record(result)
@@ -126,12 +127,14 @@ def _objective(result: Result) -> Record | None:
 def _point(result: Result, k: int) -> Record:
     point, final = result.problem.points[k], result.final
     facts = torque_facts(final.engine, point, result.problem.fidelity)
+    gas = gas_facts(final.engine, point, result.problem.fidelity)
     return {
         **_attributes(point, "name speed weight"),
         "mounts": [],
         **{places.key: _places(result, k, places.channel) for places in places_of(result)},
         "shaking": _shaking(final.loads[k].wrench),
         "torque": _attributes(facts, "mean power least=minimum largest excursion irregularity"),
+        **({"gas": {**asdict(gas), "recording": list(gas.recording)}} if gas else {}),
     }
 
 

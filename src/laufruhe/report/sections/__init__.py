@@ -9,7 +9,7 @@ from laufruhe.solvers.result import Result
 
 SECTIONS = (
     values.attainable, stars.crank_stars, values.objectives, values.decisions, weights.weights, weights.factors,
-    values.limits, loads.places, loads.torque, elastic.modes, elastic.load_cases, loads.orders,
+    values.limits, loads.places, loads.gas, loads.torque, elastic.modes, elastic.load_cases, loads.orders,
 )  # fmt: skip
 
 

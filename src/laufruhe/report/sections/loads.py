@@ -21,6 +21,7 @@ from laufruhe.present.measures import (
     uses_torque,
 )
 from laufruhe.present.numbers import DASH, aligned, number, percent
+from laufruhe.present.recorded_gas import HEAD, gas_note, gas_rows
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import place_measures
 from laufruhe.problem.loads import PointLoads
@@ -103,6 +104,12 @@ def orders(result: Result) -> list[Table]:
 def _amplitudes(loads: PointLoads) -> list[Array]:
     shaking = [shaking_orders(loads.wrench)[0], *moment_orders(loads.wrench)]
     return shaking if loads.mount_forces is None else [mount_orders(loads.mount_forces).mean(axis=1), *shaking]
+
+
+def gas(result: Result) -> list[Table]:
+    """Return a row per operating point with a recorded pressure trace."""
+    rows, note = gas_rows(result.problem), " ".join(gas_note(result.problem))
+    return [Table(HEAD, rows, title="Recorded gas pressure", note=note, file="gas-pressure")]
 
 
 def torque(result: Result) -> list[Table]:

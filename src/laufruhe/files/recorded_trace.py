@@ -1,0 +1,338 @@
+"""Pressure traces as test benches record them: columns, units, cycles, zeros of angle and pressure, noise."""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from laufruhe.errors import counted
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, errors_at_key, nearest, si_value
+from laufruhe.files.csv_rows import table_of
+from laufruhe.files.fields import Table
+from laufruhe.files.number_tables import NumberTable, unit_in
+from laufruhe.machine import Cycle, PressureTrace
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.pressure_trace import smooth_cycle
+
+_ANGLE_NAME = re.compile(r"angle|winkel|^(?:ca|kw|cad|theta|phi|alpha|gamma)\b", re.IGNORECASE)
+_GAUGE_NAME = re.compile(r"gauge|überdruck|ueberdruck", re.IGNORECASE)
+_ALIKE = 0.9
+"""Least correlation of columns that are cycles of one cylinder."""
+_UNLIKE, _MANY = 0.7, 0.2
+"""Correlation with the mean below which a cycle is unlike the others, and the largest share of such cycles."""
+_LARGER = 3.0
+"""Range of a column over that of the first pressure from which the first may be no cylinder pressure."""
+_FEWEST = 4
+_WHOLE = 0.95
+"""Least share of the points of the longest cycle that a cycle has."""
+_NEAR_FIRING = math.radians(60.0)
+"""Largest angle between the peak pressure and its dead centre at which the peak tells which dead centre it is."""
+_PEG_WIDTH = math.radians(5.0)
+"""Angle to either side over which the pressure is averaged to be pegged."""
+_ZEROS = {"firing": 0.0, "gas exchange": math.tau}
+
+
+class PegTable(Table):
+    """Known pressure at an angle, to which a floating pressure is moved."""
+
+    at: f.Angle = f.required("Crank angle after the firing dead centre; the mean of 5 degrees to either side counts.")
+    to: f.PositivePressure = f.required(
+        "Absolute pressure there, such as that in the intake at its bottom dead centre."
+    )
+
+
+class RecordedTable(Table):
+    """A recorded trace, as test benches and simulations write it: a text file, an .xlsx or a .mat file."""
+
+    file: str = f.required("Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.")
+    sheet: str | None = f.optional("Sheet of a spreadsheet; by default that with the most rows of numbers.")
+    angle_column: str | int | None = f.optional("Name or number of the column of crank angles, if it is not evident.")
+    pressure_column: str | int | list[str | int] | None = f.optional(
+        "Name or number of the column of pressures, or several that are cycles of the cylinder."
+    )
+    angle_unit: str | None = f.optional("Unit of the angles, if it is not in the file; deg by default.")
+    pressure_unit: str | None = f.optional("Unit of the pressures, if it is not in the file; bar by default.")
+    gauge: bool | None = f.optional("true: pressures count from crankcase_pressure. By default they are absolute.")
+    peg: PegTable | None = f.optional("Moves a floating pressure to a known one, at one angle.")
+    cycles: Literal["mean", "worst"] | int = f.optional(
+        "Of several cycles: their mean, the one with the highest pressure, or that with this number.", "mean"
+    )
+    smooth: bool = f.optional("false keeps the noise of the measurement.", True)
+
+
+class RecordedFile:
+    """Columns of a recorded file, and sentences about how they are read."""
+
+    def __init__(self, table: RecordedTable, folder: Path, where: str) -> None:
+        self.table, self.where, self.said = table, where, list[str]()
+        self.numbers: NumberTable = table_of(table.file, folder / table.file, f"{where}.file", table.sheet)
+        self.values = np.where(np.abs(self.numbers.values) < f.LARGEST, self.numbers.values, np.nan)
+        if self.values.shape[1] < 2:
+            raise self.refused("has no columns of crank angle and pressure", "give a file with both")
+        if len(self.values) < _FEWEST:
+            raise self.refused(f"has {counted(len(self.values), 'row')}, too few for a cycle", "give one every degree")
+        self.angle_column = self._angle_column()
+        self.pressure_columns = self._pressure_columns()
+
+    def refused(self, rule: str, remedy: str, key: str = "file") -> Refused:
+        """Return a refusal of the file, or of a key about it."""
+        value = getattr(self.table, key)
+        return Refused(f"{self.where}.{key}", None if isinstance(value, bool) else value, rule, remedy)
+
+    def name(self, column: int) -> str:
+        """Return the heading of a column, or its number."""
+        return f"'{self.numbers.names[column]}'" if self.numbers.names[column] else f"column {column + 1}"
+
+    def _column(self, word: str | int, key: str) -> int:
+        names = self.numbers.names
+        if isinstance(word, int):
+            if not 1 <= word <= len(names):
+                raise self.refused(f"is not among {counted(len(names), 'column')}", "count them from 1", key)
+            return word - 1
+        plain = [name.strip().lower() for name in names]
+        if word.strip().lower() not in plain:
+            raise self.refused("is no heading of the file", nearest(word, [n for n in names if n] or ["1"]), key)
+        return plain.index(word.strip().lower())
+
+    def _angle_column(self) -> int:
+        if self.table.angle_column is not None:
+            return self._column(self.table.angle_column, "angle_column")
+        values, units = self.values, self.numbers.units
+        of_unit = [k for k, unit in enumerate(units) if unit and unit.dimension == "rad"]
+        of_name = [k for k, name in enumerate(self.numbers.names) if _ANGLE_NAME.search(name)]
+        if of_unit or of_name:
+            return (of_unit or of_name)[0]
+        turning = [k for k in range(len(units)) if _rises(values[:, k]) and _turns(values[:, k])]
+        if len(turning) > 1:
+            names = ", ".join(map(self.name, turning))
+            raise self.refused(f"may have its crank angles in {names}", "name one by angle_column")
+        rising = [k for k in range(len(units)) if _rises(values[:, k])]
+        if not turning and rising:
+            first, last = _finite(values[:, rising[0]])[[0, -1]]
+            rule = f"has no crank angles: {self.name(rising[0])} runs from {first:.6g} to {last:.6g}, as a time does"
+            remedy = "convert it to crank angle and pressure, which needs the dead centre and the gain of the sensor"
+            raise self.refused(rule, remedy)
+        return turning[0] if turning else 0
+
+    def _pressure_columns(self) -> list[int]:
+        words = self.table.pressure_column
+        if words is not None:
+            columns = [
+                self._column(word, "pressure_column") for word in (words if isinstance(words, list) else [words])
+            ]
+            if not columns:
+                raise self.refused("names no column", "name one", "pressure_column")
+            return columns
+        values, units = self.values, self.numbers.units
+        others = [k for k in range(len(units)) if k != self.angle_column]
+        columns = [k for k in others if (unit := units[k]) and unit.dimension == "Pa"]
+        columns = columns or [k for k in others if units[k] is None]
+        if not columns:
+            rule = f"has no pressures: {self.name(others[0])} has another unit"
+            raise self.refused(rule, "convert it to a pressure, which needs the gain of the sensor")
+        ranges = {k: float(np.ptp(_finite(values[:, k]))) for k in columns}
+        first = columns[0]
+        if max(ranges.values()) > _LARGER * ranges[first]:
+            names = ", ".join(map(self.name, columns))
+            raise self.refused(f"may have the pressure of the cylinder in {names}", "name one by pressure_column")
+        alike = [k for k in columns if k == first or _correlation(values[:, first], values[:, k]) > _ALIKE]
+        unused = [self.name(k) for k in others if k not in alike]
+        self.said += [f"Columns that are not used: {', '.join(unused)}."] if unused else []
+        return alike
+
+    def angles(self) -> Array:
+        """Return the angles of all rows [rad]."""
+        values, unit = self.values[:, self.angle_column], self.numbers.units[self.angle_column]
+        name = self.table.angle_unit or (unit.name if unit else "")
+        if not name:
+            name = "rad" if _turns(values) == math.tau else "deg"
+            self.said.append(f"Angles are taken as {name}, because the file names no unit.")
+        return self._used(self.angle_column) * si_value(f"1 {name}", "rad", f"{self.where}.angle_unit", name)
+
+    def pressures(self, air: float) -> Array:
+        """Return the pressures of all rows and columns [Pa]; `air` is added to those of a gauge."""
+        first, is_gauge = self.pressure_columns[0], self.table.gauge
+        of_file, name = self.numbers.units[first], self.table.pressure_unit
+        of_key = unit_in(name) if name else None
+        if name and of_file and of_key != of_file:
+            self.said.append(f"Pressures are taken as {name}, as the problem says; the file says {of_file.name}.")
+        if not name and not of_file:
+            self.said.append("Pressures are taken as bar, because the file names no unit.")
+        unit = of_key or (None if name else of_file)
+        text = unit.name if unit else name or "bar"
+        factor = si_value(f"1 {text}", "Pa", f"{self.where}.pressure_unit", name or text)
+        pressures = np.stack([self._used(column) for column in self.pressure_columns], axis=1) * factor
+        if is_gauge is None and self.table.peg is None:
+            heading = self.numbers.names[first]
+            is_gauge = bool((unit and unit.is_gauge) or _GAUGE_NAME.search(heading))
+        if is_gauge and self.table.peg is not None:
+            raise self.refused("is given beside peg, which finds the zero of the pressure", "keep one", "gauge")
+        if is_gauge:
+            self.said.append(f"Pressures are those of a gauge, in air of {1e-5 * air:.6g} bar.")
+        return pressures + (air if is_gauge else 0.0)
+
+    def _used(self, column: int) -> Array:
+        missing = np.flatnonzero(np.isnan(self.values[:, column]))
+        if len(missing):
+            rule = f"line {self.numbers.lines[missing[0]]} has no number in {self.name(column)}"
+            raise self.refused(rule, "correct or remove it")
+        return self.values[:, column]
+
+
+def recorded_trace(
+    table: RecordedTable, folder: Path, where: str, cycle: Cycle, pace: float, air: float, zero: str | float | None,
+) -> PressureTrace:  # fmt: skip
+    """Return the trace of a recorded file in the folder of a problem, over one cycle over `pace`, without its noise.
+
+    `air` is the pressure around [Pa]. `zero` is the crank angle after firing at which the file counts zero [rad], or
+    the name of this dead centre; None leaves it to the peak of the pressure.
+    """
+    file = RecordedFile(table, folder, where)
+    period = cycle.angle / pace
+    angles, all_cycles = _cycles(file, file.angles(), file.pressures(air), period)
+    pressures = _chosen(file, all_cycles)
+    with errors_at_key(f"{where}.file", table.file):
+        smooth = smooth_cycle(angles, pressures, cycle, pace)
+    treatment = "kept"
+    if smooth.cut_off is not None and table.smooth:
+        angles, pressures = smooth.angles, smooth.pressures
+        treatment = f"removed by a low-pass that halves order {smooth.cut_off:.3g} of crank speed"
+    file.said.append(f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}.")
+    angles = angles + _zero(file, angles, pressures, zero, period)
+    if table.peg is not None:
+        since = np.mod(angles - table.peg.at + math.pi, period) - math.pi
+        rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
+        pressures = pressures + rise
+        at = math.degrees(table.peg.at)
+        file.said.append(f"Pressures are raised by {_bar(rise)}, to {_bar(table.peg.to)} at {at:.6g} deg.")
+    if pressures.min() <= 0.0:
+        rule = f"has pressures down to {_bar(pressures.min())}, which are not absolute"
+        raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
+    with errors_at_key(f"{where}.file", table.file):
+        return PressureTrace(tuple(angles.tolist()), tuple(pressures.tolist()), air, tuple(file.said))
+
+
+def _bar(pressure: float, digits: int = 4) -> str:
+    return f"{1e-5 * pressure:.{digits}g} bar"
+
+
+def _finite(values: Array) -> Array:
+    return np.asarray(values[np.isfinite(values)]) if np.isfinite(values).any() else np.zeros(2)
+
+
+def _rises(values: Array) -> bool:
+    # true if values rise or fall steadily, with some restarts
+    steps = np.diff(_finite(values))
+    sign = np.sign(np.median(steps)) if len(steps) else 0.0
+    return bool(sign != 0.0 and np.mean(np.sign(steps) == sign) > 0.95)
+
+
+def _turns(values: Array) -> float:
+    # length of a turn of the crank in values that may be angles, 360 or 2 pi; zero if they are none
+    steps = np.diff(_finite(values))
+    step = abs(float(np.median(steps))) if len(steps) else 0.0
+    extent = float(np.ptp(_finite(values))) + step
+    if extent > 300.0:
+        return 360.0
+    turns = extent / math.tau
+    return math.tau if turns > 0.9 and abs(turns - round(turns)) * math.tau < 1.5 * step else 0.0
+
+
+def _correlation(first: Array, other: Array) -> float:
+    deviations = [np.nan_to_num(column - np.nanmean(column)) for column in (first, other)]
+    lengths = math.prod(float(np.linalg.norm(deviation)) for deviation in deviations)
+    return float(deviations[0] @ deviations[1]) / lengths if lengths > 0.0 else 0.0
+
+
+def _cycles(file: RecordedFile, angles: Array, pressures: Array, period: float) -> tuple[Array, Array]:
+    """Return the angles of one cycle, shape (n,), and the pressures of every cycle, shape (cycles, n).
+
+    Cycles stand one under another, each with its angles, or with angles that rise on; columns are cycles too.
+    """
+    if np.median(np.diff(angles)) < 0.0:
+        angles, pressures = angles[::-1], pressures[::-1]
+    # where angles begin anew, whole turns make them rise on
+    drops = np.concatenate([[0.0], np.maximum(-np.diff(angles), 0.0)])
+    turns = np.where(drops > math.pi, np.ceil(drops / math.tau - 1e-6), 0.0)
+    angles = angles + math.tau * np.cumsum(turns)
+    back = np.flatnonzero(np.diff(angles) < 0.0)
+    if len(back):
+        late, early = (f"{math.degrees(angles[back[0] + side]):.6g} deg" for side in (1, 0))
+        raise file.refused(f"has {late} after {early}", "sort its rows by angle")
+    step = float(np.median(np.diff(angles))) if len(angles) > 1 else 0.0
+    new = np.concatenate([[True], (np.diff(angles) > 1e-3 * step) | np.any(np.diff(pressures, axis=0) != 0.0, axis=1)])
+    angles, pressures = angles[new], pressures[new]
+    if len(angles) < 2 or angles[-1] - angles[0] <= period + 1e-3 * step:
+        return angles, pressures.T
+    index = np.floor((angles - angles[0]) / period + 1e-6).astype(int)
+    counts = np.bincount(index)
+    whole = np.flatnonzero(counts >= _WHOLE * counts.max())
+    # the last point of the file may be the end of a whole cycle
+    partial = np.count_nonzero((counts > 1) & (counts < _WHOLE * counts.max()))
+    file.said += [f"Cycles that are not whole and not used: {partial}."] if partial else []
+    cycles = []
+    for k in whole:
+        local, values = angles[index == k] - k * period, pressures[index == k]
+        # the end of a cycle may repeat the beginning of the next
+        new = np.concatenate([[True], np.diff(local) > 1e-3 * step])
+        cycles.append((local[new], values[new]))
+    grid = cycles[0][0]
+    matrix = [
+        column if len(local) == len(grid) and np.abs(local - grid).max() < 1e-3 * step
+        else np.interp(grid, local, column, period=period)
+        for local, values in cycles for column in values.T
+    ]  # fmt: skip
+    return grid, np.array(matrix)
+
+
+def _chosen(file: RecordedFile, cycles: Array) -> Array:
+    """Return the mean, the worst or the named cycle."""
+    choice, count, peaks = file.table.cycles, len(cycles), cycles.max(axis=1)
+    if count == 1:
+        if choice not in ("mean", "worst", 1):
+            raise file.refused("is not in the file, which has one cycle", "leave it out", "cycles")
+        return np.asarray(cycles[0])
+    mean = np.asarray(cycles.mean(axis=0))
+    unlike = sum(_correlation(mean, cycle) < _UNLIKE for cycle in cycles)
+    if unlike > _MANY * count:
+        rule = f"has {counted(count, 'cycle')} that differ, and {unlike} of them are unlike their mean"
+        raise file.refused(rule, "check engine.cycle, or name one by pressure_column or cycles")
+    spread = _bar(peaks.std(ddof=1), 3)
+    which = f"Of {count} cycles, with peaks of {_bar(peaks.mean())} and a standard deviation of {spread}"
+    if choice == "mean":
+        file.said.append(f"{which}, the mean is used.")
+        return mean
+    if isinstance(choice, int) and not 1 <= choice <= count:
+        raise file.refused(f"is not among {counted(count, 'cycle')}", "count them from 1", "cycles")
+    k = int(peaks.argmax()) if choice == "worst" else int(choice) - 1
+    file.said.append(f"{which}, number {k + 1} is used.")
+    return np.asarray(cycles[k])
+
+
+def _zero(
+    file: RecordedFile, angles: Array, pressures: Array, zero: str | float | None, period: float
+) -> float:  # fmt: skip
+    """Return the crank angle after firing at which the file counts zero [rad]."""
+    if isinstance(zero, float):
+        return zero
+    peak = float(angles[int(np.argmax(pressures))])
+    if zero is None:
+        zero = "firing"
+        from_exchange = abs(math.remainder(peak - math.tau, period))
+        opposite = np.abs(np.mod(angles - peak - math.tau + math.pi, period) - math.pi) < _NEAR_FIRING
+        rise = pressures - pressures.min()
+        if (
+            period > 1.5 * math.tau
+            and from_exchange < _NEAR_FIRING
+            and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
+        ):
+            zero = "gas exchange"
+        place = math.degrees(math.remainder(peak + _ZEROS[zero], period))
+        dead_centre = f"0 deg of the file is taken as the {zero} dead centre"
+        file.said.append(f"{dead_centre}; the peak then lies {place:.4g} deg after firing.")
+    return _ZEROS[zero]

@@ -1,0 +1,36 @@
+"""Words of the trade, and the keys of problem files that they mean."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections import defaultdict
+from functools import cache
+from pathlib import Path
+
+_FILE = Path(__file__).with_name("trade_words.toml")
+_LETTERS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss", "é": "e"})
+
+
+@cache
+def trade_words() -> tuple[tuple[str, str, str], ...]:
+    """Return words of the trade, each with its key and a note on what the key is."""
+    entries = tomllib.loads(_FILE.read_text(encoding="utf-8"))["meanings"]
+    return tuple((word, entry["key"], entry["note"]) for entry in entries for word in entry["words"].split(", "))
+
+
+@cache
+def _by_word() -> dict[str, list[tuple[str, str]]]:
+    by_word = defaultdict(list)
+    for word, key, note in trade_words():
+        by_word[_plain(word)].append((key, note))
+    return dict(by_word)
+
+
+def _plain(word: str) -> str:
+    return re.sub(r"[\s_-]+", "", word.lower().translate(_LETTERS))
+
+
+def meanings(word: str) -> list[tuple[str, str]]:
+    """Return the keys that a word of the trade means, each with a note on what it is; empty for other words."""
+    return _by_word().get(_plain(word), [])

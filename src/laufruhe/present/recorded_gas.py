@@ -1,0 +1,43 @@
+"""Key figures of recorded pressure traces as text."""
+
+from __future__ import annotations
+
+from laufruhe.physics.recorded_gas import GasFacts, gas_facts
+from laufruhe.present.numbers import DEGREE, trimmed
+from laufruhe.problem.problem import Problem
+
+HEAD = ("at", "peak [bar]", "peak at [deg]", "imep [bar]", "mean torque [N m]", "power [kW]", "power [kW/l]")
+"""Heads of the figures of a recorded trace."""
+
+
+def gas_rows(problem: Problem) -> list[tuple[str, ...]]:
+    """Return a row of figures for each operating point with a recorded trace, after its name."""
+    return [(name, *_figures(facts)) for name, facts in _facts(problem)]
+
+
+def gas_note(problem: Problem) -> list[str]:
+    """Return sentences on how the files of recorded traces were read."""
+    return list(dict.fromkeys(sentence for _, facts in _facts(problem) for sentence in facts.recording))
+
+
+def gas_lines(problem: Problem) -> list[str]:
+    """Return sentences on how the file of a recorded trace was read, and a line for each operating point with it."""
+    lines = [f"gas: {sentence}" for sentence in gas_note(problem)]
+    for name, peak, angle, imep, torque, power, density in gas_rows(problem):
+        lines.append(
+            f"gas at {name}: peak {peak} bar at {angle} deg, imep {imep} bar, mean torque {torque} N m, "
+            f"power {power} kW, {density} kW/l"
+        )
+    return lines
+
+
+def _facts(problem: Problem) -> list[tuple[str, GasFacts]]:
+    facts_of = ((point.name, gas_facts(problem.engine, point, problem.fidelity)) for point in problem.points)
+    return [(name, facts) for name, facts in facts_of if facts is not None]
+
+
+def _figures(facts: GasFacts) -> list[str]:
+    kilowatts, litres = 1e-3 * facts.power, 1e3 * facts.displacement
+    bars = 1e-5 * facts.peak_pressure, 1e-5 * facts.imep
+    numbers = bars[0], DEGREE * facts.peak_angle, bars[1], facts.torque, kilowatts, kilowatts / litres
+    return [trimmed(number) for number in numbers]

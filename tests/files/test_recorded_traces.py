@@ -1,0 +1,451 @@
+"""Recorded pressure files as test benches write them: every form of one cycle gives the same torque."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import random
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import openpyxl
+import pytest
+from _pytest.mark.structures import ParameterSet
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.io import savemat
+from typer.testing import CliRunner, Result
+
+from laufruhe.cli import app
+from laufruhe.errors import InputError, LaufruheError
+from laufruhe.files.number_tables import number_table
+from laufruhe.files.reader import load
+from laufruhe.machine import PressureTrace
+from laufruhe.physics.recorded_gas import GasFacts, gas_facts
+from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
+from laufruhe.problem.problem import Problem
+from recorded_cycle import BORE, DEGREES, ROD, STROKE, cycle_pressure, mean_torque
+
+FILES = Path(__file__).parent / "traces"
+Array = NDArray[np.float64]
+
+
+def problem_with(
+    folder: Path, file: str, gas: str = "", cycle: str = "four-stroke", engine: str = "", speed: int = 2000
+) -> Problem:
+    sizes = (
+        engine
+        or f'cylinders = 1\nbore = "{1e3 * BORE} mm"\nstroke = "{1e3 * STROKE} mm"\nrod_length = "{1e3 * ROD} mm"'
+    )
+    path = folder / "scene.toml"
+    path.write_text(
+        f'title = "Recorded"\n[engine]\nlayout = "inline"\ncycle = "{cycle}"\n{sizes}\n'
+        + ("" if "reciprocating_mass" in sizes else 'reciprocating_mass = "0.45 kg"\n')
+        + f'[gas]\nmodel = "trace"\nfile = "{file}"\n{gas}\n[[operating_points]]\nspeed = "{speed} rpm"\n',
+        encoding="utf-8",
+    )
+    return load(path)
+
+
+def facts_of(problem: Problem) -> tuple[GasFacts, TorqueFacts, tuple[str, ...]]:
+    (point,) = problem.points
+    gas = gas_facts(problem.engine, point, problem.fidelity)
+    assert gas is not None
+    assert isinstance(point.gas, PressureTrace)
+    return gas, torque_facts(problem.engine, point, problem.fidelity), point.gas.recording
+
+
+# exact figures of the curve behind these files: 80 x 90 mm, rod 150 mm, 2000 rpm, from an integration in other code
+EXACT = {"mean": 47.10479261881404, "peak": 647.7534226089093, "imep": 13.084664616337232e5, "pressure": 61.483590062e5}
+ENGINE = 'cylinders = 1\nbore = "80 mm"\nstroke = "90 mm"\nrod_length = "150 mm"'
+
+
+@pytest.mark.parametrize(
+    ("file", "tolerance", "gas", "said"),
+    [
+        ("plain.csv", 0.002, "", "firing dead centre"),
+        ("indicating.txt", 0.002, "", "'PEIN', 'PAUS'"),
+        ("columns.csv", 0.005, "", "Of 20 cycles"),
+        ("stacked.txt", 0.025, "", "Of 4 cycles"),
+        ("labview.lvm", 0.002, "", "'Trigger'"),
+        ("simulation.csv", 0.002, "", "'Volume (Cylinder 1)'"),
+        ("gauge.csv", 0.002, "", "gas exchange dead centre"),
+        ("floating.csv", 0.002, 'peg = { at = "-180 deg", to = "1 bar" }', "raised by 3.2 bar"),
+    ],
+)
+def test_files_of_benches_give_the_torque_behind_them(
+    file: str, tolerance: float, gas: str, said: str, tmp_path: Path
+) -> None:
+    (tmp_path / file).write_bytes((FILES / file).read_bytes())
+    problem = problem_with(tmp_path, file, f'crankcase_pressure = "1 bar"\n{gas}', engine=ENGINE)
+    facts, _, recording = facts_of(problem)
+    assert facts.torque == pytest.approx(EXACT["mean"], rel=tolerance)
+    assert facts.imep == pytest.approx(EXACT["imep"], rel=tolerance)
+    assert facts.power == pytest.approx(EXACT["mean"] * 2000 * math.pi / 30, rel=tolerance)
+    of_gas = torque_parts(problem.engine, problem.points[0])["gas"]
+    assert of_gas.sample(2880).max() == pytest.approx(EXACT["peak"], rel=tolerance)
+    assert facts.peak_pressure == pytest.approx(EXACT["pressure"], rel=tolerance)
+    assert math.degrees(facts.peak_angle) == pytest.approx(15.47, abs=1.0)
+    assert said in " ".join(recording)
+    assert not problem.plausibility_warnings
+
+
+def test_a_record_over_time_is_refused_in_one_sentence(tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_bytes((FILES / "time-and-encoder.txt").read_bytes())
+    with pytest.raises(
+        InputError, match=r'gas\.file = "t\.txt": has no crank angles: column 1 runs from 0 to .*as a time'
+    ):
+        problem_with(tmp_path, "t.txt", engine=ENGINE)
+
+
+FOUR = (
+    'bore = "80 mm"\nstroke = "80 mm"\nrod_length = "140 mm"\ncylinder_spacing = "90 mm"\nfiring_order = [1, 3, 4, 2]\n'
+    'reciprocating_mass = "0.45 kg"\n'
+)
+SINGLE = 'cylinders = 1\nbore = "80 mm"\nstroke = "80 mm"\nrod_length = "140 mm"\nreciprocating_mass = "0.45 kg"\n'
+
+
+def bench(file: str, folder: Path, engine: str = SINGLE, gas: str = "", speed: int = 1500) -> Problem:
+    (folder / file).write_bytes((FILES / file).read_bytes())
+    return problem_with(folder, file, gas, engine=engine, speed=speed)
+
+
+@pytest.mark.parametrize("file", ["latin-1.csv", "percent.txt", "blanks.txt", "two-headings.csv"])
+def test_headings_comments_and_encodings(file: str, tmp_path: Path) -> None:
+    """An integration of the four files in other code gives 15.595 N m."""
+    assert facts_of(bench(file, tmp_path))[0].torque == pytest.approx(15.595, abs=2e-3)
+
+
+def test_a_row_of_units(tmp_path: Path) -> None:
+    facts, _, recording = facts_of(bench("units-row.csv", tmp_path, FOUR))
+    assert facts.peak_pressure == pytest.approx(47.53e5, rel=1e-3)
+    assert "because the file names no unit" not in " ".join(recording)
+
+
+def test_several_cycles_are_averaged(tmp_path: Path) -> None:
+    """An integration of the mean in other code gives 15.73 N m and 407.4 N m."""
+    facts, torque, recording = facts_of(bench("eight-cycles.csv", tmp_path))
+    assert facts.torque == pytest.approx(15.73, abs=5e-3)
+    assert torque.largest == pytest.approx(407.4, rel=1e-2)
+    assert "Of 8 cycles, with peaks of 55.09 bar and a standard deviation of 2.14 bar, the mean is used." in recording
+
+
+def test_noise_in_tenths_of_a_degree(tmp_path: Path) -> None:
+    """The torque is that of the cycle, and no derivative of noise: 405 and -377 N m were such."""
+    _, torque, recording = facts_of(bench("tenths-of-a-degree.csv", tmp_path, FOUR))
+    assert "Noise: 0.2 bar rms, removed by a low-pass" in " ".join(recording)
+    assert torque.excursion == pytest.approx(107.0, rel=1e-2)
+    # means over whole degrees leave a third of the noise
+    rows = np.loadtxt(FILES / "tenths-of-a-degree.csv", delimiter=",", skiprows=1)
+    means = rows[:, 1].reshape(720, 10).mean(axis=1)
+    (tmp_path / "means.csv").write_text(
+        "".join(f"{a + 0.45},{p}\n" for a, p in zip(range(-360, 360), means, strict=True))
+    )
+    _, coarse, _ = facts_of(problem_with(tmp_path, "means.csv", engine=FOUR, speed=1500))
+    assert torque.largest == pytest.approx(coarse.largest, rel=1e-2)
+    assert torque.minimum == pytest.approx(coarse.minimum, abs=1e-2 * coarse.largest)
+    kept = facts_of(bench("tenths-of-a-degree.csv", tmp_path, FOUR, "smooth = false"))[1]
+    assert kept.mean == pytest.approx(torque.mean, rel=1e-7)
+    assert torque.largest < kept.largest < 1.05 * torque.largest
+    assert torque.minimum > kept.minimum > torque.minimum - 0.05 * torque.largest
+
+
+def test_a_zero_at_the_other_dead_centre_is_doubted(tmp_path: Path) -> None:
+    problem = bench("other-dead-centre.csv", tmp_path)
+    (warning,) = map(str, problem.plausibility_warnings)
+    assert "mean torque of the gas: is -9.5" in warning
+    assert "lies 192 deg after the firing dead centre; check angle_zero" in warning
+    assert facts_of(problem)[0].torque == pytest.approx(-9.52, abs=0.01)
+    right = bench("other-dead-centre.csv", tmp_path, gas="angle_zero = -180")
+    assert not right.plausibility_warnings
+    assert facts_of(right)[0].torque == pytest.approx(15.60, abs=0.01)
+
+
+def test_a_pressure_over_300_bar_is_doubted(tmp_path: Path) -> None:
+    problem = bench("kilopascal.csv", tmp_path, speed=2500)
+    warnings = " ".join(map(str, problem.plausibility_warnings))
+    assert "peak pressure of the gas = 4753 bar: is more than 300 bar" in warnings
+    assert "kW for each litre" in warnings
+    right = bench("kilopascal.csv", tmp_path, gas='pressure_unit = "kPa"')
+    assert not right.plausibility_warnings
+    assert facts_of(right)[0].peak_pressure == pytest.approx(47.53e5, rel=1e-3)
+
+
+def rows(
+    *columns: Sequence[float] | Array, by: str = ",", decimal: str = ".", form: str = "%.5f", head: str = ""
+) -> str:
+    lines = (by.join((form % cell).replace(".", decimal) for cell in row) for row in zip(*columns, strict=True))
+    return head + "\n".join(lines) + "\n"
+
+
+def workbook(*sheets: Sequence[Sequence[Any]]) -> bytes:
+    book, stream = openpyxl.Workbook(), io.BytesIO()
+    for cells in sheets:
+        sheet = book.create_sheet()
+        for row in cells:
+            sheet.append(list(row))
+    book.remove(book.worksheets[0])
+    book.save(stream)
+    return stream.getvalue()
+
+
+def matlab(**variables: Any) -> bytes:
+    stream = io.BytesIO()
+    savemat(stream, variables)
+    return stream.getvalue()
+
+
+A, P = DEGREES, cycle_pressure(DEGREES)
+CLOSED, CLOSED_P = np.append(A, 360.0), np.append(P, P[0])
+TURNS = np.tile(np.arange(0.0, 360.0), 6)
+LONG = np.arange(0.0, 3800.0)
+UNEVEN = np.concatenate([np.arange(-360, -30, 2.0), np.arange(-30, 60, 0.25), np.arange(60, 360, 2.0)])
+PAIRS = list(zip(A.tolist(), P.tolist(), strict=True))
+NAMED = "CA,PCYL1,PCYL2\ndeg,bar,bar\n"
+
+
+def form(name: str, content: str | bytes, gas: str = "", said: str = "", ending: str = "csv") -> ParameterSet:
+    return pytest.param(content, gas, said, ending, id=name)
+
+
+FORMS = [
+    form("two columns", rows(A, P), said="Angles are taken as deg, because"),
+    form("blanks and decimal commas", rows(A, P, by="   ", decimal=",")),
+    form("quotes and decimal commas", "".join(f'"{a:.1f}","{p:.5f}"\n'.replace(".", ",") for a, p in PAIRS)),
+    form("UTF-16", rows(A, P, by="\t", head="Winkel\tDruck\n°KW\tbar\n").encode("utf-16")),
+    form("UTF-16 without a mark", rows(A, P, by="\t").encode("utf-16-le")),
+    form("UTF-16, the other way round", rows(A, P, by="\t").encode("utf-16-be")),
+    form("radians", rows(np.radians(A), P, form="%.8f"), said="Angles are taken as rad"),
+    form("radians by unit", rows(np.radians(A), P, form="%.8f", head="theta [rad],p [bar]\n")),
+    form("MPa in a row of units", rows(A, P / 10, form="%.7f", head="CA,p\n[deg],[MPa]\n")),
+    form("Pa in brackets", rows(A, 1e5 * P, head="phi (deg), p (Pa)\n")),
+    form("psia", rows(A, 14.503773773 * P, head="Crank angle (deg), Pressure (psia)\n")),
+    form("bar of a gauge", rows(A, P - 1, head="Crank angle (deg), Pressure (barg)\n"), said="gauge, in air of 1 bar"),
+    form("mbar behind the name", rows(A, 1000 * P, by=";", head="angle_deg;p_mbar\n")),
+    form("kPa in German",
+         rows(A, 100 * P, by=";", decimal=",", head="Kurbelwinkel in °KW;Druck in kPa\n").encode("latin-1")),
+    form("kPa by key", rows(A, 100 * P), gas='pressure_unit = "kPa"'),
+    form("unit of the key before that of the file", rows(A, P, head="a [deg],p [kPa]\n"), gas='pressure_unit = "bar"',
+         said="taken as bar, as the problem says; the file says kPa"),
+    form("names with blanks between blanks",
+         "  crank angle [deg]   cylinder pressure [kPa]\n" + rows(A, 100 * P, by="   ")),
+    form("units in a comment", "# angle [deg]; p [kPa]\n" + rows(A, 100 * P, by=";")),
+    form("pressure first", rows(P, A)),
+    form("pressure first by names", rows(P, A, by=";", head="p in bar;KW in °\n")),
+    form("falling angle", rows(A[::-1], P[::-1])),
+    form("both ends", rows(CLOSED, CLOSED_P)),
+    form("rows given twice", rows(np.repeat(A, 2), np.repeat(P, 2))),
+    form("single precision", rows(np.float32(0.1) * np.arange(-3600, 3600, 10, dtype=np.float32), P, form="%.14f")),
+    form("zero at gas exchange", rows(A + 360, P), said="gas exchange dead centre; the peak then lies"),
+    form("zero at gas exchange by key", rows(A + 360, P), gas='angle_zero = "gas exchange"'),
+    form("0 to 719", rows((A + 720) % 720, P)[:0] + rows(np.arange(720.0), cycle_pressure(np.arange(720.0)))),
+    form("-180 to 540", rows(np.arange(-180.0, 541.0), cycle_pressure(np.arange(-180.0, 541.0)))),
+    form("zero at bottom", rows(A + 180, P), gas="angle_zero = -180"),
+    form("zero at bottom as text", rows(A + 180, P), gas='angle_zero = "-180 deg"'),
+    form("cycles with both ends", rows(np.tile(CLOSED, 3), np.tile(CLOSED_P, 3)), said="Of 3 cycles"),
+    form("an angle that rises on", rows(LONG, cycle_pressure(LONG)), said="Of 5 cycles"),
+    form("an angle that begins anew each turn",
+         rows(TURNS, cycle_pressure(np.arange(360.0, 2520.0))), said="Of 3 cycles"),
+    form("headings before every cycle",
+         2 * rows(A, P, by=";", head="Cycle;Test 7\nKW;PZYL\n°;bar\n"), said="Of 2 cycles"),
+    form("blank lines and remarks", "".join(f"{a};{p:.5f};{'peak' * int(a == 19)}\n\n" for a, p in PAIRS)),
+    form("a footer", rows(A, P) + "end of data\n"),
+    form("date and counts over the numbers", rows(A, P, head="Test of 2024-02-10\n720 2 1\n")),
+    form("uneven steps", rows(UNEVEN, cycle_pressure(UNEVEN))),
+    form("worst cycle", rows(A, 0.9 * P, P, 0.95 * P), gas='cycles = "worst"', said="number 2 is used"),
+    form("second cycle", rows(A, 0.9 * P, P, 0.95 * P), gas="cycles = 2"),
+    form("first of two cylinders", rows(A, P, cycle_pressure(A - 180), head=NAMED), said="not used: 'PCYL2'"),
+    form("second of two cylinders", rows(A, cycle_pressure(A + 180), P, head=NAMED), gas='pressure_column = "pcyl2"'),
+    form("columns by number", rows(np.arange(720), P, A, 0 * A), gas="angle_column = 3\npressure_column = 2"),
+    form("mean of named columns",
+         rows(A, 0.9 * P, 5 * P, 1.1 * P, head="CA,a,b,c\n"), gas='pressure_column = ["a", "c"]'),
+    form("floating, pegged", rows(A, P - 3), gas='peg = { at = -180, to = "1 bar" }', said="raised by 3 bar"),
+    form("gauge by key", rows(A, P - 1), gas="gauge = true"),
+    form("workbook", workbook([["notes"], ["n", 1]], [["TEST DATA"], [None, "PCYL1", "INJ1"], ["deg", "bar", "-"],
+         *((float(np.float32(a)), float(p), 0.0) for a, p in PAIRS)]), ending="xlsx"),
+    form("sheet of a workbook", workbook([["CA", "p"], *((a, 2 * p) for a, p in zip(CLOSED, CLOSED_P, strict=True))],
+         [["CA", "p"], *zip(A.tolist(), P.tolist(), strict=True)]), gas='sheet = "Sheet2"', ending="xlsx"),
+    form("MATLAB, cycles in columns",
+         matlab(theta=A, p=np.stack([0.9 * P, 1.1 * P], axis=1)), said="Of 2 cycles", ending="mat"),
+    form("MATLAB, cycles in rows", matlab(theta=A, p=np.stack([0.9 * P, 1.1 * P]), speed=2000.0), ending="mat"),
+    form("MATLAB, a structure", matlab(SD={"CA": A, "CylPre": P, "n": 3}), ending="mat"),
+    form("MATLAB, one matrix", matlab(M=np.stack([A, P], axis=1)), ending="mat"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "gas", "said", "ending"), FORMS)
+def test_every_form_gives_one_torque(content: str | bytes, gas: str, said: str, ending: str, tmp_path: Path) -> None:
+    (tmp_path / f"f.{ending}").write_bytes(content if isinstance(content, bytes) else content.encode())
+    problem = problem_with(tmp_path, f"f.{ending}", f'crankcase_pressure = "1 bar"\n{gas}')
+    facts, _, recording = facts_of(problem)
+    assert facts.torque == pytest.approx(mean_torque(), rel=1e-4)
+    assert facts.peak_pressure == pytest.approx(1e5 * P.max(), rel=1e-4)
+    assert math.degrees(facts.peak_angle) == pytest.approx(A[P.argmax()], abs=0.51)
+    assert said in " ".join(recording)
+    assert not problem.plausibility_warnings
+
+
+REFUSED = {
+    "nothing": ("", "", "has no columns of crank angle and pressure; give a file with both"),
+    "no numbers": ("hello world\nfoo\n", "", "has no columns of crank angle and pressure"),
+    "a picture": ("\x89PNG\r\n\x1a\n\x01\x02", "", "has no columns of crank angle and pressure"),
+    "few rows": (rows(A[:3], P[:3]), "", "has 3 rows, too few for a cycle; give one every degree"),
+    "part of a cycle": (rows(A[:500], P[:500]), "", "so 221 of the 720 deg of a four-stroke cycle are missing"),
+    "a gap": (rows(np.delete(A, np.s_[20:60]), np.delete(P, np.s_[20:60])), "", "no point between -341 and -300 deg"),
+    "a broken row": (rows(A[:99], P[:99]) + "oops,1\n" + rows(A[99:], P[99:]), "", "line 100 is no row of numbers"),
+    "a missing cell": (rows(A[:99], P[:99]) + "-261,\n" + rows(A[100:], P[100:]), "",
+                       "line 100 has no number in column 2"),
+    "disorder": (rows(A[:99], P[:99]) + "-300,2\n" + rows(A[99:], P[99:]), "", "has -300 deg after -262 deg; sort"),
+    "volts": (rows(A, P, head="a [deg],p [V]\n"), "", "has no pressures: 'p [V]' has another unit; convert"),
+    "floating": (rows(A, P - 3), "", "has pressures down to -2 bar, which are not absolute; write"),
+    "two zeros": (rows(A, P - 3), 'gauge = true\npeg = { at = 0, to = "1 bar" }', "gas.gauge: is given beside peg"),
+    "two angles": (rows(np.arange(720), A, P), "", "may have its crank angles in column 1, column 2; name one"),
+    "two pressures": (rows(A, 0 * P + 1, P, head="CA,PEIN,PCYL1\ndeg,bar,bar\n"), "",
+                      "may have the pressure of the cylinder in 'PEIN', 'PCYL1'; name one by pressure_column"),
+    "no such heading": (rows(A, P, P, head=NAMED), 'pressure_column = "PCYL"', 'column = "PCYL": is no heading'),
+    "no such column": (rows(A, P), "pressure_column = 5", "pressure_column = 5: is not among 2 columns; count"),
+    "no such cycle": (rows(A, P, P), "cycles = 3", "gas.cycles = 3: is not among 2 cycles; count them from 1"),
+    "no such cycle of one": (rows(A, P), "cycles = 3", "gas.cycles = 3: is not in the file, which has one cycle"),
+    "no dead centre": (rows(A, P), 'angle_zero = "OT"', 'gas.angle_zero = "OT": is no dead centre; write "firing"'),
+    "no unit of pressure": (rows(A, P), 'pressure_unit = "deg"', 'gas.pressure_unit = "deg": '),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_read_is_refused_in_one_line(name: str, tmp_path: Path) -> None:
+    content, gas, said = REFUSED[name]
+    (tmp_path / "f.csv").write_text(content, encoding="latin-1")
+    with pytest.raises(InputError) as refused:
+        problem_with(tmp_path, "f.csv", gas)
+    assert said in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 1
+    assert "gas." in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "gas", "said"),
+    [
+        ("f.xlsx", "", "is no spreadsheet that can be read; save it"),
+        ("f.mat", "", "is no MATLAB file; save it with -v7"),
+    ],
+)
+def test_broken_books_are_refused(file: str, gas: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / file).write_bytes(b"abcdefgh" * 99)
+    with pytest.raises(InputError, match=said):
+        problem_with(tmp_path, file, gas)
+
+
+def test_a_sheet_that_is_not_there_is_named(tmp_path: Path) -> None:
+    (tmp_path / "f.xlsx").write_bytes(workbook([[1.0, 2.0]]))
+    with pytest.raises(InputError, match="has no sheet 'Data'; it has: Sheet1"):
+        problem_with(tmp_path, "f.xlsx", 'sheet = "Data"')
+
+
+def test_a_four_stroke_file_in_a_two_stroke_engine_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "f.csv").write_text(rows(A, P))
+    with pytest.raises(
+        InputError, match=r"has 2 cycles that differ, and 1 of them are unlike their mean; check engine\.cycle"
+    ):
+        problem_with(tmp_path, "f.csv", cycle="two-stroke")
+
+
+def test_a_two_stroke_has_one_dead_centre(tmp_path: Path) -> None:
+    turn = np.arange(-180.0, 180.0)
+    (tmp_path / "f.csv").write_text(rows(turn, cycle_pressure(turn)))
+    assert facts_of(problem_with(tmp_path, "f.csv", cycle="two-stroke"))[0].torque > 0.0
+    with pytest.raises(InputError, match="does not suit a two-stroke cycle"):
+        problem_with(tmp_path, "f.csv", 'angle_zero = "gas exchange"', cycle="two-stroke")
+
+
+def test_smooth_files_are_kept_to_the_last_digit(tmp_path: Path) -> None:
+    (tmp_path / "f.csv").write_text(rows(A, P))
+    gas = problem_with(tmp_path, "f.csv").points[0].gas
+    assert isinstance(gas, PressureTrace)
+    assert gas.pressures == tuple(float(f"{p:.5f}") * 1e5 for p in P)
+    assert gas.angles == pytest.approx(np.radians(A), rel=1e-15)
+
+
+def test_the_side_of_a_piston_reads_the_same_files(tmp_path: Path) -> None:
+    turn = np.arange(0.0, 360.0, 2.0)
+    (tmp_path / "f.csv").write_text(rows(turn, 400 + 100 * np.cos(np.radians(turn)), by=";", head="KW;p\n°;kPa\n"))
+    path = tmp_path / "scene.toml"
+    path.write_text(
+        'title = "Pump"\n[engine]\nlayout = "inline"\ncycle = "two-stroke"\ncylinders = 1\nstroke = "90 mm"\n'
+        'rod_length = "170 mm"\nreciprocating_mass = "0.6 kg"\n[gas]\nmodel = "chambers"\n'
+        '[[gas.chambers]]\nend = "head"\n'
+        'bore = "80 mm"\ntrace = { file = "f.csv" }\n[[operating_points]]\nspeed = "300 rpm"\n'
+    )
+    (chamber,) = load(path).points[0].gas.chambers  # type: ignore[union-attr]
+    assert isinstance(chamber.diagram, PressureTrace)
+    assert max(chamber.diagram.pressures) == pytest.approx(5e5)
+
+
+CHANGES: list[Callable[[random.Random, bytearray], None]] = [
+    lambda dice, text: text.__setitem__(dice.randrange(len(text)), dice.randrange(256)),
+    lambda dice, text: text.__delitem__(slice((k := dice.randrange(len(text))), k + dice.randrange(1, 40))),
+    lambda dice, text: text.__setitem__(slice(k := dice.randrange(len(text)), k),
+                                        dice.choice([b",", b"\n", b'"', b";", b"-", b"nan", b"1e999", b"\0", b"#"])),
+]  # fmt: skip
+
+
+@given(seed=st.integers(0, 100_000))
+def test_no_bytes_make_anything_but_a_table_or_one_line(seed: int) -> None:
+    dice = random.Random(seed)
+    angles = np.arange(-360.0, 360.0, 10.0)
+    columns = angles, cycle_pressure(angles)
+    texts = rows(*columns, head="CA,PCYL1\ndeg,bar\n"), rows(*columns, by=";", decimal=","), rows(*columns, by="\t")
+    text = bytearray(dice.choice(texts).encode())
+    for _ in range(dice.choice([1, 2, 5, 50])):
+        dice.choice(CHANGES)(dice, text)
+        text = text or bytearray(b"x")
+    lines = [""]
+    try:
+        table = number_table(bytes(text), ".csv")
+        assert table.values.shape == (len(table.lines), len(table.names))
+        assert len(table.units) == len(table.names)
+    except LaufruheError as error:
+        lines = str(error).splitlines()
+    assert len(lines) == 1
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def test_check_solve_and_json_say_how_the_file_was_read(tmp_path: Path) -> None:
+    problem = bench("eight-cycles.csv", tmp_path)
+    path = tmp_path / "scene.toml"
+    checked = run("check", path)
+    assert checked.exit_code == 0
+    lines = checked.output.splitlines()
+    assert lines[0].startswith("ok: scene, 1 cylinder")
+    assert "gas: Of 8 cycles, with peaks of 55.09 bar and a standard deviation of 2.14 bar, the mean is used." in lines
+    assert lines[-1].startswith(
+        "gas at 1500 rpm: peak 55.08 bar at 12 deg, imep 4.915 bar, mean torque 15.73 N m, power 2.47 kW"
+    )
+    solved = run("solve", path, "--out", tmp_path / "out", "--json", tmp_path / "r.json")
+    assert solved.exit_code == 0, solved.output
+    for text in (solved.output, (tmp_path / "out" / "report.md").read_text(encoding="utf-8")):
+        assert "Recorded gas pressure" in text
+        assert "Of 8 cycles" in " ".join(text.split())
+    (head, row) = (tmp_path / "out" / "gas-pressure.csv").read_text(encoding="utf-8").splitlines()
+    assert head.split(",")[:4] == ["at", "peak [bar]", "peak at [deg]", "imep [bar]"]
+    assert row.startswith("1500 rpm,55.08,12.0,4.915,15.73,2.47,")
+    (point,) = json.loads((tmp_path / "r.json").read_text(encoding="utf-8"))["points"]
+    facts, _, recording = facts_of(problem)
+    assert point["gas"]["imep"] == pytest.approx(facts.imep)
+    assert point["gas"]["recording"] == list(recording)
+
+
+def test_other_problems_say_nothing_of_records(tmp_path: Path) -> None:
+    (tmp_path / "f.toml").write_text(
+        f"title = 'No gas'\n[engine]\nlayout = 'inline'\ncycle = 'four-stroke'\n{SINGLE}"
+        "[[operating_points]]\nspeed = '1500 rpm'\n"
+    )
+    checked = run("check", tmp_path / "f.toml", "--json", "-")
+    assert "gas:" not in checked.output
+    assert '"recording"' not in checked.output
