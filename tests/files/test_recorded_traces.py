@@ -327,16 +327,28 @@ def test_what_cannot_be_read_is_refused_in_one_line(name: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("file", "gas", "said"),
+    ("file", "content", "said"),
     [
-        ("f.xlsx", "", "is no spreadsheet that can be read; save it"),
-        ("f.mat", "", "is no MATLAB file; save it with -v7"),
+        ("f.xlsx", b"abcdefgh", "is no spreadsheet that can be read; save it"),
+        ("f.csv", b"PK\x03\x04abcd", "is no spreadsheet that can be read; save it"),
+        ("f.mat", b"abcdefgh", "is no MATLAB file; save it with -v7"),
+        ("f.mat", b"MATLAB 7.3 MAT-file", "MATLAB file"),
+        ("f.xls", b"\xd0\xcf\x11\xe0", r"is a workbook of the old kind \(\.xls\); save it as text"),
+        ("f.tdms", b"TDSm", "is a TDMS file; save it as text"),
+        ("f.mf4", b"MDF     4.10", "is an MDF file; save it as text"),
     ],
 )
-def test_broken_books_are_refused(file: str, gas: str, said: str, tmp_path: Path) -> None:
-    (tmp_path / file).write_bytes(b"abcdefgh" * 99)
+def test_other_files_are_refused_by_name(file: str, content: bytes, said: str, tmp_path: Path) -> None:
+    (tmp_path / file).write_bytes(content * 99)
     with pytest.raises(InputError, match=said):
-        problem_with(tmp_path, file, gas)
+        problem_with(tmp_path, file)
+
+
+def test_files_are_known_by_their_bytes(tmp_path: Path) -> None:
+    (tmp_path / "f.dat").write_bytes(workbook([["CA", "p"], *PAIRS]))
+    assert facts_of(problem_with(tmp_path, "f.dat"))[0].peak_pressure == pytest.approx(1e5 * P.max())
+    (tmp_path / "g.dat").write_bytes(matlab(theta=A, p=P))
+    assert facts_of(problem_with(tmp_path, "g.dat"))[0].peak_pressure == pytest.approx(1e5 * P.max())
 
 
 def test_a_sheet_that_is_not_there_is_named(tmp_path: Path) -> None:

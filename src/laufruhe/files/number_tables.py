@@ -27,6 +27,13 @@ _COMMENTS = ("#", "%", "!", "//")
 _WITH_COMMA = re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?")
 _BRACKETS = re.compile(r"[\[(<]([^\])>]+)[\])>]")
 _SAMPLE = 200
+_BINARY = {
+    b"\xd0\xcf\x11\xe0": "a workbook of the old kind (.xls)",
+    b"\x89HDF": "an HDF5 file",
+    b"TDSm": "a TDMS file",
+    b"MDF ": "an MDF file",
+}
+"""First bytes of files that are not read, and their names."""
 _ANGLE = re.compile(r"(?:(?:°|deg(?:rees?)?|grad)(?:ca|kw|cra|cad|crank|atdc)?|cad|cadeg|dca)|rad(?:ians?)?")
 _OTHER = {"s": "s", "sec": "s", "ms": "s", "us": "s", "µs": "s", "v": "V", "mv": "V", "volt": "V"}
 _PRESSURES = {
@@ -94,9 +101,12 @@ def number_table(content: bytes, suffix: str, sheet: str | None = None) -> Numbe
     ModelError
         If the file cannot be read; the text has rule and remedy.
     """
-    if suffix == ".mat":
+    for mark, name in _BINARY.items():
+        if content.startswith(mark):
+            raise ModelError(f"is {name}; save it as text, as .xlsx, or as .mat with -v7")
+    if suffix == ".mat" or content.startswith(b"MATLAB"):
         return _of_matlab(content)
-    if suffix in (".xlsx", ".xlsm"):
+    if suffix in (".xlsx", ".xlsm") or content.startswith(b"PK\x03\x04"):
         return _of_spreadsheet(content, sheet)
     lines = [line.strip("\r\n") for line in _text(content).splitlines()]
     separator, decimal = _dialect(lines)
