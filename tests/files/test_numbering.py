@@ -15,6 +15,7 @@ from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.problem import Problem
+from laufruhe.report.wording import fired
 
 Table = dict[str, Any]
 SIZES: Table = {
@@ -159,6 +160,9 @@ def test_an_open_crank_is_decided_in_the_numbers_of_the_file(keys: Table, deviat
     again = laufruhe.solve(loaded(written, objective=tables["objective"]))
     assert again.objective is not None
     assert again.objective.value == pytest.approx(found.objective.value, rel=1e-6)
+    assert plain.phasing is not None
+    # neighbours stand side by side along the crank, whatever the numbers of their throws
+    assert best.firing_orders[0].neighbours == plain.phasing.ranking[0].firing_orders[0].neighbours
     intervals = loaded(written).engine.firing_intervals
     assert intervals == pytest.approx(best.firing_orders[0].intervals, abs=1e-6)
 
@@ -397,3 +401,22 @@ def test_the_stroke_is_the_travel_of_the_piston_with_an_offset_too() -> None:
     force = abs(shaking_loads(problem.engine, problem.points[0]).at(1)[2])
     assert force == pytest.approx(first, rel=1e-6)
     assert force == pytest.approx(8881.1, abs=0.05)
+
+
+def test_a_piston_without_a_bore_has_no_gas_and_does_not_fire() -> None:
+    """Two pistons together and a third rod below that drives a weight: the mean torque is that of two cylinders."""
+    rows: list[Table] = [
+        {"x": "0 mm", "bank_angle": 180, "throw": 90, "reciprocating_mass": "0.9 kg", "bore": "0 mm"},
+        {"x": "45 mm"},
+        {"x": "-45 mm"},
+    ]
+    engine: Table = {"layout": "parts", "slider_cranks": rows, "firing_order": [2, 3]}
+    problem = loaded(engine, gas=GAS)
+    single = loaded({"layout": "inline", "cylinders": 1, "throws": [0]}, gas=GAS)
+    mean, alone = (crank_torque(p.engine, p.points[0], p.fidelity).coefficients[0].real for p in (problem, single))
+    assert mean == pytest.approx(2.0 * alone, rel=1e-9)
+    assert [part.name for part in problem.engine.cylinders] == ["cylinder 2", "cylinder 3"]
+    assert problem.engine.firing_intervals == pytest.approx((math.tau, math.tau))
+    assert "firing order 2-3, every 360 deg" in fired(laufruhe.evaluate(problem)).lower()
+    with pytest.raises(InputError, match="does not name cylinders 2, 3 once each"):
+        loaded({**engine, "firing_order": [1, 2, 3]}, gas=GAS)

@@ -87,7 +87,7 @@ class SliderCrankTable(Table):
     firing_angle: f.Angle | None = f.optional("Crank angle at which it fires.")
     shaft: str = "crankshaft"
     stroke: f.PositiveLength | None = None
-    bore: f.PositiveLength | None = None
+    bore: f.NonNegativeLength | None = f.optional("Diameter of the cylinder; 0 for a piston on which no gas acts.")
     rod_ratio: f.NonNegative | None = None
     rod_length: f.PositiveLength | None = None
     offset: f.Length | None = None
@@ -437,7 +437,10 @@ def _in_order(table: EngineTable, parts: list[SliderCrank]) -> list[SliderCrank]
     # a firing order counts the slider-cranks of a free list as they stand
     if table.listed_order is None:
         return parts
-    check_order(table.listed_order, len(parts))
+    firing = [k for k, part in enumerate(parts, 1) if part.bore != 0.0]
+    if sorted(table.listed_order) != firing:
+        rule = f"does not name cylinders {', '.join(map(str, firing))} once each"
+        raise Refused("engine.firing_order", table.listed_order, rule, "name every piston with a bore once")
     for k, row in enumerate(table.slider_cranks, 1):
         if row.firing_angle is not None:
             rule = "is given twice, also by engine.firing_order"

@@ -152,10 +152,10 @@ class Engine:
 
     @property
     def cylinders(self) -> tuple[SliderCrank, ...]:
-        """Slider-cranks, one for each cylinder: the first of two pistons that face each other."""
+        """Slider-cranks, one for each cylinder: the first of two pistons that face each other, none without a bore."""
         pistons: list[SliderCrank] = []
         for part in self.slider_cranks:
-            if not any(part.faces(other) for other in pistons):
+            if part.bore != 0.0 and not any(part.faces(other) for other in pistons):
                 pistons.append(part)
         return tuple(pistons)
 

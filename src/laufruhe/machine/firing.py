@@ -233,9 +233,17 @@ def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:
     return tuple(math.tau * (b - a) for a, b in zip(turns, following, strict=True))
 
 
+@lru_cache(maxsize=64)
+def _ranks_along_crank(layout: Layout) -> tuple[int, ...]:
+    pins = range(len(layout.throw_positions))
+    from_front = sorted(pins, key=lambda pin: -layout.throw_positions[pin])
+    return tuple(from_front.index(pin) for pin in pins)
+
+
 def successive_neighbours(layout: Layout, order: Sequence[int]) -> int:
     """Count successive firings on one throw, or on neighbouring throws."""
-    pins = [layout.pins[number - 1] for number in order]
+    along = _ranks_along_crank(layout)
+    pins = [along[layout.pins[number - 1]] for number in order]
     return sum(abs(a - b) <= 1 for a, b in zip(pins, [*pins[1:], pins[0]], strict=True)) if len(pins) > 2 else 0
 
 

@@ -105,7 +105,8 @@ def fired(result: Result) -> str:
     firing = has_firing(result)
     fires = [as_turn(part.firing_angle) for part in engine.cylinders]
     turns = [float(reduced_turn(turn - fires[0], engine.cycle.turns)) for turn in fires]
-    order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
+    numbers = [1 + engine.slider_cranks.index(part) for part in engine.cylinders]
+    order = "-".join(str(numbers[k]) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
     spacing = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"

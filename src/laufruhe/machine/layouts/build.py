@@ -89,7 +89,7 @@ def angles_in_order(
     """
     turns = [reduced_turn(centre, 1) for centre in centres]
     start = previous = turns[firing_order[0] - 1]
-    angles = [angle_of(start)] * len(turns)
+    angles = [angle_of(turn) for turn in turns]
     for place, number in enumerate(firing_order[1:], 1):
         if intervals:
             centre = start + sum(map(as_turn, intervals[:place]))

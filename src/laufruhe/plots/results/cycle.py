@@ -186,7 +186,8 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
 def _mark_firings(panels: Sequence[Axes], engine: Engine, width: float) -> None:
     """Draw a line per firing, and cylinder numbers above the first panel if there is room."""
     cycle, firings = math.degrees(engine.cycle.angle), dict[float, list[int]]()
-    for number, part in enumerate(engine.cylinders, 1):
+    for part in engine.cylinders:
+        number = 1 + engine.slider_cranks.index(part)
         firings.setdefault(round(math.degrees(part.firing_angle), 6) % cycle, []).append(number)
     for axes in panels:
         for angle in firings:
