@@ -239,6 +239,20 @@ def test_a_refused_order_names_the_numbering_that_fits() -> None:
     assert 'write first_bank = "left"; in the present numbers' in back
 
 
+@pytest.mark.parametrize(
+    ("keys", "line"),
+    [
+        ({"numbering": "alternating", "firing_order": [1, 6, 5, 4, 3, 2]}, "are split, write split_pin_angle = 30"),
+        ({"firing_order": [1, 4, 2, 5, 3, 6]}, 'write first_bank = "right", split_pin_angle = 30;'),
+        ({"bank_angle": 60, "numbering": "alternating", "firing_order": [1, 2, 3, 4, 5, 6]},
+         'write first_bank = "right", split_pin_angle = 60;'),
+    ],
+)  # fmt: skip
+def test_an_order_that_needs_split_pins_names_their_angle(keys: Table, line: str) -> None:
+    """Three V6 engines typed without their pins: Buick 3800, Ford Essex, and that of GM with 60 degrees."""
+    assert line in refusal({"layout": "vee", "bank_angle": 90, **keys})
+
+
 def test_a_crank_typed_against_the_rotation_is_named() -> None:
     five = {"layout": "inline", "throws": [0, 216, 144, 72, 288], "firing_order": [1, 3, 5, 4, 2]}
     assert "count against the rotation, write throws = [0, 144, 216, 288, 72]" in refusal(five)
@@ -420,3 +434,30 @@ def test_a_piston_without_a_bore_has_no_gas_and_does_not_fire() -> None:
     assert "firing order 2-3, every 360 deg" in fired(laufruhe.evaluate(problem)).lower()
     with pytest.raises(InputError, match="does not name cylinders 2, 3 once each"):
         loaded({**engine, "firing_order": [1, 2, 3]}, gas=GAS)
+
+
+def test_rows_load_the_block_as_a_free_list_with_their_offsets() -> None:
+    """Inertia forces of a VR six are those of slider-cranks with tilted axes and offsets of either sign."""
+    vr = {"layout": "inline", "row_angle": 15, "offset": "12 mm", "firing_order": [1, 5, 3, 6, 2, 4]}
+    rows = loaded(vr)
+    free = [
+        {
+            "x": f"{1e3 * part.x!r} mm", "bank_angle": 7.5 * side, "offset": f"{12 * side} mm",
+            "throw": math.degrees(part.throw), "rotating_mass": "0.4 kg",
+        }
+        for part, side in zip(rows.engine.cylinders, [1, -1] * 3, strict=True)
+    ]  # fmt: skip
+    listed = loaded({"layout": "parts", "slider_cranks": free})
+    # throws of a layout carry their rotating mass as rotors
+    loads = [shaking_loads(p.engine, p.points[0], p.fidelity).coefficients for p in (rows, listed)]
+    count = min(map(len, loads))
+    np.testing.assert_allclose(loads[0][:count], loads[1][:count], atol=1e-9 * np.abs(loads[0]).max())
+
+
+def test_gas_in_rows_does_the_work_that_the_file_says() -> None:
+    """The mean torque is imep times displacement over the angle of the cycle."""
+    vr = {"layout": "inline", "row_angle": 15, "offset": "12 mm", "firing_order": [1, 5, 3, 6, 2, 4]}
+    problem = loaded(vr, gas=GAS)
+    mean = crank_torque(problem.engine, problem.points[0], problem.fidelity).coefficients[0].real
+    displacement = 6 * math.pi * 0.09**2 / 4 * 0.088
+    assert mean == pytest.approx(8e5 * displacement / (4.0 * math.pi), rel=1e-3)

@@ -121,6 +121,10 @@ def _advice(table: EngineTable, order: Sequence[int], keys: Mapping[str, Any]) -
         if keys.get(key, USUAL[key]) != (value or USUAL[key]) and not (is_list and key not in keys)
     ]
     written += [f"throws = {toml_value(angles)}"] if angles else []
+    if "split_pin_angle" in keys:
+        written.append(f"split_pin_angle = {math.degrees(keys['split_pin_angle']):.6g}")
+        if len(written) == 1:
+            return f"if its pins are split, write {written[0]}"
     if keys.keys() == {"throws"}:
         return f"if the angles of the throws count against the rotation, write {written[-1]}"
     gone = [key for key in ("first_bank", "first_end") if is_list and own_keys.get(key)]
@@ -157,11 +161,28 @@ def _readings(table: EngineTable) -> Iterator[Mapping[str, Any]]:
         numberings += [{"numbering": numbers} for numbers in (near + far, far + near)]
     if table.listed_throws is None:
         yield from numberings
+        # pins split by a small angle against the bank angle are the most usual
+        splits = [{**keys, **_split(_renumbered(table, keys))} for keys in ({}, *numberings)]
+        angles = [round(keys.get("split_pin_angle", math.pi), 9) for keys in splits]
+        order = sorted(range(len(splits)), key=lambda k: (abs(angles[k]), -angles[k]))
+        yield from (splits[k] for k in order if "split_pin_angle" in splits[k])
         return
     reversed_throws = {"throws": [-angle % math.tau for angle in table.listed_throws]}
     # of engines with one bank the sense of the throws is less certain than the numbers
     yield from (reversed_throws, *numberings) if kind.banks == 1 else (*numberings, reversed_throws)
     yield from ({**keys, **reversed_throws} for keys in numberings)
+
+
+def _split(table: EngineTable) -> Mapping[str, float]:
+    # the pins let the first two cylinders on one throw fire in their turn
+    if not table.kind.takes("split_pin_angle") or table.value_of("split_pin_angle"):
+        return {}
+    layout, cycle, order = layout_of(table), cycle_of(table), table.listed_order or []
+    left, right = sorted(layout.on_throw(0), key=lambda k: -layout.side(k))
+    later = Fraction((order.index(right + 1) - order.index(left + 1)) * cycle.turns, len(order))
+    return {
+        "split_pin_angle": math.tau * _turned(layout.dead_centre_turn(right) - layout.dead_centre_turn(left) - later)
+    }
 
 
 def _renumbered(table: EngineTable, keys: Mapping[str, Any]) -> EngineTable:

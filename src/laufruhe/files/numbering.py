@@ -60,7 +60,8 @@ def place_order(table: Numbered, kind: LayoutKind, count: int) -> tuple[int, ...
 def sense_of(table: Numbered) -> tuple[str, ...]:
     """Return the sentence of a report about an engine that turns counter-clockwise; empty for others."""
     text = (
-        "The crank turns counter-clockwise seen from the front: angles count in its sense, and y points to the right."
+        "The crank turns counter-clockwise seen from the front: angles count in its sense, y points to the right, and "
+        "pictures show the mirror image."
     )
     return (text,) if table.value_of("rotation") == REVERSED else ()
 
