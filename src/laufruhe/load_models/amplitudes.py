@@ -14,7 +14,7 @@ from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars, StarSpace, star_sums
+from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FORCE, SWAYING_COUPLE, Channel
@@ -61,6 +61,17 @@ class AmplitudeObjective:
         weights = np.stack([np.ones(len(places)), places], axis=-1)
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
         return self._values_of_sums(waves @ weights)
+
+    def lower_bound(self, space: StarSpace) -> float:
+        """Return a lower bound over all crank stars: the forces, which depend on the pattern only [SI]."""
+        return min(self.forces(space, pattern) for pattern in space.patterns)
+
+    def forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
+        """Return the terms without couples of crank stars of a pattern [SI]."""
+        forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
+        forces[forces <= 1e-12 * space.throws] = 0.0
+        pure = [term for term in self.terms if not any(term.couple)]
+        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
 
     def _values_of_sums(self, sums: NDArray[np.complex128]) -> Array:
         squares = np.square(sums.real) + np.square(sums.imag)

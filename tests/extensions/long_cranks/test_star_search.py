@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from laufruhe.extensions.long_cranks import couple_search as star_search
 from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes
 from laufruhe.extensions.long_cranks.couple_search import search_stars
-from laufruhe.extensions.long_cranks.throw_halves import Free, Window, meeting, shares_of, work_of
+from laufruhe.extensions.long_cranks.throw_halves import Free, Window, meeting, shares_of
 from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import SERIAL, working_on
@@ -75,8 +75,8 @@ def test_enumeration_equals_plain_permutations(throws):
 @given(st.integers(3, 7), st.sampled_from(sorted(OBJECTIVES)), st.floats(0.2, 1.5), st.data())
 def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
     """What a window holds is found whole, and no star that is worth as little lies outside."""
-    reflect = data.draw(st.booleans())
-    space = replace(whole(throws), mirror=False, reflect=reflect)
+    mirror, reflect = data.draw(st.booleans()), data.draw(st.booleans())
+    space = replace(whole(throws), mirror=mirror, reflect=reflect)
     objective = OBJECTIVES[name]
     every = np.array([(0, *rest) for rest in itertools.permutations(range(1, throws))], dtype=np.uint8)
     values = objective.values(space, every)
@@ -91,11 +91,30 @@ def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
     found = {tuple(star) for block in blocks for star in block}
     assert {tuple(star) for star in space.canonical(every[values < cut * (1.0 - 1e-9)])} <= found
     if window is not None:
-        couples = star_sums(every, throws, space.places, (window.order,))[:, 0, 1]
-        clear = np.abs(np.abs(couples.real) - window.high.real) > 1e-9
-        clear &= np.abs(np.abs(couples.imag) - window.high.imag) > 1e-9
-        inside = (np.abs(couples.real) < window.high.real) & (np.abs(couples.imag) < window.high.imag)
-        assert {tuple(star) for star in space.canonical(every[inside & clear])} <= found
+        couples = np.abs(star_sums(every, throws, space.places, window.orders)[:, :, 1])
+        inside = (couples < np.array(window.reaches) - 1e-9).all(axis=1)
+        assert {tuple(star) for star in space.canonical(every[inside])} <= found
+
+
+@settings(max_examples=12)
+@given(st.integers(0, 10**6), st.sampled_from([(1,), (2,), (1, 2), (2, 3)]), st.floats(-4.0, 1.0))
+def test_rearranged_throws_meet_in_every_star_of_a_window_and_no_other(seed, orders, width):
+    """Seven of nine throws on places of any distance: all 5040 arrangements are tried for comparison."""
+    r = np.random.default_rng(seed)
+    steps = np.concatenate([[0], r.permutation(np.repeat(np.arange(5), [1, 2, 2, 2, 1]))]).astype(np.uint8)
+    space = StarSpace(5, ((2, 2, 2, 2, 1),), tuple(r.normal(size=9)))
+    throws = sorted(map(int, 1 + r.permutation(8)[:7]))
+    every = np.repeat(steps[None], 5040, axis=0)
+    every[:, throws] = np.array(list(itertools.permutations(steps[throws])))
+    couples = np.abs(star_sums(every, 5, space.places, orders)[:, :, 1])
+    # the window ends between two stars
+    reaches = tuple(np.abs(couples[int(r.integers(5040))]) * (1.0 + 1e-6) + 10.0**width)
+    free = Free.from_throws(steps, throws)
+    blocks = [block for own in shares_of(space, free) for block in meeting(space, free, own, Window(orders, reaches))]
+    found = {tuple(star) for block in blocks for star in block}
+    assert {tuple(star) for star in every[(couples <= np.array(reaches)).all(axis=1)]} <= found
+    parts = np.concatenate([star_sums(block, 5, space.places, orders)[:, :, 1] for block in blocks])
+    assert np.all(np.maximum(np.abs(parts.real), np.abs(parts.imag)) <= np.array(reaches) + 1e-9)
 
 
 @pytest.mark.parametrize("throws", [5, 8, 11])
@@ -105,19 +124,82 @@ def test_some_throws_are_arranged_in_every_order(throws):
         replace(whole(throws), reflect=False),
         Free.from_throws(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4)),
     )
-    wide = Window(1, complex(-np.inf, -np.inf), complex(np.inf, np.inf))
+    wide = Window((1, 2), (np.inf, np.inf))
     found = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
     assert len(np.unique(found, axis=0)) == len(found) == 24
     assert (found[:, 5:] == np.arange(5, throws)).all()
 
 
-@pytest.mark.parametrize("throws", [4, 7, 9, 10])
-def test_arrangements_are_counted(throws):
-    for space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
-        free = Free.from_pattern(space.patterns[0])
-        ways = len(shares_of(replace(space, reflect=False), free))
-        assert work_of(replace(space, reflect=False)) == free.arrangements * ways
-        assert len(shares_of(space, free)) * 2 <= ways + 2 ** (throws // 2)
+@pytest.mark.parametrize("throws", [4, 7, 8, 9, 10])
+@pytest.mark.parametrize("mirror", [False, True])
+@pytest.mark.parametrize("reflect", [False, True])
+def test_one_division_of_each_set_of_images_is_left(throws, mirror, reflect):
+    """Divisions that turn into each other by steps, or by images of their stars, are counted by plain sets."""
+    for whole_space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
+        space = replace(whole_space, mirror=mirror, reflect=reflect)
+        count, front = space.patterns[0][0], throws // 2
+        orbits = set()
+        for own in itertools.product(range(count + 1), repeat=space.phases):
+            if sum(own) == front:
+                images = [own, *([own[::-1]] if reflect else [])]
+                images += [tuple(count - k for k in image) for image in images if mirror and 2 * front == throws]
+                orbits.add(min(image[k:] + image[:k] for image in images for k in range(space.phases)))
+        divisions = shares_of(space, Free.from_pattern(space.patterns[0]))
+        assert len(divisions) == len(np.unique(divisions, axis=0)) == len(orbits)
+
+
+class Clock:
+    """Seconds that pass with each look at the clock."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        self.now += 1.0
+        return self.now
+
+
+@settings(max_examples=8)
+@given(st.integers(1, 60), st.sampled_from(sorted(OBJECTIVES)))
+def test_looking_at_every_star_ends_with_the_time(seconds, name):
+    """The best of the stars looked at is kept, and the bound holds for all: no clock of the machine is asked."""
+    space, objective = whole(9), OBJECTIVES[name]
+    every = enumerate_stars(space, objective, 3)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("laufruhe.numerics.budget.time", Clock())
+        patched.setattr("laufruhe.physics.crank_stars.BLOCK", 64)
+        found = enumerate_stars(space, objective, 3, time_limit=float(seconds))
+    assert len(found.values)
+    assert found.complete == (found.nodes == every.nodes)
+    assert found.lower_bound <= every.values[0] * (1.0 + 1e-12) <= found.values[0] * (1.0 + 1e-9)
+    np.testing.assert_allclose(objective.values(space, found.stars), found.values, rtol=1e-12, atol=1e-12)
+
+
+def test_enumeration_looks_at_more_stars_in_more_time(monkeypatch):
+    monkeypatch.setattr("laufruhe.physics.crank_stars.BLOCK", 64)
+    nodes = []
+    for seconds in (2.0, 8.0, 32.0, 1e6):
+        monkeypatch.setattr("laufruhe.numerics.budget.time", Clock())
+        nodes.append(enumerate_stars(whole(9), OBJECTIVES["mixed"], 1, seconds))
+    assert [found.complete for found in nodes] == [False, False, False, True]
+    assert nodes[0].nodes < nodes[1].nodes < nodes[2].nodes < nodes[3].nodes
+
+
+def test_cranks_with_halves_too_long_to_list_are_rearranged_while_time_is_left(monkeypatch):
+    """More time is used, and its stars are no worse; the bound is that of all stars."""
+    monkeypatch.setattr(star_search, "LONGEST_HALF", 5)
+    monkeypatch.setattr(star_search, "REARRANGED", (4, 6))
+    space, objective, found = whole(13), OBJECTIVES["rms of four"], []
+    for seconds in (20.0, 200.0, 2000.0):
+        clock = Clock()
+        monkeypatch.setattr("laufruhe.numerics.budget.time", clock)
+        found.append(search_stars(space, objective, 2, seconds))
+        assert clock.now >= seconds
+    assert not any(result.complete for result in found)
+    assert found[0].nodes < found[1].nodes < found[2].nodes
+    assert found[2].values[0] <= found[1].values[0] <= found[0].values[0]
+    assert found[2].values[0] < found[0].values[0]
+    assert all(result.lower_bound == objective.lower_bound(space) for result in found)
 
 
 def test_a_search_out_of_time_claims_no_proof():

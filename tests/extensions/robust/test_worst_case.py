@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lanes import first_fast
-from laufruhe.extensions.robust.worst_case import ErrorBlock, bound_node, value_at, worst_case
+from laufruhe.extensions.robust.worst_case import ErrorBlock, KnownBounds, bound_node, value_at, worst_case
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import NORMS, Grid
 
@@ -57,7 +57,7 @@ def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
             assert narrow is not None
             assert narrow.arc is not None
             blocks = [whole[0], whole[2], narrow]
-            above = bound_node(terms, middle, blocks, 0.0, [{}]).bound
+            above = bound_node(terms, middle, blocks, 0.0, KnownBounds(terms)).bound
             for _ in range(40):
                 z = np.zeros(5)
                 angle = narrow.arc[0] + random.uniform(-1.0, 1.0) * narrow.arc[1]
@@ -81,6 +81,37 @@ def test_squares_lie_over_their_norm(name: str) -> None:
         assert norm.norm.value(norm.grid, rows) <= above * (1.0 + 1e-12)
         if size == 0.0:
             assert norm.norm.value(norm.grid, rows) == pytest.approx(above, rel=1e-12)
+
+
+@pytest.mark.parametrize("name", ["mean", "rms"])
+def test_majorants_of_earlier_nodes_hold_at_all_errors(name: str) -> None:
+    """Each is exact at errors that it touches, and no lower than the norms at any others."""
+    random, terms = np.random.default_rng(11), [(1.0, random_norm(name, 12, 1.0)), (0.3, random_norm("mean", 13))]
+    known, touched = KnownBounds(terms), random.normal(size=(6, 5))
+    for z in touched:
+        constant, slope, curvature = known.touch([np.linalg.norm(norm.rows(z), axis=1) for _, norm in terms])
+        for other in (z, *touched, *random.normal(scale=3.0, size=(40, 5))):
+            above = constant + slope @ other + 0.5 * other @ curvature @ other
+            assert value_at(terms, other) <= above * (1.0 + 1e-12)
+        assert constant + slope @ z + 0.5 * z @ curvature @ z == pytest.approx(value_at(terms, z), rel=1e-11)
+    assert len(known.majorants) == 6
+
+
+def test_an_arc_lies_in_its_trapezoid_and_its_ends_are_vertices() -> None:
+    whole, random = ErrorBlock(slice(0, 2), np.eye(2)), np.random.default_rng(14)
+    arcs = [(middle, arc) for centre, arc in whole.parts(np.zeros(2)) if arc for middle, arc in arc.parts(centre)]
+    for centre, arc in arcs:
+        assert arc is not None
+        assert arc.arc is not None
+        vertices = np.array([centre + arc.spans @ local for local in arc.vertices])
+        angles = arc.arc[0] + arc.arc[1] * np.linspace(-1.0, 1.0, 41)
+        points = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+        for direction in random.normal(size=(200, 2)):
+            assert (points @ direction).max() <= (vertices @ direction).max() + 1e-12
+        for end in points[[0, -1]]:
+            assert np.linalg.norm(vertices - end, axis=1).min() < 1e-12
+        # no farther out than the tangents at the middle and at both ends meet
+        assert np.linalg.norm(vertices, axis=1).max() == pytest.approx(1.0 / np.cos(0.5 * arc.arc[1]), rel=1e-12)
 
 
 def test_no_errors_leave_the_drawing() -> None:

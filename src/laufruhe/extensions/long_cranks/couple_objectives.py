@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,7 +24,7 @@ from laufruhe.machine import Role
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves, star_sums
+from laufruhe.physics.crank_stars import Stars, StarSpace, star_sums
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_common_base
 from laufruhe.problem.measure import Measure, kinks_of, load_rows
@@ -55,27 +55,15 @@ class StarAmplitudes(AmplitudeObjective):
             for term in self.terms
         )
 
-    def lower_bound(self, space: StarSpace) -> float:
-        """Return a lower bound over all crank stars: the forces, which depend on the pattern only [SI]."""
-        return min(self._forces(space, pattern) for pattern in space.patterns)
-
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return a range of couples outside which a crank star's objective is not below `value`.
-
-        The result is None if it is empty (S5).
-        """
+        """Return the largest couples of crank stars with an objective below `value`; None if there is none (S5)."""
         shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
-        place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
+        room = value - self.forces(space, pattern)
         if room < 0.0:
             return None
-        maximum = room / shares[place] if shares[place] > 0.0 else np.inf
-        return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
-
-    def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
-        forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
-        forces[forces <= 1e-12 * space.throws] = 0.0
-        pure = [term for term in self.terms if not any(term.couple)]
-        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
+        return Window.narrowest(space.phases, {
+            order: room / share for order, share in zip(self.orders, shares, strict=True) if share > 0.0
+        })  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,24 +161,21 @@ class CoupleNorms:
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Return a range of couples outside which a crank star's objective is not below `value`.
-
-        The result is None if empty (S48).
-        """
+        """Return the largest couples of crank stars with an objective below `value`; None if there is none (S48)."""
         del pattern
         minimum = self.lower_bound(space)
         if value < minimum:
             return None
         shares = np.asarray(sum(term.shares for term in self.terms))
-        if not len(shares) or not shares.max() > 0.0 or value == math.inf:
-            return Window(1, complex(-math.inf, -math.inf), complex(math.inf, math.inf))
-        place = int(np.argmax(shares))
-        if len(self.terms) == 1 and self.terms[0].norm.is_euclidean:
-            # squares of orders add up, so that what no couple changes leaves less room
-            maximum = math.sqrt((value - minimum) * (value + minimum)) / float(shares[place])
-        else:
-            maximum = self._reach(space, place, value, value / float(shares[place]))
-        return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
+        is_euclidean = len(self.terms) == 1 and self.terms[0].norm.is_euclidean
+        # squares of orders add up, so that what no couple changes leaves less room
+        room = math.sqrt(value - minimum) * math.sqrt(value + minimum) if is_euclidean else value
+        places = np.flatnonzero(shares > 0.0)
+        window = Window.narrowest(space.phases, {self.orders[k]: room / float(shares[k]) for k in places})
+        if is_euclidean or value == math.inf or not len(places):
+            return window
+        pairs = zip(window.orders, window.reaches, strict=True)
+        return replace(window, reaches=tuple(self._reach(space, self.orders.index(h), value, c) for h, c in pairs))
 
     def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
         """Return an upper bound of the couple of any crank star with an objective up to `value` (S48).

@@ -17,10 +17,10 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.extensions.long_cranks.couple_objectives import CoupleNorms, StarAmplitudes
-from laufruhe.extensions.long_cranks.throw_halves import Counts, Free, meeting, shares_of, work_of
+from laufruhe.extensions.long_cranks.throw_halves import Counts, Free, meeting, shares_of
 from laufruhe.load_models.amplitudes import NEGLIGIBLE
 from laufruhe.numerics.arrays import Indices
-from laufruhe.numerics.budget import is_time_over, limit_time, until_time_limit
+from laufruhe.numerics.budget import is_time_over, limit_time, timed_rounds, until_time_limit
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
 from laufruhe.physics.crank_stars import Stars, StarSpace
@@ -28,14 +28,16 @@ from laufruhe.solvers.stars.enumeration import SLACK, BestStars, StarSearchResul
 
 WORTH_SHARING = 20_000_000
 """Number of arrangements of halves from which workers share the search (fifteen throws, two seconds)."""
-LARGEST_WORK = 400_000_000
-"""Largest number of arrangements of halves (sixteen throws, half a minute of one core)."""
+LONGEST_HALF = 11
+"""Most throws of a half whose arrangements fit into memory (21 throws)."""
 # pieces of the divisions of a pattern, and most pieces in a round
 PIECES, MAX_AT_ONCE = 64, 16
 STARTS, BLOCK_STARS = 12, 1500
 """Number of starting stars of each kind, and of stars in groups from which the best are selected."""
 REARRANGED = (8, 8, 10, 10, 12, 12)
 """Numbers of throws in successive rearrangements of the best star."""
+MAX_REARRANGED = 100_000
+"""Most rearrangements of a crank whose halves are too long to list."""
 LONG = 16
 """Number of throws from which rearrangement pays; shorter cranks are enumerated as fast."""
 SEED = 1964
@@ -87,15 +89,14 @@ def _search_pieces(space: StarSpace, objective: CoupleObjective, best: BestStars
     """
     if best.cut <= NEGLIGIBLE * objective.upper_bound(space):
         return 0, True
-    work = work_of(space)
-    if work > LARGEST_WORK:
-        return 0, False
-    pieces = [
-        (pattern, part)
-        for pattern in space.patterns
-        for part in np.array_split(shares_of(space, Free.from_pattern(pattern)), PIECES)
-        if len(part)
-    ]
+    frees = [Free.from_pattern(pattern) for pattern in space.patterns]
+    if len(frees[0].back) > LONGEST_HALF:
+        return _rearrange_in_time(space, objective, best), False
+    pieces, work, rng = [], 0, np.random.default_rng(SEED)
+    for pattern, free in zip(space.patterns, frees, strict=True):
+        shares = rng.permutation(shares_of(space, free))
+        work += len(shares) * free.arrangements
+        pieces += [(pattern, part) for part in np.array_split(shares, PIECES) if len(part)]
     looked_at, start, size = 0, 0, 1
     with ExitStack() as stack:
         is_parallel = work > WORTH_SHARING and worker_count() > 1
@@ -138,6 +139,18 @@ def _search_piece(
             best.offer(stars, objective.values(space, stars, best.cut))
             looked_at += len(stars)
     return best, looked_at, True
+
+
+def _rearrange_in_time(space: StarSpace, objective: CoupleObjective, best: BestStars) -> int:
+    # rearranges random throws of the best star until the time is over; returns the number of arrangements
+    rng, star, looked_at = np.random.default_rng(SEED), best.stars[0], 0
+    for _ in timed_rounds(MAX_REARRANGED):
+        throws = sorted(map(int, 1 + rng.permutation(space.throws - 1)[: REARRANGED[-1]]))
+        star = _rearrange(space, objective, star, throws)
+        best.offer(space.canonical(star[None]), objective.values(space, star[None]))
+        looked_at += math.factorial(len(throws))
+        report_progress("rearranged stars", looked_at, value=float(best.values.min()))
+    return looked_at
 
 
 def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes, couple_norms, three_stars
 from laufruhe.extensions.long_cranks.couple_search import best_starts, search_stars
 from laufruhe.load_models.star_model import StarModel
-from laufruhe.numerics.budget import is_time_over, until_time_limit
+from laufruhe.numerics.budget import is_time_over, limit_time, until_time_limit
 from laufruhe.numerics.norms import RMS
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.problem.channels import ROCKING_COUPLE
@@ -62,7 +62,7 @@ def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     for family, objective in simple:
         space = replace(family.space, mirror=True, reflect=True)
         if phasing.method is Method.ENUMERATION:
-            stars, method = enumerate_stars(space, objective, phasing.best), "every star looked at"
+            stars, method = enumerate_stars(space, objective, phasing.best, phasing.time_limit), "every star looked at"
         else:
             stars, method = search_stars(space, objective, phasing.best, phasing.time_limit), _BY_HALVES
         answers.append(enumeration_result(phasing, family, stars, method))
@@ -133,7 +133,8 @@ def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
     objective = _amplitudes(of_couples, family)
     if objective is None:
         return np.zeros((0, family.space.throws), dtype=np.uint8)
-    return best_starts(replace(family.space, mirror=True, reflect=True), objective, phasing.best).stars
+    with limit_time(phasing.time_limit):
+        return best_starts(replace(family.space, mirror=True, reflect=True), objective, phasing.best).stars
 
 
 def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> EvenStarResult:
@@ -149,7 +150,8 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         values = {star: objective_value(star_problem, evaluate(star_problem)) for star, star_problem in engines.items()}
         first = min(starts, key=values.__getitem__, default=family.first)
         built = min(phasing.shafts.allowed, key=lambda shafts: coarse_value(model, first, shafts))
-        star = improved(model, first, built)
+        with limit_time(phasing.time_limit):
+            star = improved(model, first, built)
         design, cut = solve_design(model, star, built, problem.tolerance, zero_level)
         if design is None or cut is None:
             answers.append(EvenStarResult((), 0.0, False, 1, "exchanges of throws"))

@@ -51,6 +51,8 @@ MAX_SCENARIOS = 24
 COARSER = 4
 """Factor by which the first program has fewer samples than the fidelity."""
 SAME = 1e-9
+ADVERSARY_SHARE = 0.2
+"""Share of the tolerance that the upper bound over all engines of a design may take."""
 JOIN_SHARE = 0.1
 """Share of the tolerance by which an engine must exceed all in the program to join it."""
 MAX_MARGINS, MAX_DOUBLINGS = 3, 3
@@ -99,7 +101,7 @@ def _minimise(problem: Problem, start: tuple[Value, ...], drawing: Result) -> tu
     tolerances, population, samples = tolerances_of(problem), robust_of(problem).population, problem.fidelity.samples
     zero_level, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(population.seed)
     if population.share is None and tolerances.is_affine:
-        adversary = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
+        adversary = WorstCaseAdversary(problem, samples, ADVERSARY_SHARE * problem.tolerance)
         return adversary, _minimise_worst_case(problem, adversary, start, zero_level)
     if population.share is None:
         sampled = SampledEngines(problem, tolerances.draw(random, population.engines), samples)

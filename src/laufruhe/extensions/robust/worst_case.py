@@ -11,7 +11,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -35,8 +35,10 @@ STARTS, CLIMBS = 12, 30
 """Random starts of the local search, and most steps of each."""
 MAX_ENDS = 12
 """Most intervals with all ends enumerated in one node."""
-MAJORANTS, BALL_STEPS = 3, 6
-"""Most majorants, and fixed-point steps for the points of balls, in one node."""
+MAJORANTS, BALL_STEPS = 6, 6
+"""Most new majorants, and fixed-point steps for the points of balls, in one node."""
+MAX_KNOWN, MIN_FALL = 12, 0.05
+"""Most majorants of earlier nodes that a node uses, and share of the excess by which a new one must lower the bound."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
         return WorstCase(np.zeros(0), best[0], best[0], 0)
     search = _ErrorSearch(terms, tolerance, best)
     blocks = [ErrorBlock(error_columns, np.eye(error_columns.stop - error_columns.start)) for error_columns in columns]
-    root = bound_node(terms, np.zeros(count), blocks, best[0], search.reaches)
+    root = bound_node(terms, np.zeros(count), blocks, best[0], search.known)
     search.improve(_climb(terms, columns, root.errors))
     bound = search.divide((-root.bound, _Node(np.zeros(count), blocks, root.split)), maximum)
     value, errors = search.best
@@ -105,7 +107,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum
 def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
     """Report an error if the bound of a thin node around the worst errors is below their objective."""
     sides = [ErrorBlock(part, THIN * np.eye(part.stop - part.start)) for part in columns]
-    thin = bound_node(terms, (1.0 - THIN) * worst.errors, sides, -math.inf, [{} for _ in terms])
+    thin = bound_node(terms, (1.0 - THIN) * worst.errors, sides, -math.inf, KnownBounds(terms))
     # the sum is maximised, and a witness bounds a minimum
     Witness(worst.errors, -worst.value).check_near(
         "upper bound of the worst case over manufacturing errors", -thin.bound
@@ -128,7 +130,7 @@ class _ErrorSearch(BranchAndBound[_Node]):
 
     def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
         self._terms, self._tolerance, self.best = terms, tolerance, best
-        self.reaches: Reaches = [{} for _ in terms]
+        self.known = KnownBounds(terms)
 
     def improve(self, point: tuple[float, Array]) -> None:
         """Store a value and its errors if they are worse than the worst so far."""
@@ -144,7 +146,7 @@ class _ErrorSearch(BranchAndBound[_Node]):
         other_blocks = [block for k, block in enumerate(parent.blocks) if k != parent.split]
         for centre, free in parent.blocks[parent.split].parts(parent.centre):
             blocks = other_blocks if free is None else [*other_blocks, free]
-            child = bound_node(self._terms, centre, blocks, self.best[0] * (1.0 + self._tolerance), self.reaches)
+            child = bound_node(self._terms, centre, blocks, self.best[0] * (1.0 + self._tolerance), self.known)
             self.improve((value_at(self._terms, child.errors), child.errors))
             # the bound of the parent also holds for the child
             bound = min(child.bound, -negative_bound)
@@ -194,6 +196,14 @@ class ErrorBlock:
         """True if its local numbers lie in the unit disc, False for intervals."""
         return self.arc is None and len(self.spans) > 1
 
+    @property
+    def vertices(self) -> tuple[tuple[float, ...], ...]:
+        """Vertices of an interval, or of a trapezoid around an arc, in local numbers (R7)."""
+        if self.arc is None:
+            return ((1.0,), (-1.0,))
+        top = 0.5 / math.cos(0.5 * self.arc[1]) ** 2
+        return ((1.0, top), (1.0, -top), (-1.0, 1.0), (-1.0, -1.0))
+
     def parts(self, centre: Array) -> list[tuple[Array, ErrorBlock | None]]:
         """Return smaller blocks of errors, with centres, that together contain all extreme points of this block."""
         if len(self.spans) == 1:
@@ -225,7 +235,43 @@ class NodeBound:
     errors: Array
 
 
-def bound_node(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, reaches: Reaches) -> NodeBound:
+class KnownBounds:
+    """Bounds that all nodes of one search share: reaches of blocks, and majorants of the terms that have them (R6).
+
+    A majorant c + g . z + z . H z / 2 is an upper bound at all errors z, so that a later node needs few new ones.
+    """
+
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
+        self.reaches: list[dict[_Key, _Reach]] = [{} for _ in terms]
+        self.has_majorant = [
+            norm.norm.majorant(norm.grid, lengths(norm.constant)) is not None for _, norm in terms
+        ]  # fmt: skip
+        self.majorants: list[tuple[float, Array, Array]] = []
+        # rows as functions of 1 and z
+        self._columns = [
+            np.concatenate([norm.constant[..., None], norm.slope], axis=2).reshape(norm.constant.size, -1)
+            for _, norm in terms
+        ]  # fmt: skip
+
+    def touch(self, row_lengths: Sequence[Array]) -> tuple[float, Array, Array]:
+        """Return the majorant that is exact at given lengths of the rows of each term, and keep it."""
+        size = self._columns[0].shape[1]
+        offset, form = 0.0, np.zeros((size, size))
+        for (weight, norm), sizes, columns in zip(self._terms, row_lengths, self._columns, strict=True):
+            majorant = norm.norm.majorant(norm.grid, sizes)
+            if majorant is not None:
+                factors = np.repeat(weight * majorant[0], norm.constant.shape[1])
+                # a margin for rounding
+                offset += weight * majorant[1] * (1.0 + ROUNDING)
+                form += columns.T @ (factors[:, None] * columns)
+        self.majorants.append((offset + 0.5 * float(form[0, 0]), form[0, 1:], form[1:, 1:]))
+        return self.majorants[-1]
+
+
+def bound_node(
+    terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff: float, known: KnownBounds
+) -> NodeBound:
     """Return an upper bound of the objective over all errors of a node (R5, R6).
 
     Parameters
@@ -238,140 +284,150 @@ def bound_node(terms: Terms, centre: Array, blocks: Sequence[ErrorBlock], cutoff
         Free blocks.
     cutoff
         Bound at which the node is fathomed and no better bound is needed.
-    reaches
-        Cache of the changes by blocks, one for each term; filled here.
+    known
+        Bounds of earlier nodes; those of this node are added.
     """
-    parts = [_TermAbout(*term, centre, blocks, cached) for term, cached in zip(terms, reaches, strict=True)]
     if not blocks:
-        return NodeBound(sum(part.separate_bound() for part in parts), -1, centre)
-    best_point = np.ones(parts[0].moves.shape[2])
-    touching_lengths = [np.sqrt(np.square(part.lengths) + np.square(part.reaches).sum(axis=0)) for part in parts]
-    best = math.inf
-    for k in range(MAJORANTS):
-        majorants = [
-            part.norm.norm.majorant(part.norm.grid, sizes) for part, sizes in zip(parts, touching_lengths, strict=True)
-        ]
-        if not any(majorants):
-            best = sum(part.separate_bound() for part in parts)
+        return NodeBound(value_at(terms, centre), -1, centre)
+    reaches = [
+        [_reach(norm, block, cached) for block in blocks]
+        for (_, norm), cached in zip(terms, known.reaches, strict=True)
+    ]  # fmt: skip
+    sizes = np.array([[weight * r.size for r in of_term] for (weight, _), of_term in zip(terms, reaches, strict=True)])
+    with_majorant = np.array(known.has_majorant)
+    over = _OverBlocks(centre, blocks, sizes[with_majorant].sum(axis=0), sizes[~with_majorant].sum(axis=0))
+    separate = sum(
+        _separate_bound(*term, centre, blocks, of_term)
+        for term, of_term, has_majorant in zip(terms, reaches, known.has_majorant, strict=True) if not has_majorant
+    )  # fmt: skip
+    if not with_majorant.any():
+        over.lower((separate, np.zeros(len(centre)), np.zeros((len(centre), len(centre)))))
+        return NodeBound(over.bound, over.split, over.errors)
+    cutoff -= separate
+    if not known.majorants:
+        known.touch([
+            np.sqrt(np.square(lengths(norm.rows(centre))) + sum(np.square(r.rows) for r in of_term))
+            for (_, norm), of_term in zip(terms, reaches, strict=True)
+        ])  # fmt: skip
+    for majorant in reversed(known.majorants[-MAX_KNOWN:]):
+        over.lower(majorant, cutoff)
+    for _ in range(MAJORANTS):
+        if over.bound <= cutoff:
             break
-        bound, point = _over_majorants(parts, majorants, blocks)
-        if bound < best:
-            best, best_point = bound, point
-        row_lengths = [lengths(part.rows + part.moves @ point) for part in parts]
-        value = sum(part.value(sizes) for part, sizes in zip(parts, row_lengths, strict=True))
-        if best <= cutoff or best <= value * (1.0 + ROUNDING):
+        rows = [norm.rows(over.point) for _, norm in terms]
+        value = sum(
+            weight * norm.norm.value(norm.grid, row)
+            for (weight, norm), row, has_majorant in zip(terms, rows, known.has_majorant, strict=True) if has_majorant
+        )  # fmt: skip
+        # no majorant is lower than the value at a point of the node
+        if over.bound <= value * (1.0 + 2.0 * ROUNDING):
             break
-        touching_lengths = [(a * k + b) / (k + 1) for a, b in zip(touching_lengths, row_lengths, strict=True)]
-    errors, first = centre.copy(), 0
-    for block in blocks:
-        width = len(block.spans)
-        errors[block.columns] += block.spans @ best_point[first : first + width]
-        if width > 1:
-            # move the error to the circle of its disc
-            errors[block.columns] /= float(np.hypot(*errors[block.columns])) or 1.0
-        first += width
-    return NodeBound(best, int(np.argmax(np.sum([part.sizes for part in parts], axis=0))), errors)
+        before = over.bound
+        over.lower(known.touch([lengths(row) for row in rows]), cutoff)
+        if value > cutoff or before - over.bound < MIN_FALL * (before - cutoff):
+            break
+    return NodeBound(separate + over.bound, over.split, over.errors)
 
 
-class _TermAbout:
-    """Weighted norm about a centre, and its changes by the local numbers of all blocks.
+class _OverBlocks:
+    """Upper bound over a node: the least of several majorants at each combination of vertices.
+
+    The vertices of blocks with up to MAX_ENDS numbers are enumerated. The other blocks are bounded as balls (R6a).
 
     Attributes
     ----------
-    rows, lengths
-        Rows at the centre, shape (k, d), and their lengths, shape (k,).
-    moves
-        Change of the rows per local number, shape (k, d, n).
-    slices
-        Slice of each block among the n local numbers.
-    reaches
-        Largest change of each row by each block, shape (blocks, k).
-    sizes
-        Largest rise of the weighted norm by each block, shape (blocks,).
+    split
+        Index of the block to divide next. Blocks have `sizes` in terms with majorants, which are exact at enumerated
+        ends of intervals, and `other_sizes` in terms without.
     """
 
-    def __init__(
-        self, weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[ErrorBlock], cached: dict[_Key, _Reach]
-    ) -> None:
-        self.weight, self.norm, self.blocks = weight, norm, blocks
-        self.rows = norm.rows(centre)
-        self.lengths = lengths(self.rows)
-        block_reaches = [_reach(norm, block, cached) for block in blocks]
-        ends = np.cumsum([0, *(reach.move.shape[-1] for reach in block_reaches)])
-        self.slices = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
-        self.moves = np.concatenate([np.zeros((*self.rows.shape, 0)), *(reach.move for reach in block_reaches)], axis=2)
-        self.reaches = np.array([reach.rows for reach in block_reaches]).reshape(len(blocks), len(self.rows))
-        self.sizes = weight * np.array([reach.size for reach in block_reaches])
+    def __init__(self, centre: Array, blocks: Sequence[ErrorBlock], sizes: Array, other_sizes: Array) -> None:
+        self._centre, self._blocks = centre, blocks
+        ends = np.cumsum([0, *(len(block.spans) for block in blocks)])
+        numbers_of = [list(range(a, b)) for a, b in itertools.pairwise(ends)]
+        self._spans = np.zeros((len(centre), ends[-1]))
+        for block, numbers in zip(blocks, numbers_of, strict=True):
+            self._spans[block.columns, numbers[0] : numbers[-1] + 1] = block.spans
+        enumerated: list[int] = []
+        count = 0
+        # majorants alone need vertices
+        for k in np.argsort(-sizes, kind="stable") if sizes.any() else ():
+            if not blocks[k].is_disc and count + len(numbers_of[k]) <= MAX_ENDS:
+                enumerated.append(int(k))
+                count += len(numbers_of[k])
+        self._enumerated = [j for k in enumerated for j in numbers_of[k]]
+        self._vertices = _vertices(tuple(blocks[k].vertices for k in enumerated))
+        others = [k for k in range(len(blocks)) if k not in enumerated]
+        self._others = [j for k in others for j in numbers_of[k]]
+        # a disc is one ball; each number of an interval or an arc is a ball of its own
+        self._firsts = np.array([
+            self._others.index(j) for k in others for j in (numbers_of[k][:1] if blocks[k].is_disc else numbers_of[k])
+        ], dtype=int)  # fmt: skip
+        # the ends of an interval are errors; the outer vertices of an arc are farther out the wider the arc
+        shares = [
+            1.0 if k not in enumerated else 0.0 if block.arc is None else block.arc[1] for k, block in enumerate(blocks)
+        ]
+        weights = sizes + other_sizes if other_sizes.any() else sizes * shares
+        self.split = int(np.argmax(weights if weights.any() else sizes))
+        self._bounds = np.full(len(self._vertices), math.inf)
+        self._points = np.zeros((len(self._vertices), len(self._others)))
 
-    def separate_bound(self) -> float:
-        """Return an upper bound of the weighted norm, as if each row had its own worst errors (R5)."""
-        kind, grid, rows = self.norm.norm, self.norm.grid, self.rows
-        bound = self.weight * kind.value(grid, rows) + float(self.sizes.sum())
-        if not kind.is_monotone_in_lengths:
-            return bound
-        pulls = np.einsum("kd,kdn->kn", rows, self.moves)
-        pull_sum = np.zeros(len(rows))
-        for block, numbers in zip(self.blocks, self.slices, strict=True):
-            pull_sum += (
-                np.hypot.reduce(pulls[:, numbers], axis=1) if block.is_disc else np.abs(pulls[:, numbers]).sum(axis=1)
-            )
-        reach_sum = self.reaches.sum(axis=0)
-        longest = np.sqrt(np.square(self.lengths) + 2.0 * pull_sum + np.square(reach_sum))
-        longest = np.minimum(self.lengths + reach_sum, longest)
-        return min(bound, self.weight * kind.value(grid, longest[:, None]))
+    def lower(self, majorant: tuple[float, Array, Array], cutoff: float = -math.inf) -> None:
+        """Lower the bounds of the vertices above the cutoff by another majorant."""
+        rows = np.flatnonzero(self._bounds > cutoff)
+        if not len(rows):
+            return
+        constant, slope, curvature = majorant
+        curved, vertices = curvature @ self._centre, self._vertices[rows]
+        constant += float(slope @ self._centre) + 0.5 * float(self._centre @ curved)
+        slope, curvature = self._spans.T @ (slope + curved), self._spans.T @ curvature @ self._spans
+        bent = vertices @ curvature[self._enumerated]
+        pulls = slope[self._others] + bent[:, self._others]
+        values = constant + vertices @ slope[self._enumerated]
+        values += 0.5 * np.einsum("sn,sn->s", bent[:, self._enumerated], vertices)
+        balls, points = _over_balls(pulls, curvature[np.ix_(self._others, self._others)], self._firsts)
+        is_lower = values + balls < self._bounds[rows]
+        self._bounds[rows[is_lower]] = (values + balls)[is_lower]
+        self._points[rows[is_lower]] = points[is_lower]
 
-    def value(self, sizes: Array) -> float:
-        """Return the weighted norm of rows of lengths `sizes`, shape (k,); 0 if the norm needs more than lengths."""
-        kind = self.norm.norm
-        return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.is_monotone_in_lengths else 0.0
+    @property
+    def bound(self) -> float:
+        """Upper bound over the node."""
+        return float(self._bounds.max())
+
+    @property
+    def point(self) -> Array:
+        """Errors at the vertices with the largest bound, shape (columns,)."""
+        best, numbers = int(np.argmax(self._bounds)), np.zeros(self._spans.shape[1])
+        numbers[self._enumerated], numbers[self._others] = self._vertices[best], self._points[best]
+        return np.asarray(self._centre + self._spans @ numbers)
+
+    @property
+    def errors(self) -> Array:
+        """Errors of the node near `point`, shape (columns,): each error in the plane on the circle of its disc."""
+        errors = self.point
+        for block in self._blocks:
+            if len(block.spans) > 1:
+                errors[block.columns] /= float(np.hypot(*errors[block.columns])) or 1.0
+        return errors
 
 
-def _over_majorants(
-    parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[ErrorBlock]
-) -> tuple[float, Array]:
-    """Return an upper bound of quadratic functions above the norms, over all errors of a node, and its point, (n,).
-
-    The ends of up to MAX_ENDS intervals are enumerated, so that the majorants are exact there. The other blocks are
-    bounded one by one.
-    """
-    numbers_of = parts[0].slices
-    count = parts[0].moves.shape[2]
-    constant, slope, curvature = 0.0, np.zeros(count), np.zeros((count, count))
-    for part, majorant in zip(parts, majorants, strict=True):
-        if majorant is None:
-            constant += part.separate_bound()
-            continue
-        factors, offset = part.weight * majorant[0], part.weight * majorant[1]
-        weighted = (factors[:, None, None] * part.moves).reshape(-1, count)
-        constant += offset + 0.5 * float(factors @ np.square(part.lengths))
-        slope += weighted.T @ part.rows.reshape(-1)
-        curvature += weighted.T @ part.moves.reshape(-1, count)
-    ends = [k for k, block in enumerate(blocks) if not block.is_disc]
-    ends.sort(key=lambda k: -float(np.abs(curvature[numbers_of[k]]).sum()))
-    enumerated: list[int] = []
-    for k in ends:
-        if len(enumerated) + numbers_of[k].stop - numbers_of[k].start <= MAX_ENDS:
-            enumerated += range(numbers_of[k].start, numbers_of[k].stop)
-    signs = _signs(len(enumerated))
-    other_blocks = [k for k in range(len(blocks)) if numbers_of[k].start not in enumerated]
-    other_numbers = [j for k in other_blocks for j in range(numbers_of[k].start, numbers_of[k].stop)]
-    # a disc is one ball; each number of an interval or an arc is a ball of its own
-    firsts = [
-        other_numbers.index(j)
-        for k in other_blocks
-        for j in range(numbers_of[k].start, numbers_of[k].start + 1 if blocks[k].is_disc else numbers_of[k].stop)
-    ]
-    enumerated_values = signs @ slope[enumerated] + 0.5 * np.einsum(
-        "sn,sn->s", signs @ curvature[np.ix_(enumerated, enumerated)], signs
-    )
-    pulls = slope[other_numbers] + signs @ curvature[np.ix_(enumerated, other_numbers)]
-    ball_bounds, points = _over_balls(
-        pulls, curvature[np.ix_(other_numbers, other_numbers)], np.array(firsts, dtype=int)
-    )
-    best = int(np.argmax(enumerated_values + ball_bounds))
-    point = np.zeros(count)
-    point[enumerated], point[other_numbers] = signs[best], points[best]
-    return constant + float(enumerated_values[best] + ball_bounds[best]), point
+def _separate_bound(
+    weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[ErrorBlock], reaches: Sequence[_Reach]
+) -> float:
+    """Return an upper bound of a weighted norm over a node, as if each row had its own worst errors (R5)."""
+    kind, grid, rows = norm.norm, norm.grid, norm.rows(centre)
+    bound = weight * (kind.value(grid, rows) + sum(reach.size for reach in reaches))
+    if not kind.is_monotone_in_lengths:
+        return bound
+    pull_sum = np.zeros(len(rows))
+    for block, reach in zip(blocks, reaches, strict=True):
+        pulls = np.einsum("kd,kdn->kn", rows, reach.move)
+        pull_sum += np.hypot.reduce(pulls, axis=1) if block.is_disc else np.abs(pulls).sum(axis=1)
+    reach_sum, row_lengths = np.sum([reach.rows for reach in reaches], axis=0), lengths(rows)
+    longest = np.sqrt(np.square(row_lengths) + 2.0 * pull_sum + np.square(reach_sum))
+    longest = np.minimum(row_lengths + reach_sum, longest)
+    return min(bound, weight * kind.value(grid, longest[:, None]))
 
 
 def _over_balls(slopes: Array, curvature: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array]:
@@ -417,9 +473,11 @@ def _over_balls(slopes: Array, curvature: Array, firsts: NDArray[np.int_]) -> tu
     return bound, points
 
 
-@cache
-def _signs(count: int) -> Array:
-    return np.array(list(itertools.product((1.0, -1.0), repeat=count))).reshape(2**count, count)
+@lru_cache(maxsize=256)
+def _vertices(vertices_of: tuple[tuple[tuple[float, ...], ...], ...]) -> Array:
+    # all combinations of the vertices of blocks, shape (combinations, numbers)
+    combinations = [list(itertools.chain(*parts)) for parts in itertools.product(*vertices_of)]
+    return np.array(combinations).reshape(len(combinations), -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -432,8 +490,6 @@ class _Reach:
 
 
 _Key: TypeAlias = tuple[int, tuple[float, float] | None]
-Reaches: TypeAlias = Sequence[dict[_Key, _Reach]]
-"""Cache of the reach of blocks for each term; it is independent of the centre."""
 
 
 def _reach(norm: AffineNorm, block: ErrorBlock, cache: dict[_Key, _Reach]) -> _Reach:

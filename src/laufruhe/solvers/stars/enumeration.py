@@ -71,14 +71,24 @@ class BestStars:
         self.stars, self.values = all_stars[selected], all_values[selected]
 
 
-def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarSearchResult:
-    """Return the best `count` crank stars of a space, by evaluating all of them in blocks."""
-    best, nodes = BestStars(count, space.throws), 0
-    for block in space.blocks():
-        best.offer(block, objective.values(space, block))
-        nodes += len(block)
+def enumerate_stars(
+    space: StarSpace, objective: AmplitudeObjective, count: int = 1, time_limit: float = float("inf")
+) -> StarSearchResult:
+    """Return the best `count` crank stars of a space, by evaluating all of them in blocks.
+
+    After `time_limit` [s] the search returns the best stars so far, without a proof.
+    """
+    best, nodes, complete = BestStars(count, space.throws), 0, True
+    with limit_time(time_limit):
+        for block in space.blocks():
+            if nodes and is_time_over():
+                complete = False
+                break
+            best.offer(block, objective.values(space, block))
+            nodes += len(block)
     minimum = float(best.values[0]) if len(best.values) else float("inf")
-    return StarSearchResult(best.stars, best.values, minimum, True, nodes)
+    bound = minimum if complete else objective.lower_bound(space)
+    return StarSearchResult(best.stars, best.values, bound, complete, nodes)
 
 
 def enumerate_orders(

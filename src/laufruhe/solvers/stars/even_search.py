@@ -138,7 +138,8 @@ def search_even(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         return _search_by_cuts(problem, phasing, families)
     results = []
     for family, objective in zip(families, objectives, strict=True):
-        search = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective, phasing.best)
+        space = replace(family.space, mirror=True, reflect=True)
+        search = enumerate_stars(space, objective, phasing.best, phasing.time_limit)
         results.append(enumeration_result(phasing, family, search, "all stars evaluated"))
     return merge_results(results, phasing.best)
 
