@@ -155,7 +155,7 @@ SHORT = {
     "NONE": "-",
     "AFFINE": "affine",
     "BIAFFINE": "affine while unbalances are fixed",
-    "BENT": "affine between bearings",
+    "KINKED": "affine between bearings",
     "MASSES": "affine in masses that follow",
     "SHIFT": "sum of shifted parts",
     "SWING": "number of shifted parts",

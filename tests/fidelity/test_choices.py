@@ -195,7 +195,7 @@ def test_contradictions_are_refused(table: str, key: str, tmp_path: Path) -> Non
 
 def test_uneven_speed_from_a_file(tmp_path: Path) -> None:
     problem = load(written(tmp_path, _with(scenes.TIGHT, 'samples = 360\ncrank_inertia = "0.5 kg m^2"')))
-    assert problem.fidelity.is_uneven
+    assert problem.fidelity.has_uneven_speed
     result = solve(problem)
     assert result.certificate is not None
     assert result.certificate.gap <= 1e-3

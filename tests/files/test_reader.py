@@ -150,7 +150,7 @@ BAD = [
     bad("throws and order differ in number", "[1, 3, 4, 2]", "[1, 3, 2]",
         "engine.throws: gives 4 cylinders, but engine.firing_order gives 3; make"),
     bad("throws and cylinders differ in number", "[0, 180, 180, 0]", "[0, 180, 180, 0]\ncylinders = 5",
-        "engine.firing_order: gives 4 cylinders, but engine.cylinders gives 5; make the two numbers agree"),
+        "engine.firing_order: gives 4 cylinders, but engine.cylinders gives 5; make both give the same number"),
     bad("a throw too few", "[0, 180, 180, 0]", "[0, 180, 180]",
         "engine.throws: gives 3 cylinders, but engine.firing_order"),
     bad("bounds reversed", '["0 kg", "3 kg"]', '["3 kg", "0 kg"]',

@@ -33,7 +33,7 @@ ALL_OPEN = Path(__file__).parent / "inputs" / "geared-pair-all-open.toml"
 STRONGER = {
     Dependence.AFFINE: [Dependence.NONE],
     Dependence.BIAFFINE: [Dependence.NONE],
-    Dependence.BENT: [Dependence.NONE, Dependence.BIAFFINE],
+    Dependence.KINKED: [Dependence.NONE, Dependence.BIAFFINE],
     Dependence.SHIFT: [Dependence.NONE, Dependence.AFFINE],
     Dependence.SWING: [Dependence.NONE, Dependence.AFFINE],
     Dependence.CONVEX: [Dependence.NONE, Dependence.AFFINE],

@@ -37,7 +37,8 @@ def write_results(
     with ExitStack() as stack:
         with timed(result.timing, "tables"):
             tables = stack.enter_context(write_tables(result, stage))
-        live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
+        page_model = live_model(result.problem, result)
+        document = result_document(result, list(PICTURES), request.command)
         if request.kinds:
             say("drawing")
         with timed(result.timing, "plots"):
@@ -48,7 +49,7 @@ def write_results(
             pictures = wait_for_pictures()
         document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
-        files.write(stage / files.PAGE, as_html(document, pictures, live))
+        files.write(stage / files.PAGE, as_html(document, pictures, page_model))
         with timed(result.timing, "tables"):
             tables()
     text = as_json(result, request.series)

@@ -23,7 +23,10 @@ from laufruhe.studies.stores import FINISHED_POINTS
 def run_study(
     path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], ask: Ask, kinds: Sequence[str]
 ) -> tuple[str, Callable[[], str]]:
-    """Write the files of a study; return the message about them, and a function that makes JSON of all parts."""
+    """Compute a study and write its files; return the message about them, and a function that returns it as JSON.
+
+    `ask` runs a function, here one that draws a picture, in another process.
+    """
     if jobs is not None and jobs < 1:
         raise refused("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
     started = time.perf_counter()
@@ -46,7 +49,7 @@ def run_study(
 
 
 def check_study(path: Path) -> tuple[str, Callable[[], str]]:
-    """Return the number of points of a study as text, and a function that makes JSON of it."""
+    """Return the number of points of a study as text, and a function that returns it as JSON."""
     study, problem_files = load_study(path), ProblemFiles(path.parent)
     points = {part.name: len(part.points(problem_files)) for part in study.study.parts}
     text = f"ok: {printed(study.title)}, {sum(points.values())} points\n"

@@ -110,10 +110,13 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 
 
 def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
-    """Return the cheapest fidelity within a tolerance; `scale` is the reference to which errors are relative."""
-    allowed_error = max(tolerance - scale.relative_doubt, 0.0)
+    """Return the cheapest fidelity whose relative error is within a tolerance.
+
+    `scale` is the evaluation at exact fidelity to which errors are relative.
+    """
+    allowed_error = max(tolerance - scale.relative_reference_error, 0.0)
     fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
-    estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_doubt
+    estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_reference_error
     pruned = full = 0
     for term in scale.terms:
         spectra = signals(term.measure, scale.best)
@@ -136,7 +139,7 @@ def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelit
     """Return the cheapest fidelity whose relative error from all options together is at most `allowed_error` (F10)."""
     problem, loss = reference.problem, reference.relative_loss
     # at an uneven speed, gas and inertia affect all loads
-    is_even = not fidelity.is_uneven
+    is_even = not fidelity.has_uneven_speed
     fidelity = replace(fidelity, gas_samples=REFERENCE_SAMPLES)
     for part in (ROD, GAS):
         if is_even and part.is_there(problem):
@@ -200,7 +203,7 @@ def _description(reference: ErrorReference, fidelity: Fidelity) -> list[str]:
         lines.append("inertia of the rods beyond that of two masses")
     if GAS.is_active(problem, fidelity):
         lines.append(f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {orders} of it")
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         lines.append("crank speed that varies within the cycle")
     if mounting and fidelity.mounts == "rigid":
         lines.append("mounts as if they gave no way")
@@ -270,9 +273,9 @@ def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None =
 
 
 def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
-    """Return the fidelities that a trade compares, as pairs (name, problem at this fidelity) (F13).
+    """Return the fidelities that `laufruhe trade` compares, as pairs (name, problem at this fidelity) (F13).
 
-    `scale` is the reference of the problem.
+    `scale` is the evaluation of the problem to which errors are relative.
     """
     problem, mounting = scale.problem, scale.mounting
     has_gas = GAS.is_there(problem)

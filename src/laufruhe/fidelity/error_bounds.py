@@ -130,8 +130,8 @@ class ErrorReference:
         return self.largest_change(self.evaluation(replace(fidelity, gas_samples=fidelity.gas_steps // 2)), self.best)
 
     @property
-    def relative_doubt(self) -> float:
-        """Upper bound of the relative error of the reference itself (F9)."""
+    def relative_reference_error(self) -> float:
+        """Upper bound of the error of the reference itself, relative to its objective (F9)."""
         return relative(self.gas_step_error, self.value) + ROUNDING
 
     def relative_loss(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
@@ -238,7 +238,7 @@ def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float
     Both are in the unit of the objective, and the same for all designs, because unbalances do not change the gas.
     """
     fidelity = evaluation.fidelity
-    if not (fidelity.is_uneven or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
+    if not (fidelity.has_uneven_speed or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
         return 0.0, 0.0
     scale = ErrorReference(problem, evaluation)
     # mounts in the frequency domain, because integration in time takes long

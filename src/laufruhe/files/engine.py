@@ -276,7 +276,7 @@ def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
     for key, other_count in counts:
         if other_count != count:
             rule = f"gives {counted(other_count, 'cylinder')}, but engine.{first} gives {count}"
-            raise Refused(f"engine.{key}", None, rule, "make the two numbers agree")
+            raise Refused(f"engine.{key}", None, rule, "make both give the same number of cylinders")
     check_order(table.listed_order, count)
     mechanism, rod = _mechanism(table, numbers)
     stagger = numbers.get("bank_stagger")

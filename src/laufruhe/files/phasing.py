@@ -140,7 +140,7 @@ def open_phasing(
     except ModelError as error:
         raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
     # the smooth program of uneven throws needs an even speed (S19)
-    if phasing.continuous and problem.fidelity.is_uneven:
+    if phasing.continuous and problem.fidelity.has_uneven_speed:
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
         rule = "makes the crank speed uneven, and uneven throws are optimised at even speed only"
         raise Refused("fidelity.crank_inertia", inertia, rule, "remove this key, or fix the throws")

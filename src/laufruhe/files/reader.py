@@ -99,7 +99,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
                 problem = replace(problem, warnings=order_warnings(file.engine))
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
-                problem_of_star = replace(problem_of_star, rebuild=partial(_rebuilt, closed, path, candidate))
+                problem_of_star = replace(problem_of_star, rebuild=partial(_changed_drawing, closed, path, candidate))
                 for note in notes():
                     if parts[note]:
                         problem_of_star = note.put(parts[note], problem_of_star, file, closed)
@@ -146,7 +146,7 @@ def _apply_edit(origin: Origin, edit: str, *arguments: Any) -> Problem:
     return load_tables(tables, origin.path)
 
 
-def _rebuilt(
+def _changed_drawing(
     tables: Mapping[str, Any], path: Path, candidate: Candidate | None, changes: Mapping[Place, str | float]
 ) -> Drawing:
     """Return the engine of a file with other numbers at some addresses; for one candidate if crank stars are open."""
@@ -157,15 +157,15 @@ def _rebuilt(
     for place, value in changes.items():
         tables = with_value_at(tables, place, value)
     try:
-        rebuilt = _of_file(file_model().model_validate(with_followers(tables)), path)
-        if candidate is not None and rebuilt.phasing is not None:
-            rebuilt = rebuilt.phasing.problem_of(candidate)
+        problem = _of_file(file_model().model_validate(with_followers(tables)), path)
+        if candidate is not None and problem.phasing is not None:
+            problem = problem.phasing.problem_of(candidate)
     except (ValidationError, Refused, ModelError) as error:
         values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
         faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
         why = " and ".join(map(str, faults))
         raise ModelError(f"this engine cannot be built with {values}: {why}; narrow its bounds or tolerances") from None
-    return Drawing(rebuilt.engine, rebuilt.points, rebuilt.decisions, rebuilt.mount_numbers)
+    return Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
 
 
 def tables_of(path: Path) -> dict[str, Any]:

@@ -109,7 +109,10 @@ class Signal:
 
 
 def signal_of(model: AffineModel, measure: Measure) -> Signal:
-    """Return the signal of a measure of loads or masses, as an affine function of the sliders' values."""
+    """Return the signal of a measure for a live page: constant, and slope of each column of the decision vector.
+
+    The page adds slope times value of its sliders to the constant. Masses are added up, and have no orders.
+    """
     if not measure.is_load:
         rows, first = model.norm(measure, 1), np.zeros(1, dtype=np.intp)
         constant, slope = (Waves(first, part[None].astype(complex)) for part in (rows.constant, rows.slope))

@@ -349,7 +349,7 @@ class _Change(NamedTuple):
 def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
     by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
     rotors = tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
-    if decision.keys(Kind.PISTON) and problem.fidelity.is_uneven:
+    if decision.keys(Kind.PISTON) and problem.fidelity.has_uneven_speed:
         rule = "reciprocating masses are decided for a crank that turns evenly"
         raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
     return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE))

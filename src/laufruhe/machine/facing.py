@@ -54,14 +54,17 @@ class SharedChamber(SliderCrank):
         return self.facing
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Return the travel of both pistons, from the highest position of this one [m]."""
+        """Return the travel of both pistons, from the highest position of this one [m]; `lib` is NumPy or CasADi."""
         other = self._other
         angle = self.shaft.ratio * alpha + other.ahead
         far = other.crank_radius * kinematics.travel(lib, angle, other.crank_radius / other.rod_length)
         return super().travel(lib, alpha) + far
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Return the velocity of both pistons, towards each other, by the angle of this one's crank [m]."""
+        """Return the derivative of the travel of both pistons by the angle of this one's crank [m].
+
+        `lib` is NumPy or CasADi.
+        """
         other = self._other
         angle = self.shaft.ratio * alpha + other.ahead
         far = other.crank_radius * kinematics.piston_velocity(lib, angle, other.crank_radius / other.rod_length)

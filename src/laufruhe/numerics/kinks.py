@@ -139,7 +139,7 @@ class SignalKinks:
         """Return the kinks after a real linear map of values, shape (n, ...); None if no kink remains."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
-        return _left(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
+        return _kinks_with_jumps(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
 
     def shift(self, angle: float, degrees: int = 0) -> Self:
         """Return the kinks delayed by `angle` [rad] and integrated `degrees` times."""
@@ -154,7 +154,7 @@ class SignalKinks:
     @property
     def derivative(self) -> SignalKinks | None:
         """Kinks of the derivative of a continuous signal; None if it has no kinks."""
-        return _left(self.angles, self.jumps[:, 1:])
+        return _kinks_with_jumps(self.angles, self.jumps[:, 1:])
 
     def folded(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of a signal averaged over `times` shifts, with the angles reduced to `period` [rad]."""
@@ -186,7 +186,9 @@ def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
 def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
     """Return the kinks with those at equal angles added up; None if all jumps are zero."""
     first, order = _distinct(angles)
-    return _left(angles[order[first]], np.add.reduceat(jumps[order], first, axis=0)) if len(angles) else None
+    return (
+        _kinks_with_jumps(angles[order[first]], np.add.reduceat(jumps[order], first, axis=0)) if len(angles) else None
+    )
 
 
 def _distinct(angles: Array) -> tuple[Indices, Indices]:
@@ -196,7 +198,7 @@ def _distinct(angles: Array) -> tuple[Indices, Indices]:
     return np.flatnonzero(np.diff(steps[order], prepend=-math.inf)), order
 
 
-def _left(angles: Array, jumps: Array) -> SignalKinks | None:
+def _kinks_with_jumps(angles: Array, jumps: Array) -> SignalKinks | None:
     nonzero = jumps.reshape(len(jumps), -1).any(axis=1)
     if len(angles) and nonzero.all():
         return SignalKinks(angles, jumps)
@@ -235,7 +237,7 @@ class KinkNodes:
         jumps = np.sum(series * (np.sign(self.intervals)[:, :, None] * powers)[..., None], axis=1)
         # without a jump the polynomials of both sides meet to a rounding error
         jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
-        return _left(self.places, jumps.reshape(*jumps.shape[:2], *values.shape[1:]))
+        return _kinks_with_jumps(self.places, jumps.reshape(*jumps.shape[:2], *values.shape[1:]))
 
 
 def kink_nodes(breaks: Array, period: float) -> KinkNodes:

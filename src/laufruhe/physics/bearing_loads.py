@@ -44,7 +44,7 @@ PinReaction: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tupl
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
     """Return True if loads inside the crankcase are modelled: known pin loads, at even crank speed."""
-    return not fidelity.is_uneven and all(part.has_pin_loads for part in engine.slider_cranks)
+    return not fidelity.has_uneven_speed and all(part.has_pin_loads for part in engine.slider_cranks)
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -97,7 +97,7 @@ def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidel
 
 
 def _check_even(fidelity: Fidelity) -> None:
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         raise ModelError("bearing loads are modelled at constant crank speed; remove fidelity.crank_inertia")
 
 

@@ -79,7 +79,7 @@ class Fidelity:
             raise ChoiceError("gas_orders", self.gas_orders, "needs gas, and must be at least 1", "leave it out")
         if not self.crank_inertia > 0.0:
             raise ChoiceError("crank_inertia", self.crank_inertia, "must be positive", "give an inertia in kg m2")
-        if self.is_uneven and self.kinematics != "exact":
+        if self.has_uneven_speed and self.kinematics != "exact":
             rule = "needs exact kinematics"
             raise ChoiceError("crank_inertia", self.crank_inertia, rule, "leave kinematics out")
         if self.modes is None:
@@ -91,7 +91,7 @@ class Fidelity:
             raise ChoiceError("modes", modes, f"must be different numbers from 1 to {MODES}", "1 is the lowest mode")
 
     @property
-    def is_uneven(self) -> bool:
+    def has_uneven_speed(self) -> bool:
         """True if the crank speed varies within the cycle."""
         return math.isfinite(self.crank_inertia)
 
@@ -126,7 +126,7 @@ class Fidelity:
             (self.rod == "mass-only", "rod of two masses"),
             (not self.gas, "no gas"),
             (self.gas_orders is not None, f"gas to order {self.gas_orders}"),
-            (self.is_uneven, f"uneven crank speed ({self.crank_inertia:g} kg m2)"),
+            (self.has_uneven_speed, f"uneven crank speed ({self.crank_inertia:g} kg m2)"),
             (self.mounts == "rigid", "mounts that do not give way"),
             (self.mounts == "time", "mounts in the time domain"),
             (self.modes is not None, modes),

@@ -37,14 +37,14 @@ class Direction(IntEnum):
 
 @dataclass(frozen=True)
 class Effect:
-    """Load of a mechanism.
+    """Load of a moving part of one cylinder, in one direction, as a Fourier series.
 
     Attributes
     ----------
     size
-        What its series is multiplied with, besides the square of the speed [kg m, kg m2].
+        Factor of the series, besides the square of the speed [kg m, kg m2].
     shape
-        Equal where series are equal.
+        Key of the series: loads with equal keys have equal series.
     series
         Coefficients by order of the crank's own angle (C8).
     """
@@ -106,7 +106,7 @@ def two_order_roll(rod_ratio: float) -> ComplexArray:
 
 
 def _slider_crank(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    """Return the loads of piston and rod of a slider-crank, from closed forms of their order coefficients (K7-K10)."""
+    """Return the loads of the reciprocating mass of a slider-crank, then those of its rod, in closed form (K7-K10)."""
     radius, ratio = part.crank_radius, part.shaft.ratio
     shape = part.rod_ratio, part.offset_ratio
 

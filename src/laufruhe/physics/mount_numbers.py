@@ -68,21 +68,25 @@ class AxisResidual:
     minimum: float
     maximum: float
 
-    def answer(self, matrix: Any) -> Any:
-        """Return left A right, also for symbols."""
+    def stiffness_part(self, matrix: Any) -> Any:
+        """Return left A right, the part of the residual that depends on stiffness; also for symbols."""
         return self.left @ matrix @ self.right
 
-    def nearest(self, answer: Array) -> float:
-        """Return the s with the least residual."""
-        return float(np.clip(self.mass @ answer / (self.mass @ self.mass), self.minimum, self.maximum))
+    def nearest(self, stiffness_part: Array) -> float:
+        """Return the s with the least residual, from the part that depends on stiffness."""
+        return float(np.clip(self.mass @ stiffness_part / (self.mass @ self.mass), self.minimum, self.maximum))
 
     def rows(self, matrix: Array) -> Array:
         """Return left A right - s mass at the best s, shape (6,)."""
-        answer = np.asarray(self.answer(matrix))
-        return answer - self.nearest(answer) * self.mass
+        stiffness_part = np.asarray(self.stiffness_part(matrix))
+        return stiffness_part - self.nearest(stiffness_part) * self.mass
 
-    def under(self, z: Array) -> tuple[Array, float]:
-        """Return a linear lower bound of the residual: y, |y| <= 1, and c (E19, E46)."""
+    def linear_bound(self, z: Array) -> tuple[Array, float]:
+        """Return y and c of a lower bound of the residual, linear in stiffness: y . left A right - c (E19, E46).
+
+        `z` is its slope before it is shortened to length one, and made valid for an unbounded s. c is the largest
+        s y . mass within the bounds of s.
+        """
         y = z / max(float(np.linalg.norm(z)), 1.0)
         along = float(y @ self.mass)
         if self.maximum == np.inf and along > 0.0:
@@ -140,9 +144,9 @@ def torque_roll_coupling(mounting: ElasticMounting) -> float:
     frequency. 1: the mounts answer with nothing but other motions.
     """
     root, along = mass_root(mounting.block), _along(mounting.block)
-    answer = root @ mounting.stiffness @ root.T @ along
-    size = float(np.linalg.norm(answer))
-    return float(np.linalg.norm(answer - along * (along @ answer))) / size if size > 0.0 else 0.0
+    stiffness_part = root @ mounting.stiffness @ root.T @ along
+    size = float(np.linalg.norm(stiffness_part))
+    return float(np.linalg.norm(stiffness_part - along * (along @ stiffness_part))) / size if size > 0.0 else 0.0
 
 
 def torque_roll_frequency(mounting: ElasticMounting) -> float:

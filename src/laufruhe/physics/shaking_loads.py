@@ -40,7 +40,7 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     ModelError
         If the gas model cannot be met, or a gas-loaded cylinder has no bore.
     """
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         return uneven_loads(engine, point, fidelity)
     gas, cycle, square = fidelity.gas_of(point), engine.cycle, point.speed**2
     turning = rotor_loads((*engine.pins, *engine.rotors), 1.0, cycle)
@@ -83,7 +83,7 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the loads of the geared inertia of an engine, at even or uneven speed (L8, F5)."""
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         return uneven_geared_loads(engine, point, fidelity)
     return geared_moment(engine, crank_torque(engine, point, fidelity))
 
@@ -92,7 +92,7 @@ def added_rotor_loads(
     rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
 ) -> Spectrum:
     """Return the loads that rotors add to an engine at an operating point, at even or uneven speed (L1, F5)."""
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         return uneven_rotor_loads(rotors, engine, point, fidelity)
     return rotor_loads(rotors, point.speed, engine.cycle)
 

@@ -169,5 +169,5 @@ def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) ->
     omega = wrench.orders[:, None, None] * speed
     impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(model.size)
     y = np.linalg.solve(impedance, (wrench.coefficients @ model.load.T)[..., None])
-    forces = (model.forces + 1j * omega * model.drag) @ y
+    forces = (model.forces + 1j * omega * model.damping_forces) @ y
     return Spectrum(wrench.base, forces.reshape(len(omega), -1, 3))

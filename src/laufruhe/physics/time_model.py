@@ -28,7 +28,7 @@ class TimeModel:
         From a wrench about the origin to y, shape (n, 6).
     travels
         From y to travel along the own axes of the springs, shape (3 springs, n).
-    forces, drag
+    forces, damping_forces
         From y and y' to the mount forces in the axes of C2, shape (3 mounts, n).
     gaps, stops
         Of the bump stops along every own axis, shape (3 springs,).
@@ -45,7 +45,7 @@ class TimeModel:
     load: Array
     travels: Array
     forces: Array
-    drag: Array
+    damping_forces: Array
     gaps: Array
     stops: Array
     turns: Array
@@ -70,7 +70,7 @@ class TimeModel:
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
         """Return the mount forces over time, shape (times, mounts, 3), from motion y and its rate, (n, times) each."""
-        out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
+        out = np.array((self.forces @ y + self.damping_forces @ rate).T.reshape(y.shape[1], -1, 3))
         if self.has_stops:
             forces = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
             np.add.at(out.swapaxes(0, 1), self.places, np.einsum("nma,mab->mnb", forces, self.turns))
@@ -104,15 +104,15 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
     mount_motions = np.einsum("mab,mbj->maj", turns, motions[list(places)])
     spread = np.where(modes.squares > 0.0, 1.0 / np.sqrt(np.where(modes.squares > 0.0, modes.squares, 1.0)), 0.0)
     lossy = (mounting.losses @ (mounting.motions @ modes.shapes) * spread) @ vectors.T
-    drag = mounting.dampers @ motions + lossy
+    damper_forces = mounting.dampers @ motions + lossy
     mounts = len(mounting.mounts)
     model = TimeModel(
         stiffness=root @ mounting.stiffness @ root.T,
-        damping=np.einsum("mai,maj->ij", motions, drag),
+        damping=np.einsum("mai,maj->ij", motions, damper_forces),
         load=root @ moved_wrench(NUMBERS, mounting.block.centre_of_gravity),
         travels=mount_motions.reshape(-1, 6),
         forces=(mounting.springs @ motions).reshape(3 * mounts, 6),
-        drag=drag.reshape(3 * mounts, 6),
+        damping_forces=damper_forces.reshape(3 * mounts, 6),
         gaps=np.repeat([spring.stop_gap for spring in springs], 3),
         stops=np.repeat([spring.stop_stiffness for spring in springs], 3),
         turns=turns,
@@ -136,7 +136,7 @@ def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeM
     if len(tracks) < len(dynamic.laws):
         raise ModelError(NO_LAW)
     bulge, mass = (np.array([getattr(track, name) for track in tracks]) for name in ("bulge", "mass"))
-    lower, drag = (np.array([getattr(track, name) for track in tracks]) for name in ("stiffness", "damping"))
+    lower, damping = (np.array([getattr(track, name) for track in tracks]) for name in ("stiffness", "damping"))
     static = np.array([track.static for track in tracks])
     seen, swelling = dynamic.rows @ root.T, bulge / np.sqrt(mass)
     block = model.stiffness + seen.T @ ((bulge - static)[:, None] * seen)
@@ -145,12 +145,12 @@ def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeM
     return replace(
         model,
         stiffness=np.block([[block, across], [across.T, np.diag((bulge + lower) / mass)]]),
-        damping=np.pad(model.damping, (wider, wider)) + np.diag(np.concatenate([np.zeros(6), drag / mass])),
+        damping=np.pad(model.damping, (wider, wider)) + np.diag(np.concatenate([np.zeros(6), damping / mass])),
         load=np.pad(model.load, (wider, (0, 0))),
         travels=np.pad(model.travels, ((0, 0), wider)),
         forces=np.hstack([
             model.forces + dynamic.directions @ ((bulge - static)[:, None] * seen), -dynamic.directions * swelling
         ]),
-        drag=np.pad(model.drag, ((0, 0), wider)),
+        damping_forces=np.pad(model.damping_forces, ((0, 0), wider)),
         roll=np.pad(model.roll, wider),
     )  # fmt: skip

@@ -215,7 +215,7 @@ def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
 
     None if none of these is known.
     """
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         return fidelity.crank_inertia
     if engine.flywheel is not None:
         return engine.flywheel.inertia

@@ -58,7 +58,11 @@ def places_of(result: Result) -> list[Places]:
     places_list += [
         places for places, is_available in has_data.items() if inside and (is_available or places.channel in requested)
     ]
-    loads = [Measure(channel).load for channel in CHANNELS.values() if channel.title and not problem.fidelity.is_uneven]
+    loads = [
+        Measure(channel).load
+        for channel in CHANNELS.values()
+        if channel.title and not problem.fidelity.has_uneven_speed
+    ]
     loads_of = [load for load in loads if load.needs.of(engine) and load.places(engine)]
     return [*places_list, *(Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in loads_of)]
 

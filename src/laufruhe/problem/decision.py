@@ -266,7 +266,9 @@ class AddressDrive:
 
     def move(self, _numbers: Numbers, _change: Any) -> None:
         """Raise TypeError: the engine is built again instead (`Problem.fixed_at`)."""
-        raise TypeError(f"{self.path} is a number of the file; build the engine again with Problem.fixed_at")
+        raise TypeError(
+            f"the number at {self.path} of the problem file cannot change in a built engine; use Problem.fixed_at"
+        )
 
 
 def mount_from_numbers(mount: Mount, numbers: Sequence[float]) -> Mount:

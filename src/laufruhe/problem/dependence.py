@@ -24,8 +24,8 @@ class Dependence(StrEnum):
     AFFINE = "affine"
     """Affine; a mass is a sum of lengths of affine vectors."""
     BIAFFINE = "affine while unbalances are fixed"
-    BENT = "affine between bearings while unbalances are fixed"
-    """Affine while unbalances are fixed, with a kink where a rotor passes a bearing of its shaft (B4)."""
+    KINKED = "affine between bearings while unbalances are fixed"
+    """Affine in the place of a rotor while unbalances are fixed, with a kink where it passes a bearing (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Affine in masses that follow from sizes, times a factor of each place that is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
@@ -127,7 +127,7 @@ TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_extensions(dict(map(_row,
 # loads of bearings depend on the positions of rotors on the shafts that they carry
 _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
-    if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.BENT)
+    if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.KINKED)
 )  # fmt: skip
 # dependences that are lost at an uneven speed, where loads of parts do not add up
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
@@ -142,7 +142,7 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
         return entry
     if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
         return Dependence.NONE
-    if entry is Dependence.BENT and problem.fidelity.crankshaft != "cut":
+    if entry is Dependence.KINKED and problem.fidelity.crankshaft != "cut":
         # a continuous beam passes loads on to all bearings
         return Dependence.SMOOTH
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
@@ -151,7 +151,7 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     if kind is Kind.LEAD and entry in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
         # a lead changes the volume between two pistons with common gas
         return Dependence.SMOOTH
-    if problem.fidelity.is_uneven and entry in _OF_EVEN_SPEED and kind is not Kind.STAR:
+    if problem.fidelity.has_uneven_speed and entry in _OF_EVEN_SPEED and kind is not Kind.STAR:
         return Dependence.SMOOTH
     return entry
 

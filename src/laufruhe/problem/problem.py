@@ -28,7 +28,7 @@ Path: TypeAlias = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Drawing:
-    """Parts of a problem that depend on the numbers of its file; each elastic spring has fourteen numbers (E13)."""
+    """Engine of a problem file, with operating points, decisions and mounts; a spring has fourteen numbers (E13)."""
 
     engine: Engine
     points: tuple[OperatingPoint, ...]
@@ -288,7 +288,9 @@ class Problem:
     @property
     def depends_on_gas(self) -> bool:
         """True if gas affects a measure: by the roll moment, or at an uneven speed by all loads."""
-        return self.has_gas and (any(measure.depends_on_gas for measure in self.measures) or self.fidelity.is_uneven)
+        return self.has_gas and (
+            any(measure.depends_on_gas for measure in self.measures) or self.fidelity.has_uneven_speed
+        )
 
     @property
     def depends_on_firing_order(self) -> bool:

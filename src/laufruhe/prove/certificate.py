@@ -78,7 +78,7 @@ SMALL_GAP = 0.05
 
 def make_certificate(
     value: float, bound: float, zero_level: float, tolerance: float, strength: ProofStrength, kkt_residual: float,
-    method: str, doubt: float = 0.0,
+    method: str, value_error: float = 0.0,
 ) -> Certificate:  # fmt: skip
     """Return the certificate of a design from its objective and a lower bound.
 
@@ -100,12 +100,12 @@ def make_certificate(
         Largest relative violation of the optimality conditions.
     method
         Description of the method that computed the bound.
-    doubt
+    value_error
         Largest error by which the objective may be too low [SI]: between samples, and by accepted violations of limits.
     """
     # a norm is never negative
     value, bound = float(value), max(float(bound), 0.0)
-    if not check_bound(method, bound, value, zero_level + doubt):
+    if not check_bound(method, bound, value, zero_level + value_error):
         return unproven_certificate(value, kkt_residual, method)
     gap = gap_of(value, bound, zero_level)
     if gap <= tolerance:

@@ -87,7 +87,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         },
         "balance_factors": [_attributes(balance, "cylinders factor") for balance in balance_factors(engine)],
         "firing_intervals": list(engine.firing_intervals),
-        "warnings": [str(doubt) for doubt in problem.plausibility_warnings],
+        "warnings": [str(warning) for warning in problem.plausibility_warnings],
         **_phasing(result),
         **_ranks(result),
         **_reached(result),

@@ -24,7 +24,7 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     if problem.assumptions:
         yield Bullets("Assumptions:", problem.assumptions)
     if problem.plausibility_warnings:
-        yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.plausibility_warnings])
+        yield Bullets("Numbers to check:", [str(warning) for warning in problem.plausibility_warnings])
     yield Heading("Result")
     yield Paragraph(headline(result))
     yield from map(Paragraph, details(result))

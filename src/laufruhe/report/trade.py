@@ -196,7 +196,7 @@ def _named(trade: Trade, name: str) -> TradeRow | None:
 
 
 def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
-    """Return the errors that a fidelity causes in values and designs, largest and median."""
+    """Return a sentence on the errors of a fidelity in values and designs, largest and median over problems."""
     rows = [row for trade in trades if trade.problem.load_terms and (row := _named(trade, name)) is not None]
     errors = sorted(row.error for row in rows)
     regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
@@ -205,7 +205,7 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
         return f"{what} nothing in these problems."
     text = f"{what} {_up_to(errors[-1])} of the value{_median(errors)}"
     if regrets:
-        text += f"; of the design {_up_to(regrets[-1])}{_median(regrets)}"
+        text += f"; the design that it finds is worse than the best by {_up_to(regrets[-1])}{_median(regrets)}"
     if broken:
         text += f"; {counted(broken, 'design')} broke a limit"
     return text + "."

@@ -239,10 +239,10 @@ def _feasible_result(result: Result, problem: Problem, candidate: Result) -> Res
     """Return the feasible design of the result `candidate` with the lower bound of the original problem's objective."""
     bound = result.certificate.lower_bound if result.certificate else 0.0
     zero_level, value = numerical_zero(problem, candidate.final.engine), objective_value(problem, candidate.final)
-    final, value, doubt = refine_objective(problem, candidate.final, value, bound, zero_level)
+    final, value, value_error = refine_objective(problem, candidate.final, value, bound, zero_level)
     method = f"found while {candidate.problem.objective_name} was minimised"
     proof = make_certificate(
-        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, method, doubt
+        value, bound, zero_level, problem.tolerance, ProofStrength.RELAXED, math.inf, method, value_error
     )
     restored = candidate.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(

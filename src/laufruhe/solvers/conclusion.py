@@ -153,22 +153,22 @@ def refine_objective(
     fine = with_fine_sampling(evaluation) if problem.limits else evaluation
     if fine.violation(problem.limits) > FEASIBLE:
         return evaluation, value, math.inf
-    doubt = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in problem.objective)
+    value_error = sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
         standing = fine.check_limit(limit)
         if standing.side == side and price.relaxed > 0.0:
-            doubt += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
-    return evaluation, value, doubt
+            value_error += price.relaxed * max(standing.violation, 0.0) * abs(standing.edge)
+    return evaluation, value, value_error
 
 
 def refine_result(result: Result, bound: float, zero_level: float) -> tuple[Result, float]:
     """Return a result, with more samples while a bound exceeds its objective, and the error of that objective [SI]."""
     if result.objective is None:
         return result, 0.0
-    final, value, doubt = refine_objective(
+    final, value, value_error = refine_objective(
         result.problem, result.final, result.objective.value, bound, zero_level, result.prices
     )
-    return replace(result, final=final, objective=replace(result.objective, value=value)), doubt
+    return replace(result, final=final, objective=replace(result.objective, value=value)), value_error
 
 
 def without_proof(result: Result, error: BoundError) -> Result:
@@ -207,8 +207,8 @@ def witness_of(design: Design, place: Array, violation: float = FEASIBLE) -> Wit
 
     def read() -> float:
         zero_level = numerical_zero(problem, evaluation.engine)
-        _, value, doubt = refine_objective(problem, evaluation, design.value, math.inf, zero_level)
-        return value * (1.0 + VIOLATION_PENALTY * max(design.violation, 0.0)) + doubt + zero_level
+        _, value, value_error = refine_objective(problem, evaluation, design.value, math.inf, zero_level)
+        return value * (1.0 + VIOLATION_PENALTY * max(design.violation, 0.0)) + value_error + zero_level
 
     return Witness(place, design.value, read)
 
@@ -227,12 +227,19 @@ def build_result(design: Design, initial: Evaluation, proof: ProofData, timing: 
     zero_level = numerical_zero(problem, design.evaluation.engine)
     message = f"the initial design has no finite loads: {initial.resonance}" if initial.resonance else ""
     if is_feasible:
-        evaluation, value, doubt = refine_objective(
+        evaluation, value, value_error = refine_objective(
             problem, design.evaluation, design.value, proof.bound, zero_level, proof.prices
         )
         design = replace(design, evaluation=evaluation, value=value)
         certificate = make_certificate(
-            value, proof.bound, zero_level, problem.tolerance, proof.strength, proof.kkt_residual, proof.method, doubt
+            value,
+            proof.bound,
+            zero_level,
+            problem.tolerance,
+            proof.strength,
+            proof.kkt_residual,
+            proof.method,
+            value_error,
         )
     else:
         # an infeasible design proves nothing

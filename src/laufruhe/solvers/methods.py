@@ -93,7 +93,7 @@ def _distinguishes_stars(problem: Problem) -> bool:
 
 
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
-_PLACED = (Dependence.BIAFFINE, Dependence.BENT)
+_PLACED = (Dependence.BIAFFINE, Dependence.KINKED)
 _ANY = tuple(Dependence)
 _UNBALANCES = {Kind.UNBALANCE: _AFFINE}
 _MOUNTS = {**_UNBALANCES, Kind.STIFFNESS: (), Kind.MOUNT: ()}
@@ -138,7 +138,7 @@ _CORE: tuple[Method, ...] = (
         known_channels=frozenset({MOUNT_FORCE, *OF_BLOCK}),
         accepts_norm=is_pointwise,
         accepts_constant=is_no_number,
-        accepts_problem=lambda p: p.engine.block is None and not p.fidelity.is_uneven,
+        accepts_problem=lambda p: p.engine.block is None and not p.fidelity.has_uneven_speed,
         proves="the optimum, as far as the boxes go (P15)",
     ),
     Method(

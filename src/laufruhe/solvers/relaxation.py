@@ -63,10 +63,17 @@ def with_better_bound(result: Result, bound: float, source: str) -> Result:
     ):
         return result
     zero_level = numerical_zero(result.problem, result.final.engine)
-    result, doubt = refine_result(result, bound, zero_level)
+    result, value_error = refine_result(result, bound, zero_level)
     value, text = (result.objective or objective).value, f"{certificate.method}; {source}"
     proof = make_certificate(
-        value, bound, zero_level, result.problem.tolerance, ProofStrength.PARTIAL, certificate.kkt_residual, text, doubt
+        value,
+        bound,
+        zero_level,
+        result.problem.tolerance,
+        ProofStrength.PARTIAL,
+        certificate.kkt_residual,
+        text,
+        value_error,
     )
     status = Status.OPTIMAL if proof.kind is Proof.GLOBAL else result.status
     return replace(result, certificate=proof, status=status)

@@ -64,8 +64,8 @@ def _with_fine_values(result: Result) -> Result:
     final = with_fine_sampling(result.final) if result.measured is result.final else result.final
     zero_level = numerical_zero(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, zero_level)
-    doubt = sum(term.weight * measure_sampling_error(term.measure, final) for term in problem.objective)
-    check_bound(proof.method, proof.lower_bound, value, zero_level + doubt)
+    value_error = sum(term.weight * measure_sampling_error(term.measure, final) for term in problem.objective)
+    check_bound(proof.method, proof.lower_bound, value, zero_level + value_error)
     weaker_kind = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
     is_feasible = (
         violation_at_fine_sampling(problem, result.final) <= FEASIBILITY_TOL or result.measured is not result.final

@@ -1,6 +1,6 @@
 """Draws of a study in one Zarr store, with a region for each piece of work.
 
-Values of a piece are written first, then a mark with a checksum of both. A region that is cut, changed or foreign
+Values of a piece are written first, then a note with a checksum of both. A region that is cut, changed or foreign
 does not match its checksum and is computed again.
 """
 
@@ -49,42 +49,45 @@ class Regions:
         self._wanted, self._chunk, self._columns = regions, template.chunk, template.columns
         self._values, self._done = _laid_out(root, name, template)
         self.seconds: dict[str, float] = {}
-        for mark, region in regions.items():
-            seconds = self._find(mark, region)
+        for fingerprint, region in regions.items():
+            seconds = self._find(fingerprint, region)
             if seconds is not None:
-                self.seconds[mark] = seconds
+                self.seconds[fingerprint] = seconds
 
-    def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Store the values of a finished batch of draws with the fingerprint `mark`, then mark it as done."""
-        region, values = self._wanted[mark], np.ascontiguousarray(record[VALUES], dtype="<f8")
+    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
+        """Store the values of a finished batch of draws and its computing time [s]; then note that the batch is done.
+
+        `fingerprint` names the batch. A batch that was stopped before the note counts as missing.
+        """
+        region, values = self._wanted[fingerprint], np.ascontiguousarray(record[VALUES], dtype="<f8")
         packed = _SECONDS.pack(seconds)
         self._values[region.case, region.first : region.last] = values
-        noted = _checksum(mark, packed, values) + packed
+        noted = _checksum(fingerprint, packed, values) + packed
         self._done[region.case, region.first // self._chunk] = np.frombuffer(noted, dtype=np.uint8)
-        self.seconds[mark] = seconds
+        self.seconds[fingerprint] = seconds
 
-    def read(self, mark: str) -> Record:
-        """Return the record of the piece of work with the fingerprint `mark`."""
-        region = self._wanted[mark]
+    def read(self, fingerprint: str) -> Record:
+        """Return the record of the piece of work with a fingerprint."""
+        region = self._wanted[fingerprint]
         values = np.asarray(self._values[region.case, region.first : region.last])
         return {VALUES: values, COLUMNS: self._columns}
 
-    def _find(self, mark: str, region: Region) -> float | None:
+    def _find(self, fingerprint: str, region: Region) -> float | None:
         # seconds that a piece took; None if it is not done, or damaged
         try:
             noted = bytes(np.asarray(self._done[region.case, region.first // self._chunk]))
             packed = noted[_SUM:]
             if not any(noted):
                 return None
-            values = np.ascontiguousarray(self.read(mark)[VALUES], dtype="<f8")
+            values = np.ascontiguousarray(self.read(fingerprint)[VALUES], dtype="<f8")
         except Exception:
             # damaged files raise any error of their codec
             return None
-        return float(_SECONDS.unpack(packed)[0]) if noted[:_SUM] == _checksum(mark, packed, values) else None
+        return float(_SECONDS.unpack(packed)[0]) if noted[:_SUM] == _checksum(fingerprint, packed, values) else None
 
 
-def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
-    return hashlib.sha256(mark.encode() + seconds + values.tobytes()).digest()
+def _checksum(fingerprint: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
+    return hashlib.sha256(fingerprint.encode() + seconds + values.tobytes()).digest()
 
 
 def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:

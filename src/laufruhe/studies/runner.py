@@ -58,28 +58,28 @@ def run(
     """
     problem_files = ProblemFiles(folder)
     work = [(part, point) for part in study.study.parts for point in part.points(problem_files)]
-    marks = [problem_files.fingerprint(point, part.settings()) for part, point in work]
+    fingerprints = [problem_files.fingerprint(point, part.settings()) for part, point in work]
     # equal problems of several parts are solved once
-    tasks = dict(zip(marks, work, strict=True))
+    tasks = dict(zip(fingerprints, work, strict=True))
     with ExitStack() as stores:
         store = {
-            mark: points_of
+            fingerprint: points_of
             for points_of, marked in stores_of(study, problem_files, finished, tasks, stores)
-            for mark in marked
+            for fingerprint in marked
         }
-        todo = {mark: task for mark, task in tasks.items() if mark not in store[mark].seconds}
+        todo = {key: task for key, task in tasks.items() if key not in store[key].seconds}
         names, total = list(todo), len(tasks)
         say(total - len(todo), total)
         with closing(answers(list(todo.values()), problem_files, jobs)) as results:
             for count, answer in enumerate(results, 1):
-                mark = names[answer.task]
-                if answer.mark != mark:
+                fingerprint = names[answer.task]
+                if answer.fingerprint != fingerprint:
                     where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
-                    rule = f"'{todo[mark][1]}' had other files, another Laufruhe or other libraries {where}"
+                    rule = f"'{todo[fingerprint][1]}' had other files, another Laufruhe or other libraries {where}"
                     remedy = "install the same versions and files everywhere, and the same command goes on"
                     raise SolverError(f"{rule}, so the result of this point is not kept; {remedy}")
                 try:
-                    store[mark].keep(mark, answer.seconds, answer.record)
+                    store[fingerprint].keep(fingerprint, answer.seconds, answer.record)
                 except OSError as error:
                     why = f"a point cannot be kept ({error.strerror or error})"
                     remedy = "finished points are kept; make room, and the same command goes on"
@@ -87,19 +87,24 @@ def run(
                 say(total - len(todo) + count, total)
         datasets, seconds = {}, {}
         for part in study.study.parts:
-            points_of = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
-            records = Records([mark for mark, _ in points_of], store)
+            points_of = [
+                (fingerprint, point)
+                for fingerprint, (owner, point) in zip(fingerprints, work, strict=True)
+                if owner is part
+            ]
+            fingerprints_of_part = [fingerprint for fingerprint, _ in points_of]
+            records = Records(fingerprints_of_part, store)
             datasets[part.name] = part.dataset([point for _, point in points_of], records)
-            seconds[part.name] = sum(store[mark].seconds[mark] for mark in {mark for mark, _ in points_of})
+            seconds[part.name] = sum(store[key].seconds[key] for key in set(fingerprints_of_part))
     return datasets, seconds
 
 
 @dataclass(frozen=True)
 class PointResult:
-    """Record of the task with the index `task`; `mark` is its fingerprint as computed on the machine `host`."""
+    """Record of the task with the index `task`, and the fingerprint of its point as computed on the machine `host`."""
 
     task: int
-    mark: str
+    fingerprint: str
     host: str
     record: Record
     seconds: float

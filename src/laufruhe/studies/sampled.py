@@ -53,7 +53,7 @@ class Sampled(Part):
         for case, name in names:
             if not name:
                 raise problem_files.refused(
-                    case, "objective", "is missing, so the draws have no number to compare", "give one"
+                    case, "objective", "is missing, but the random draws are compared by it", "add an objective"
                 )
             if name != names[0][1]:
                 rule = f"is {name} in '{case.name}' and {names[0][1]} in '{names[0][0].name}'"

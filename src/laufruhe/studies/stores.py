@@ -34,11 +34,11 @@ class Store(Protocol):
     def seconds(self) -> Mapping[str, float]:
         """Computing time of every point [s], by fingerprint."""
 
-    def read(self, mark: str) -> Record:
-        """Return the record of the point with the fingerprint `mark`; all records may exceed memory."""
+    def read(self, fingerprint: str) -> Record:
+        """Return the record of the point with a fingerprint; all records together may exceed the memory."""
 
-    def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write the record of the point with the fingerprint `mark`; the system has it when this returns."""
+    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
+        """Store the record and the computing time [s] of the point with a fingerprint, before this returns."""
 
 
 class FinishedPoints(AbstractContextManager["FinishedPoints"]):
@@ -49,7 +49,7 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
     so that neither a cut line nor another study in the same folder spoils it.
     """
 
-    def __init__(self, path: Path, marks: Collection[str]) -> None:
+    def __init__(self, path: Path, fingerprints: Collection[str]) -> None:
         self.path = path
         self._records: Record = {}
         self.seconds: dict[str, float] = {}
@@ -60,25 +60,28 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
                 for line in lines:
                     checksum, _, content = line.rstrip(b"\n").partition(b" ")
                     if checksum == _checksum(content):
-                        mark, seconds, record = json.loads(content)
-                        if mark in marks:
-                            self._records[mark], self.seconds[mark] = record, seconds
+                        fingerprint, seconds, record = json.loads(content)
+                        if fingerprint in fingerprints:
+                            self._records[fingerprint], self.seconds[fingerprint] = record, seconds
 
-    def read(self, mark: str) -> Record:
+    def read(self, fingerprint: str) -> Record:
         """Return the record of a point."""
-        return dict(self._records[mark])
+        return dict(self._records[fingerprint])
 
-    def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Append the record of a finished point and its seconds to the file; both are written when this returns."""
+    def keep(self, fingerprint: str, seconds: float, record: Record) -> None:
+        """Append the record of a finished point and its computing time [s] to the file, under its fingerprint.
+
+        Both are written when this returns.
+        """
         if self._stream is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = FileIO(self.path, "a")
-        line = json.dumps([mark, round(seconds, 6), record]).encode()
+        line = json.dumps([fingerprint, round(seconds, 6), record]).encode()
         unwritten = memoryview(b"\n%b %b\n" % (_checksum(line), line))
         while unwritten:
             # a full disk writes a part before it fails
             unwritten = unwritten[self._stream.write(unwritten) :]
-        self._records[mark], self.seconds[mark] = record, seconds
+        self._records[fingerprint], self.seconds[fingerprint] = record, seconds
 
     def __exit__(self, *_: object) -> None:
         if self._stream is not None:
@@ -98,7 +101,7 @@ def stores_of(
     A range of random draws is a region of an array on disk (`Regions`). The record of any other point is a line of the
     file `finished` (`FinishedPoints`).
     """
-    marks, root = set(tasks), regions_in(finished.parent)
+    fingerprints, root = set(tasks), regions_in(finished.parent)
     templates = [
         (part, template) for part in study.study.parts if (template := part.template(problem_files)) is not None
     ]
@@ -106,13 +109,13 @@ def stores_of(
         stores.enter_context(locked_store(root))
     for part, template in templates:
         regions = {
-            mark: Region(template.cases.index(point.case.name), *point.span)
-            for mark, (task_part, point) in tasks.items()
+            fingerprint: Region(template.cases.index(point.case.name), *point.span)
+            for fingerprint, (task_part, point) in tasks.items()
             if task_part is part and point.span is not None
         }
         yield Regions(root, part.name, template, regions), regions
-        marks -= set(regions)
-    yield stores.enter_context(FinishedPoints(finished, marks)), marks
+        fingerprints -= set(regions)
+    yield stores.enter_context(FinishedPoints(finished, fingerprints)), fingerprints
 
 
 def regions_in(folder: Path) -> Path:
@@ -123,12 +126,12 @@ def regions_in(folder: Path) -> Path:
 class Records(Sequence[Record]):
     """Records in the order of points, read on access."""
 
-    def __init__(self, marks: Sequence[str], stores: Mapping[str, Store]) -> None:
-        self._marks, self._stores = marks, stores
+    def __init__(self, fingerprints: Sequence[str], stores: Mapping[str, Store]) -> None:
+        self._fingerprints, self._stores = fingerprints, stores
 
     def __getitem__(self, k: Any) -> Any:
-        mark = self._marks[k]
-        return self._stores[mark].read(mark)
+        fingerprint = self._fingerprints[k]
+        return self._stores[fingerprint].read(fingerprint)
 
     def __len__(self) -> int:
-        return len(self._marks)
+        return len(self._fingerprints)

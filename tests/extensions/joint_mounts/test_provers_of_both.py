@@ -44,5 +44,5 @@ def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(prover, "load_bounds", lambda *_: iter([BoxResult(0.5, 1), BoxResult(0.6, 9)]))
     for known, boxes in ((0.4, 9), (0.7, 1)):
         question = Question(problem, 1.0, 0.1, bound=known)
-        assert [found.boxes for found in prover.load_answers(question)][-1] == boxes
-    assert not [*prover.load_answers(Question(problem, 1.0, 0.1, in_batch=True))]
+        assert [found.boxes for found in prover.bounds_from_boxes(question)][-1] == boxes
+    assert not [*prover.bounds_from_boxes(Question(problem, 1.0, 0.1, in_batch=True))]

@@ -168,6 +168,6 @@ def test_a_plane_meets_its_term_and_is_nowhere_over_it(norm):
     drawn = r.normal(size=(40, 2 * orders))
     assert term.values(drawn) == pytest.approx([by_hand(c) for c in drawn])
     for at in drawn[:4]:
-        minimum, slope = term.plane(at)
+        minimum, slope = term.linear_bound(at)
         assert minimum + slope @ at == pytest.approx(by_hand(at))
         assert all(minimum + slope @ c <= by_hand(c) * (1.0 + 1e-12) for c in drawn)

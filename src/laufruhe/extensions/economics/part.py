@@ -155,7 +155,7 @@ class Economics(Part):
                     rule = f"has no shaft '{shaft}', which '{build.name}' builds"
                     raise problem_files.refused(case, "balancer_shafts", rule, nearest(shaft, names))
             points.append(Point(case, shafts=tuple(build.shafts)))
-        points += [_rebuilt(case, reference, problem_files) for case in self.more_cylinders]
+        points += [_larger_engine(case, reference, problem_files) for case in self.more_cylinders]
         _check_objectives(points, problem_files)
         return points
 
@@ -246,8 +246,8 @@ class Economics(Part):
         return p.Picture(data.attrs["title"], words, [fronts], credit, (7.2, 4.6), legend=legend)
 
 
-def _rebuilt(case: CaseTable, reference: Problem, problem_files: ProblemFiles) -> Point:
-    """Return the point of an engine with more cylinders, at the power of the reference engine."""
+def _larger_engine(case: CaseTable, reference: Problem, problem_files: ProblemFiles) -> Point:
+    """Return the study point of an engine with more cylinders, scaled to the power of the reference engine."""
     problem = problem_files.problem(Point(case))
     cylinders = len(reference.engine.slider_cranks)
     if shafts_of(problem):

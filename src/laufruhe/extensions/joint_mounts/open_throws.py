@@ -68,7 +68,10 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
     Gas loads are nonlinear in the throws, and open bank angles, pins or shafts are not throws.
     """
     is_unsupported = (
-        problem.depends_on_gas or problem.fidelity.is_uneven or any(phasing.is_geometry_open) or phasing.shafts.optional
+        problem.depends_on_gas
+        or problem.fidelity.has_uneven_speed
+        or any(phasing.is_geometry_open)
+        or phasing.shafts.optional
     )
     if phasing.throw_bounds is None or is_unsupported:
         return None

@@ -24,29 +24,33 @@ EARLY = 0.1
 """Share of the box budget after which other provers run."""
 
 
-def corner_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one lower bound of the objective from vertices of boxes of mounts.
+def bounds_from_corners(question: Question) -> Iterator[BoxResult]:
+    """Yield one lower bound of the objective, by branch and bound over boxes of mount numbers (E69).
 
-    A better design at a vertex lowers the objective of the incumbent, `question.value`.
+    At each vertex of a box the unbalances are optimised, and their multipliers bound the objective in the box. If a
+    design at a vertex is better than the incumbent, `question.value` is lowered to its objective.
     """
     problem = question.problem
     if question.in_batch or question.value == math.inf:
         return
 
-    def exact_value(mounts: Array, columns: Array) -> float:
+    def objective_at(mounts: Array, columns: Array) -> float:
         design = design_at_start(problem, (mounts.tolist(), columns))
         if design is None or design.violation > 0.0:
             return math.inf
         return design.value - sampling_overestimate(problem, design.evaluation)
 
-    boxes = DesignBoxes(problem, question.value, exact_value)
+    boxes = DesignBoxes(problem, question.value, objective_at)
     result = designed_bound(boxes, question.gap_tolerance, question.witness)
     question.value = boxes.value
     yield replace(result, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
-def load_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield lower bounds of the objective by boxes of mounts and unbalances; stop if another prover's is better."""
+def bounds_from_boxes(question: Question) -> Iterator[BoxResult]:
+    """Yield lower bounds of the objective, by branch and bound over boxes of mount numbers and unbalances.
+
+    The second bound is omitted if another prover has a better bound than the first.
+    """
     if question.in_batch:
         return
     problem, witness = question.problem, _witness(question)
@@ -58,8 +62,8 @@ def load_answers(question: Question) -> Iterator[BoxResult]:
             return
 
 
-def throw_answers(question: Question) -> Iterator[BoxResult]:
-    """Yield one lower bound of the objective by boxes of throws, mounts and unbalances, for any firing order (E72)."""
+def bounds_with_throws(question: Question) -> Iterator[BoxResult]:
+    """Yield one lower bound of the objective for any firing order, by boxes of throws, mounts and unbalances (E72)."""
     throws = None if question.open_throws is None else throws_at(question.problem, *question.open_throws)
     if throws is not None:
         witness = _witness(question)
@@ -80,10 +84,10 @@ def _witness(question: Question) -> Witness | None:
     return replace(witness, place=np.append(witness.place, columns))
 
 
-CORNERS = Prover("boxes of mounts, with unbalances", mixes_corners, corner_answers, "boxes of stiffness")
+CORNERS = Prover("boxes of mounts, with unbalances", mixes_corners, bounds_from_corners, "boxes of stiffness")
 LOADS = Prover(
     "boxes of mounts and unbalances",
     lambda problem: not is_stiffness_problem(problem) and is_boxed(problem),
-    load_answers,
+    bounds_from_boxes,
 )
-THROWS = Prover("boxes of throws, mounts and unbalances", lambda _: True, throw_answers, for_open_throws=True)
+THROWS = Prover("boxes of throws, mounts and unbalances", lambda _: True, bounds_with_throws, for_open_throws=True)

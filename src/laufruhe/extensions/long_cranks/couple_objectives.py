@@ -1,4 +1,4 @@
-"""Objectives of even crank stars as convex functions of their couples (S3, S5, S48).
+"""Objectives of even crank stars as convex functions of their rocking couples (S3, S5, S48).
 
 Even crank stars of one pattern have the same forces. So the signals V and V' of two of them differ by what their
 couples C_h and C'_h of order h load: V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose
@@ -103,7 +103,7 @@ class CoupleTerm:
                 values[part] = self.norm.values(self.grid, rows)
         return self.weight * values
 
-    def plane(self, couples: Array) -> tuple[float, Array]:
+    def linear_bound(self, couples: Array) -> tuple[float, Array]:
         """Return constant and slope of a linear lower bound that touches the term at `couples`, (2 orders,) (P2)."""
         rows = self.constant + np.tensordot(couples, self.couples, axes=1)
         z = self.norm.dual_feasible(self.grid, self.norm.subgradient(self.grid, rows))
@@ -128,27 +128,30 @@ class CoupleNorms:
         parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
         if maximum == math.inf:
             return np.asarray(sum(term.values(parts) for term in self.terms))
-        constants, slopes = self._planes
+        constants, slopes = self._linear_bounds
         values = (constants + parts @ slopes.T).max(axis=1, initial=0.0)
         below_maximum = values <= maximum
         values[below_maximum] = sum(term.values(parts[below_maximum]) for term in self.terms)
         return np.asarray(values)
 
     @cached_property
-    def _planes(self) -> tuple[Array, Array]:
-        """Constants and slopes of linear lower bounds of the objective as a function of the couples (P2)."""
+    def _linear_bounds(self) -> tuple[Array, Array]:
+        """Constants and slopes of lower bounds of the objective, linear in the rocking couples of the orders (P2).
+
+        Each bound touches the objective at small couples of the two strongest orders, with one pair of their phases.
+        """
         shares = np.asarray(sum(term.shares for term in self.terms))
         turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
-        heavy = np.argsort(-shares, kind="stable")[:2]
-        touching_points = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
-        for row, chosen in zip(touching_points, itertools.product(turns, repeat=len(heavy)), strict=True):
+        strongest_orders = np.argsort(-shares, kind="stable")[:2]
+        touching_points = np.zeros((len(turns) ** len(strongest_orders), len(self.orders)), dtype=complex)
+        for row, chosen in zip(touching_points, itertools.product(turns, repeat=len(strongest_orders)), strict=True):
             # small compared with the part that no couple changes, if there is one
-            row[heavy] = np.array(chosen) / np.maximum(shares[heavy], 1e-300)
+            row[strongest_orders] = np.array(chosen) / np.maximum(shares[strongest_orders], 1e-300)
         constant_part = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
         unit = SMALL * max(constant_part, float(shares.max(initial=0.0)) * SHORT)
-        planes = [[term.plane(unit * row.view(float)) for term in self.terms] for row in touching_points]
-        constants = np.array([sum(constant for constant, _ in parts) for parts in planes])
-        return constants, np.array([sum(slope for _, slope in parts) for parts in planes])
+        bounds = [[term.linear_bound(unit * row.view(float)) for term in self.terms] for row in touching_points]
+        constants = np.array([sum(constant for constant, _ in parts) for parts in bounds])
+        return constants, np.array([sum(slope for _, slope in parts) for parts in bounds])
 
     def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound over all crank stars [SI]."""
@@ -208,7 +211,7 @@ def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -
     Nothing but the phasing of the problem may be open. `stars` are the problems of `three_stars`.
     """
     known = all(term.measure.is_load and not term.measure.is_inside for term in problem.objective)
-    if not known or problem.fidelity.is_uneven or problem.limits or len(space.patterns) > 1:
+    if not known or problem.fidelity.has_uneven_speed or problem.limits or len(space.patterns) > 1:
         return None
     if any(rotor.role is not Role.THROW for star in stars for rotor in star.engine.rotors):
         return None

@@ -131,7 +131,7 @@ def refuse(problem: Problem) -> None:
         raise ModelError(
             "[assembly] is for measured parts, and [robust] for parts within tolerances; remove one of the two tables"
         )
-    if problem.fidelity.is_uneven:
+    if problem.fidelity.has_uneven_speed:
         raise ModelError("[assembly] assumes a constant crank speed; remove fidelity.crank_inertia")
     for term in problem.objective:
         if not term.measure.is_load or not is_affine(term.measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):

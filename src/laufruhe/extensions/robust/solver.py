@@ -136,7 +136,7 @@ def refuse(problem: Problem) -> None:
         )
     if problem.engine.geared:
         raise ModelError("[robust] does not support geared inertias; remove [[geared_inertias]], or [robust]")
-    if problem.fidelity.is_uneven:
+    if problem.fidelity.has_uneven_speed:
         raise ModelError("[robust] assumes a constant crank speed; remove fidelity.crank_inertia, or [robust]")
     for measure in problem.measures:
         if measure.channel.is_number or not is_affine(measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):

@@ -47,7 +47,7 @@ class PistonDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the engine drawing with the error in the reciprocating mass of one cylinder."""
+        """Return the drawing of the engine with the error in the reciprocating mass of one cylinder."""
         parts = list(drawing.engine.slider_cranks)
         part = parts[self.cylinder]
         mass = part.reciprocating_mass + self.gain * error.real
@@ -66,7 +66,7 @@ class AddedDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the drawing with a further rotor that has the error."""
+        """Return the drawing of the engine with a further rotor that has the error."""
         return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, self.rotor(error))))
 
     def rotor(self, error: complex) -> Rotor:
@@ -83,7 +83,7 @@ class ShareDrive:
     is_affine: ClassVar[bool] = True
 
     def with_error(self, drawing: Drawing, error: complex) -> Drawing:
-        """Return the engine drawing with a rotor's unbalance, and its decisions, changed by a relative error."""
+        """Return the drawing of the engine with a relative error in the unbalance of a rotor, and in its decisions."""
         factor = 1.0 + self.share * error.real
         rotors = tuple(
             replace(rotor, unbalance=factor * rotor.unbalance) if rotor.name == self.rotor else rotor
@@ -269,9 +269,9 @@ class Tolerances:
         return np.concatenate([half, -half])
 
     def with_errors(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
-        """Return the engine drawing with errors, shape (columns,).
+        """Return the drawing of the engine with errors, shape (columns,).
 
-        `rebuild` builds it again from changed file numbers.
+        `rebuild` makes the drawing of a problem file with changed numbers.
         """
         moves: list[tuple[ErrorDrive, complex]] = []
         columns = iter(self.columns)

@@ -52,10 +52,10 @@ class RunBoxes:
 
     @cached_property
     def _runs(self) -> tuple[RunMoments, ...]:
-        drag = float(np.linalg.norm(self._matrices.base.damping, 2))
+        damping = float(np.linalg.norm(self._matrices.base.damping, 2))
         runs = []
         for sweep, wrenches in zip(self._peaks.sweeps, self._peaks.wrenches, strict=True):
-            maximum = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / MIN_STEPS)
+            maximum = min(REACH / ((self._scale + damping) * sweep.step), sweep.count / MIN_STEPS)
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(maximum), 1)))
         return tuple(runs)
 

@@ -38,11 +38,11 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class LinearMaps:
-    """Matrices P (`position`), L (`lossy`) and D (`drag`) of a signal P y + (L S + D) y' of the motion y."""
+    """Matrices P (`position`), L (`lossy`) and D (`damping`) of a signal P y + (L S + D) y' of the motion y."""
 
     position: Linear
     lossy: Linear
-    drag: Linear
+    damping: Linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,13 +168,14 @@ def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots
         return np.asarray(np.swapaxes(modes, -1, -2) @ rows if of_motion else rows)
 
     scale = halves[:, :, None, None]
-    (position, position_slopes), (lossy, lossy_slopes), (drag, drag_slopes) = (
-        (in_modes(part.at(above)), in_modes(scale * part.slopes)) for part in (parts.position, parts.lossy, parts.drag)
+    (position, position_slopes), (lossy, lossy_slopes), (damping, damping_slopes) = (
+        (in_modes(part.at(above)), in_modes(scale * part.slopes))
+        for part in (parts.position, parts.lossy, parts.damping)
     )
-    rate_slopes = lossy_slopes @ s.middle[:, None] + lossy[:, None] @ s.first + drag_slopes
+    rate_slopes = lossy_slopes @ s.middle[:, None] + lossy[:, None] @ s.first + damping_slopes
     bends = []
     for number, (j, k) in enumerate(pairs_of(halves.shape[1])):
         bend = lossy @ s.second[:, number] + lossy_slopes[:, j] @ s.first[:, k]
         bends.append(bend if j == k else bend + lossy_slopes[:, k] @ s.first[:, j])
     remainder = np.abs(lossy) @ s.after_second + np.abs(lossy_slopes).sum(axis=1) @ s.after_first
-    return Maps(position, position_slopes, lossy @ s.middle + drag, rate_slopes, np.stack(bends, axis=1), remainder)
+    return Maps(position, position_slopes, lossy @ s.middle + damping, rate_slopes, np.stack(bends, axis=1), remainder)

@@ -34,10 +34,10 @@ class RunMatrices:
     @cached_property
     def motion(self) -> LinearMaps:
         """Matrices of stiffness, loss and damping in the equation of motion (E25, E26)."""
-        drag = self.base.damping.copy()
-        drag[:6, :6] = self._lowest("damping")
+        damping = self.base.damping.copy()
+        damping[:6, :6] = self._lowest("damping")
         position = Linear(self.base.stiffness, self._square("stiffness").slopes)
-        return LinearMaps(position, self._square("loss"), Linear(drag, self._square("damping").slopes))
+        return LinearMaps(position, self._square("loss"), Linear(damping, self._square("damping").slopes))
 
     @cached_property
     def loss_factor(self) -> float:
@@ -62,28 +62,31 @@ class RunMatrices:
         return LinearMaps(zero, Linear(lowest, slopes), zero)
 
     def maps_of(self, measure: Measure) -> Rows:
-        """Return the maps from motion to the signal of a measure, place by place, and the count of rows per place."""
-        no_drag = np.zeros_like(self.base.drag)
+        """Return the linear maps from the motion of the block to the signal of a measure, and the rows of each place.
+
+        The signal is a sum of forces that follow motion (springs) and its rate (losses and dampers).
+        """
+        no_damping_forces = np.zeros_like(self.base.damping_forces)
 
         def at_rest(forces: Array) -> Array:
-            return self._signal_rows(measure, forces, no_drag, False)
+            return self._signal_rows(measure, forces, no_damping_forces, False)
 
-        def moving(drag: Array) -> Array:
-            return self._signal_rows(measure, no_drag, self._padded(drag), True)
+        def moving(damping_forces: Array) -> Array:
+            return self._signal_rows(measure, no_damping_forces, self._padded(damping_forces), True)
 
         def linear(name: str) -> Linear:
-            zero = moving(np.zeros((len(no_drag), 6)))
+            zero = moving(np.zeros((len(no_damping_forces), 6)))
             by_side = [moving(slope) - zero for slope in self._model.slopes[name]]
             return Linear(moving(self._lowest(name)), np.array(by_side))
 
-        springs = [at_rest(self._padded(slope)) - at_rest(no_drag) for slope in self._model.slopes["springs"]]
+        springs = [at_rest(self._padded(slope)) - at_rest(no_damping_forces) for slope in self._model.slopes["springs"]]
         maps = LinearMaps(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
         zero = np.zeros((self.base.size, 1))
         return maps, signal_of(measure, RunResponse(self.base, zero, zero)).shape[-1]
 
-    def _signal_rows(self, measure: Measure, forces: Array, drag: Array, is_rate: bool) -> Array:
+    def _signal_rows(self, measure: Measure, forces: Array, damping_forces: Array, is_rate: bool) -> Array:
         identity, zero = np.eye(self.base.size), np.zeros((self.base.size, self.base.size))
-        model = replace(self.base, forces=forces, drag=drag)
+        model = replace(self.base, forces=forces, damping_forces=damping_forces)
         signal = signal_of(measure, RunResponse(model, *((zero, identity) if is_rate else (identity, zero))))
         return np.asarray(signal.reshape(self.base.size, -1).T)
 

@@ -118,7 +118,7 @@ def begin(source: Source) -> dict[str, Any]:
         "objectives": [rank.terms[0].measure.name for rank in problem.ranks],
         "crank": can_open_crank,
         "openCrank": problem.phasing is not None,
-        "doubts": [str(doubt) for doubt in problem.plausibility_warnings],
+        "doubts": [str(warning) for warning in problem.plausibility_warnings],
     }
 
 

@@ -75,4 +75,4 @@ PIN_OVALITY = crankcase_channel(
     "piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors
 )
 THROW_CLEARANCE = _size_channel("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
-GEAR_MASS = _size_channel("running-gear mass", "kg", Needs.UNCONDITIONAL, ("max",), strength.gear_mass)
+GEAR_MASS = _size_channel("running-gear mass", "kg", Needs.UNCONDITIONAL, ("max",), strength.running_gear_mass)

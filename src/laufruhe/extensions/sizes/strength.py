@@ -245,8 +245,8 @@ def throw_clearance(engine: Engine) -> float:
     return min(clearances)
 
 
-def gear_mass(engine: Engine) -> float:
-    """Return the mass of all crank pins, webs, shanks and piston pins [kg] (Z2)."""
+def running_gear_mass(engine: Engine) -> float:
+    """Return the mass of the running gear: all crank pins, webs, rod shanks and piston pins [kg] (Z2)."""
     gear = gear_of(engine)
     if gear.density is None:
         raise ModelError("the mass of the running gear needs a density; add running_gear.density")

@@ -103,7 +103,7 @@ class TorsionTable(Table):
     speeds: f.Pair[f.Speed] | None = f.optional(
         "Range of speeds in which the response is shown and barred speeds are looked for."
     )
-    output: str | None = f.optional("Disc at which the load takes its torque; the last one by default.")
+    output: str | None = f.optional("Disc at which the driven machine takes its torque; the last one by default.")
     crank: CrankTable | None = None
     discs: list[DiscTable] = Field(default_factory=list)
     absorbers: list[AbsorberTable] = Field(default_factory=list)
@@ -129,7 +129,7 @@ def _chain(
     """Return the chain from front to rear, and the decisions about its open numbers."""
     for part in parts:
         if part.shaft != CRANKSHAFT:
-            rule = f"is modelled for one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
+            rule = f"is modelled for one crankshaft, and the throw of {part.name} is on shaft '{part.shaft.name}'"
             raise Refused("torsion", None, rule, "leave it out")
     if len(table.discs) > MAX_DISCS:
         rule = f"has {len(table.discs)} discs, and at most {MAX_DISCS} may be given beside the throws"

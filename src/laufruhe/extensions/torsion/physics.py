@@ -198,7 +198,7 @@ def chain_of(engine: Engine) -> Torsion:
 
 def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
     """Return True if twist is modelled: the crankshaft has a chain of discs, and its mean speed is constant."""
-    return engine.extra(Torsion) is not None and not fidelity.is_uneven
+    return engine.extra(Torsion) is not None and not fidelity.has_uneven_speed
 
 
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -206,12 +206,12 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
 
     An uneven crank speed, or a cylinder on another shaft, raises `ModelError`.
     """
-    if fidelity.is_uneven:
+    if fidelity.has_uneven_speed:
         raise ModelError("twist of the crankshaft is modelled at a constant crank speed; remove fidelity.crank_inertia")
     for part in engine.slider_cranks:
         if part.shaft != CRANKSHAFT:
             raise ModelError(
-                f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled for one crankshaft only"
+                f"the throw of {part.name} is on shaft '{part.shaft.name}'; twist is modelled for one crankshaft only"
             )
     driven = tuple(disc.cylinders for disc in chain_of(engine).discs)
     return _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)

@@ -86,7 +86,10 @@ class Maximum(Norm):
         return max((float(amplitudes(signal).max(initial=0.0)) for signal in counted), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
+        """Return an upper bound of the sampling error: spread over shifted samples, and curvature between them.
+
+        `shares` has the weight of each operating point.
+        """
         coarse = steps * self.refinement
         times, errors, curvatures = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
         for signal, share in zip(signals, shares, strict=True):

@@ -105,7 +105,10 @@ class Mean(Norm):
         return float(shares @ np.sqrt(squares).mean(axis=1))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the spread over all shifts of the samples, plus the curvature bound between fine samples."""
+        """Return an upper bound of the sampling error: spread over shifted samples, and curvature between them.
+
+        `shares` has the weight of each operating point.
+        """
         times, total = max(2, math.ceil(finest / steps)), 0.0
         for signal, share in zip(signals, shares, strict=True):
             if share == 0.0:

@@ -103,7 +103,7 @@ class WorstMean(Norm):
         return max((_MEAN.upper_bound([signal], np.ones(1)) for signal in _counted(signals, shares)), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Return the largest sampling bound of the mean at any operating point."""
+        """Return the largest bound of the sampling error of the mean, over the operating points that count."""
         errors = (_MEAN.sampling_bound([signal], np.ones(1), steps, finest) for signal in _counted(signals, shares))
         return max(errors, default=0.0)
 

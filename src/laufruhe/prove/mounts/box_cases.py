@@ -98,9 +98,9 @@ def _with_stops(
     side_maps = None if map_slopes is None else map_slopes.real * factors[:, None]
     ends = stops.directions[rows] * factors[:, None] * (not is_travel(_AS_LOADS[measure.channel]))
     value = value + np.einsum("rk,bk,ki->bri", ends, on * stops.stiffness, stops.rows)[:, None]
-    answer = mapped(expansion, value, side_maps)
-    points = answer.value[:, 0] - (signs * stops.stiffness * stops.gaps) @ ends.T
-    points, slopes = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
+    response = mapped(expansion, value, side_maps)
+    points = response.value[:, 0] - (signs * stops.stiffness * stops.gaps) @ ends.T
+    points, slopes = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, response.slopes[:, 0]))
     size = np.linalg.norm(points, axis=-1)
     along = points / np.where(size > 0.0, size, 1.0)[..., None]
     slope = np.einsum("bnpa,bpa->bpn", slopes, along)
@@ -109,11 +109,11 @@ def _with_stops(
     if side_maps is not None:
         reach = reach + sum(_along(corner, side) for side in model.sides.maps_by_number(side_maps[:, 0]))
     error = reach * np.sum(violation * _along(corner, stops.rows), axis=1, keepdims=True) + violation @ np.abs(ends).T
-    remainder = answer.remainder[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
+    remainder = response.remainder[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
     # the series diverges close to a free mode
     minimum = np.where(np.isfinite(remainder), size - np.abs(slope).sum(axis=-1) - remainder, -np.inf)
     box, best = np.arange(len(size)), np.argmax(minimum, axis=1)
-    bound = LinearBound(size[box, best], slope[box, best], remainder[box, best], answer.scores[:, 0])
+    bound = LinearBound(size[box, best], slope[box, best], remainder[box, best], response.scores[:, 0])
     return bound.where(np.isfinite(minimum[box, best])), span
 
 

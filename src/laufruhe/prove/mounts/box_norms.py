@@ -79,33 +79,35 @@ def lower_bound_of_norm(
 ) -> LinearBound:
     """Return a linear lower bound of a norm of mount forces or travel on every box, from the series of motion (E38)."""
     rows, factors = counted_rows(model.problem, measure)
-    answer = model.answer(loaded_orders, expansion, measure.channel, rows, factors)
-    return norm_under(model.problem, measure, answer, loaded_orders)
+    response = model.linear_response(loaded_orders, expansion, measure.channel, rows, factors)
+    return norm_under(model.problem, measure, response, loaded_orders)
 
 
-def norm_under(problem: Problem, measure: Measure, answer: LinearResponse, loaded_orders: LoadedOrders) -> LinearBound:
+def norm_under(
+    problem: Problem, measure: Measure, response: LinearResponse, loaded_orders: LoadedOrders
+) -> LinearBound:
     """Return a linear lower bound of a norm of mount forces or travel on every box (E38).
 
-    `answer` has the forces or travel of the counted mounts, r = 3 mounts components, for every loaded order.
+    `response` has the forces or travel of the counted mounts, r = 3 mounts components, for every loaded order.
     """
     share, weights = measure.shares(problem.points), line_weights(problem, measure, loaded_orders)
     if measure.norm.is_euclidean:
-        return root_under(answer, weights)
+        return root_under(response, weights)
     points = [p for p in np.flatnonzero(share > 0.0) if np.any(loaded_orders.points == p)]
-    by_point = [_sampled(measure, answer, loaded_orders, int(p)) for p in points]
+    by_point = [_sampled(measure, response, loaded_orders, int(p)) for p in points]
     if not by_point:
-        return zero_bound(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
+        return zero_bound(np.zeros((len(response.slopes), response.slopes.shape[2])))
     if not measure.norm.sums_lengths:
         largest = choose(by_point, np.argmax([bound.value for bound in by_point], axis=0))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
         squares = 2.0 * weights * (loaded_orders.orders > 0.0) if measure.norm.is_diameter else weights
-        return largest if measure.norm.is_largest_mean else largest.or_else(root_under(answer, squares))
+        return largest if measure.norm.is_largest_mean else largest.or_else(root_under(response, squares))
     value, slopes = (
         sum(share[p] * getattr(bound, part) for p, bound in zip(points, by_point, strict=True))
         for part in ("value", "slopes")
     )
-    remainder, scores = root_of(weights, answer.remainder), root_of(weights, answer.scores)
+    remainder, scores = root_of(weights, response.remainder), root_of(weights, response.scores)
     return LinearBound(np.asarray(value), np.asarray(slopes), remainder, scores)
 
 
@@ -123,11 +125,11 @@ def line_weights(problem: Problem, measure: Measure, loaded_orders: LoadedOrders
     return np.asarray(share[loaded_orders.points] * np.where(loaded_orders.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(measure: Measure, answer: LinearResponse, loaded_orders: LoadedOrders, p: int) -> LinearBound:
+def _sampled(measure: Measure, response: LinearResponse, loaded_orders: LoadedOrders, p: int) -> LinearBound:
     """Return a linear lower bound on boxes of a mean, maximum or peak to peak over samples of operating point p."""
     indices = np.flatnonzero(loaded_orders.points == p)
-    value, slopes = answer.value[:, indices], answer.slopes[:, indices]
-    remainder, scores = answer.remainder[:, indices], answer.scores[:, indices]
+    value, slopes = response.value[:, indices], response.slopes[:, indices]
+    remainder, scores = response.remainder[:, indices], response.scores[:, indices]
     factors = loaded_orders.phases(indices)
     boxes, samples, mounts = len(value), len(factors), value.shape[-1] // 3
     # rows by direction, then mount; real and imaginary parts count as separate orders
@@ -174,19 +176,19 @@ def _lengths(rows: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
+def root_under(response: LinearResponse, weights: Array) -> LinearBound:
     """Return a linear lower bound of the root of a sum of squares over orders with `weights`, shape (orders,).
 
     Orders whose series may diverge count as zero in value and slopes.
     """
-    is_finite = np.isfinite(answer.remainder)
-    value = np.where(is_finite[..., None], answer.value, 0.0)
-    slopes = np.where(is_finite[..., None, None], answer.slopes, 0.0)
+    is_finite = np.isfinite(response.remainder)
+    value = np.where(is_finite[..., None], response.value, 0.0)
+    slopes = np.where(is_finite[..., None, None], response.slopes, 0.0)
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
-    remainder = root_of(weights, np.where(is_finite, answer.remainder, 0.0))
+    remainder = root_of(weights, np.where(is_finite, response.remainder, 0.0))
     return LinearBound(
-        size, slopes / np.where(size > 0.0, size, 1.0)[:, None], remainder, root_of(weights, answer.scores)
+        size, slopes / np.where(size > 0.0, size, 1.0)[:, None], remainder, root_of(weights, response.scores)
     )
 
 

@@ -70,8 +70,8 @@ def axis_residual(model: BoxModel, measure: Measure, lower: Array, upper: Array)
     slopes = axis.left @ model.slopes["stiffness"] @ axis.right
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
         rows = axis.rows(matrix)
-        y, constant = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))
-        minimum = float(y @ axis.answer(matrix)) - constant - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
+        y, constant = axis.linear_bound(rows / (float(np.linalg.norm(rows)) or 1.0))
+        minimum = float(y @ axis.stiffness_part(matrix)) - constant - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
         bounds[k] = max(float(minimum), 0.0)
     return bounds
 

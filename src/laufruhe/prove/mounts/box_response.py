@@ -177,7 +177,7 @@ class BoxModel:
         motion = np.matmul(inverse, loaded_orders.loads[:, :, None])[..., 0]
         return series(centres, halves, inverse, self.sides, _dynamic(loaded_orders, *self._inside), motion)
 
-    def answer(
+    def linear_response(
         self, loaded_orders: LoadedOrders, expansion: Expansion, channel: Channel, rows: Indices, factors: Array
     ) -> LinearResponse:
         """Return mount forces or travels as linear functions on boxes (E37).

@@ -138,7 +138,7 @@ class Residual:
         Its direction is the solver's `dual` vector, or else the residual at x.
         """
         z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
-        y, mass = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
+        y, mass = self.axis.linear_bound(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
         constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)
         return constant - mass, gradient
 

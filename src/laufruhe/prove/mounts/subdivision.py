@@ -247,7 +247,7 @@ class StiffnessBoxes:
         loads = (loaded_orders, loaded_orders.at_rest())
         expansions = [self.model.expanded(orders, lower, upper) for orders in loads]
         elastic, rigid = (
-            self.model.answer(orders, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
+            self.model.linear_response(orders, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for orders, expansion in zip(loads, expansions, strict=True)
         )
         return ratio_under(elastic, rigid, measure, self.problem.points, loaded_orders)

@@ -30,7 +30,10 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
     `design` is the evaluation of one of these stars, with any counterweights; all have its bank angle and split pin.
     """
     engine = design.engine
-    if any(term.measure.is_load and term.measure.is_inside for term in problem.objective) or problem.fidelity.is_uneven:
+    if (
+        any(term.measure.is_load and term.measure.is_inside for term in problem.objective)
+        or problem.fidelity.has_uneven_speed
+    ):
         return 0.0
     # shafts that are not built in this design may be built in others
     if not _is_alike(engine) or not _is_alike(problem.engine) or gas_distinguishes_cylinders(problem):

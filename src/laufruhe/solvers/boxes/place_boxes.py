@@ -61,7 +61,7 @@ class Relaxation:
                 self._placed.setdefault(drive.rotor, []).append(k)
         # positions of inner bearings [m]
         self._kinks = [np.zeros(0) for _ in self.places]
-        if any(dependence(m.channel, Kind.PLACE, problem) is Dependence.BENT for m in problem.measures):
+        if any(dependence(m.channel, Kind.PLACE, problem) is Dependence.KINKED for m in problem.measures):
             for k, place in enumerate(self.places):
                 shafts = {self._rotors[drive.rotor].shaft for drive in place.place_drives if drive.axis == AXIAL}
                 bearings = (sorted(b.x for b in problem.engine.bearings if b.shaft == shaft) for shaft in shafts)

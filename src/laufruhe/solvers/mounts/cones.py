@@ -103,7 +103,7 @@ class _Program:
 
         The squared angular frequency of the roll motion is a variable within bounds.
         """
-        response = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
+        response = axis.stiffness_part(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
         unit = float(np.linalg.norm(response)) or 1.0
         square_unit = unit / float(np.linalg.norm(axis.mass))
         epigraph, square = cp.Variable(), cp.Variable()

@@ -236,7 +236,7 @@ def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], desig
         bound = min(certificate.lower_bound if certificate else 0.0 for certificate in certificates)
     division = _divide_boxes(problem, phasing, best)
     bound = max(bound, division.bound)
-    result, doubt = refine_result(best.result, bound, zero_level)
+    result, value_error = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
     method = details.method
     if division.boxes:
@@ -245,7 +245,7 @@ def _result(problem: Problem, phasing: Phasing, designs: list[StarDesign], desig
     if certificate is not None:
         text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
         certificate = make_certificate(
-            best.value, bound, zero_level, problem.tolerance, ProofStrength.PARTIAL, residual, text, doubt
+            best.value, bound, zero_level, problem.tolerance, ProofStrength.PARTIAL, residual, text, value_error
         )
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 

@@ -245,7 +245,7 @@ class SmoothProgram:
         if quantity.channel.axis_residual is not None:
             # residual of the torque-roll axis, relative to that of the initial mounts
             axis = quantity.channel.axis_residual(self._mounting.block, quantity.frequency)
-            initial = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
+            initial = axis.stiffness_part(self._root @ self._mounting.stiffness @ self._root.T)
             unit = float(np.linalg.norm(initial)) or 1.0
             answer, mass = ca.DM(axis.left) @ mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
             best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.minimum)

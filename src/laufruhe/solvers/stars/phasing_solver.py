@@ -149,11 +149,11 @@ def _best_of(problem: Problem, phasing: Phasing, search_result: EvenStarResult) 
     bound, zero_level = search_result.bound, numerical_zero(problem)
     if result.objective and not any(phasing.is_geometry_open):
         bound = max(bound, firing_bound(problem, result.final))
-    result, doubt = refine_result(result, bound, zero_level)
+    result, value_error = refine_result(result, bound, zero_level)
     value = result.objective.value if result.objective else best.value
     certificate = make_certificate(
         value, bound, zero_level, problem.tolerance, ProofStrength.EXACT,
-        result.certificate.kkt_residual if result.certificate else 0.0, search_result.method, doubt,
+        result.certificate.kkt_residual if result.certificate else 0.0, search_result.method, value_error,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in remaining)]
     count = sum(family.size for family in families_of(phasing, problem.depends_on_firing_order)[0])
@@ -247,10 +247,10 @@ def solve_every_order(
     proof = best.result.certificate
     method_text, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     strength = ProofStrength.EXACT if maximum is None else ProofStrength.RELAXED
-    result, doubt = refine_result(best.result, bound, zero_level)
+    result, value_error = refine_result(best.result, bound, zero_level)
     best = replace(best, result=result)
     certificate = make_certificate(
-        best.value, bound, zero_level, problem.tolerance, strength, residual, method_text, doubt
+        best.value, bound, zero_level, problem.tolerance, strength, residual, method_text, value_error
     )
     # best design of every star; its firing order comes first in the ranking
     firsts: dict[Candidate, StarDesign] = {}

@@ -13,7 +13,7 @@ from laufruhe.solvers.conclusion import violated_limits
 
 
 def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
-    """Return the problem without those sets of optional shafts that violate limits on their positions.
+    """Return the problem without those optional shafts, alone or in pairs, that violate limits on their positions.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
     if phasing is None or not (phasing.shafts.optional and placing):
         return problem, initial
 
-    def with_built(sets: Sequence[int]) -> Evaluation:
+    def evaluation_with(sets: Sequence[int]) -> Evaluation:
         left_out = phasing.without(sets)
         rotors = tuple(rotor for rotor in initial.engine.rotors if rotor.shaft.name not in left_out)
         return replace(initial, engine=replace(initial.engine, rotors=rotors))
@@ -42,7 +42,7 @@ def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evalu
     for count in (1, 2):
         for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
             is_known = any(set(clash) <= set(sets) for clash in clashes)
-            if not is_known and violated_limits(placing, with_built(sets)):
+            if not is_known and violated_limits(placing, evaluation_with(sets)):
                 clashes.append(sets)
     shafts = replace(phasing.shafts, clashes=tuple(clashes))
-    return replace(problem, phasing=replace(phasing, shafts=shafts)), with_built(())
+    return replace(problem, phasing=replace(phasing, shafts=shafts)), evaluation_with(())

@@ -341,8 +341,8 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
 
     def _highest_objective(self, best: StarDesign) -> float:
         zero_level, result = numerical_zero(self._problem), best.result
-        _, value, doubt = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
-        return value + doubt + zero_level
+        _, value, value_error = refine_objective(result.problem, result.final, best.value, math.inf, zero_level)
+        return value + value_error + zero_level
 
     def around(self, incumbent: _Best) -> _Part | FathomedPart | None:
         """Return a thin box of throws around a design, with its bound; None if no window contains the design."""

@@ -110,11 +110,11 @@ def solve_uneven(problem: Problem, phasing: Phasing, even_result: Result | None)
         return _without_design(problem, phasing, box_bound)
     trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
     zero_level = numerical_zero(problem)
-    result, doubt = refine_result(designs[0].result, floor, zero_level)
+    result, value_error = refine_result(designs[0].result, floor, zero_level)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
     certificate = make_certificate(
-        best.value, floor, zero_level, problem.tolerance, ProofStrength.PARTIAL, best.kkt_residual, method, doubt
+        best.value, floor, zero_level, problem.tolerance, ProofStrength.PARTIAL, best.kkt_residual, method, value_error
     )
     distinct_designs: list[StarDesign] = []
     for design in designs:
@@ -146,7 +146,11 @@ def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: S
 
 
 def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[float, str]:
-    """Return a lower bound of the objective for these bounds of firing intervals [SI], and its source (S22, S24)."""
+    """Return a lower bound of the objective over all cranks with firing intervals in these bounds, and its source.
+
+    Windows around the even stars give the bound if these have one geometry and the objective is a sum of amplitudes
+    (S22); else the mean of the loads over the cycle gives it (S24) [SI].
+    """
     families = families_of(phasing)[0] if phasing.throw_bounds is None else ()
     if len(families) == 1 and families[0].fixed is None:
         # without limits, the bound is still valid
