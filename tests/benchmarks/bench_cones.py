@@ -13,6 +13,7 @@ import resource
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -68,7 +69,8 @@ def decided(problem: Problem, model: AffineModel) -> tuple[float, float, float]:
 
 def ready() -> list[tuple[Problem, AffineModel]]:
     """Ready problems with open unbalances alone, and their models."""
-    problems = [load(path) for path in sorted((ROOT / "problems").glob("*.toml"))]
+    paths = sorted((ROOT / "problems").glob("*.toml"))
+    problems = [load(path) for path in paths if "study" not in tomllib.loads(path.read_text(encoding="utf-8"))]
     problems = [p for p in problems if open_kinds(p) == {Kind.UNBALANCE} and p.objective and not p.extras]
     return [(problem, AffineModel(problem)) for problem in problems]
 

@@ -68,6 +68,15 @@ def with_mass(problem: AffineProblem, seed: int, share: float) -> AffineProblem:
     return replace(problem, limits=((share * norm.value(free[0]), norm),))
 
 
+def with_load(problem: AffineProblem, seed: int, *names: str) -> AffineProblem:
+    """With limits on other loads, under what they are at the optimum without."""
+    rng = np.random.default_rng(100 + seed)
+    free = newton_solution(problem)
+    assert free is not None
+    norms = [load_norm(rng, name, problem.size, problem.size) for name in names]
+    return replace(problem, limits=tuple((0.97 * norm.value(free[0]), norm) for norm in norms))
+
+
 def by_cones(problem: AffineProblem, monkeypatch: pytest.MonkeyPatch) -> ConicSolution:
     with monkeypatch.context() as patch:
         patch.setattr(conic, "newton_solution", lambda _: None)
@@ -81,6 +90,9 @@ SCENES: dict[str, Callable[[int], AffineProblem]] = {
     "sum of three": lambda seed: scene(seed, ("mean", "rms", "rmq")),
     "at its bounds": lambda seed: scene(seed, upper=0.1),
     "mass limited": lambda seed: with_mass(scene(seed), seed, 0.6),
+    "mean limited": lambda seed: with_load(scene(seed), seed, "mean"),
+    "peak limited": lambda seed: with_load(scene(seed, ("rms",)), seed, "maximum"),
+    "mean, root mean square and peak limited": lambda seed: with_load(scene(seed), seed, "mean", "rms", "maximum"),
     "mass counted": lambda seed: replace(
         scene(seed), terms=(*scene(seed).terms, (0.1, masses(np.random.default_rng(seed), scene(seed).size)))
     ),
@@ -102,7 +114,9 @@ def test_it_proves_the_optimum_of_the_cones(kind: str, seed: int, monkeypatch: p
     assert problem.violation(x) <= 1e-9
     for domain in problem.domains:
         assert domain.project(x) == pytest.approx(x[domain.columns], rel=1e-12)
-    assert multipliers.shadow_prices(problem) == pytest.approx(other.multipliers.shadow_prices(problem), rel=1e-4)
+    prices = [m.shadow_prices(problem) for m in (multipliers, other.multipliers)]
+    assert prices[0] == pytest.approx(prices[1], rel=1e-4, abs=1e-5 * max(*prices[1], 1e-9) if prices[1] else 0.0)
+    assert not problem.limits or max(prices[0]) > 0.0
     # no design near or far is below the bound
     rng = np.random.default_rng(seed)
     for size in 10.0 ** rng.uniform(-6.0, 0.0, 50):
@@ -122,7 +136,7 @@ def wrong_end(program: NewtonProgram, x: np.ndarray, directions: Any = None) -> 
     return x * 1.001, program.multipliers(x * 1.001, program.no_cones)
 
 
-@pytest.mark.parametrize("kind", ["mean", "sum of three", "at its bounds"])
+@pytest.mark.parametrize("kind", ["mean", "sum of three", "at its bounds", "mean limited", "peak limited"])
 @pytest.mark.parametrize(
     "broken", [("derivatives", wrong_gradient), ("steps", wrong_end), ("minimise", lambda *_: None)], ids=lambda b: b[0]
 )
@@ -139,6 +153,20 @@ def test_what_it_cannot_prove_it_does_not_claim(
     assert honest.x is not None
     assert solution.x is not None
     assert problem.objective(solution.x) == pytest.approx(problem.objective(honest.x), rel=1e-8)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in SCENES if "limited" in kind])
+def test_an_optimum_that_breaks_its_limits_is_not_claimed(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, minimise = SCENES[kind](0), NewtonProgram.minimise
+
+    def without_limits(program: NewtonProgram, gradient: Any, curvature: Any, x: Any) -> Any:
+        free = NewtonProgram.of(replace(program.problem, limits=()))
+        assert free is not None
+        step = minimise(free, gradient, curvature, x)
+        return step and (step[0], program.no_cones)
+
+    monkeypatch.setattr(NewtonProgram, "minimise", without_limits)
+    assert newton_solution(problem) is None
 
 
 def test_loads_that_are_not_unique_are_left_to_the_cones() -> None:

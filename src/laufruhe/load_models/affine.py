@@ -7,7 +7,7 @@ once for each column, an entry of the decision vector.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -301,7 +301,7 @@ class AffineModel:
         if channel.is_number:
             # numbers of fixed mounts or of a fixed flywheel are the same for every design
             rows = Rows(MEAN, np.array([[self.bare.value(measure)]]), Grid(np.ones(1), 1))
-            return _stacked(rows, [np.zeros((1, 1))] * len(self._changes), self._keep_all)
+            return _stacked(rows, [np.zeros((1, 1))] * len(self._changes), len(self._changes), self._keep_all)
         if not isinstance(channel, LoadChannel):
             engine = self.bare.engine
             bare, slopes = mass_rows(measure, engine.rotors, engine.slider_cranks), []
@@ -309,7 +309,7 @@ class AffineModel:
                 changed = {rotor.name: rotor.unbalance for rotor in change.rotors}
                 rotors = [replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors]
                 slopes.append(mass_rows(measure, rotors, _only_changed(engine, change).slider_cranks).vectors)
-            return _stacked(bare, slopes, self._keep_all)
+            return _stacked(bare, slopes, len(slopes), self._keep_all)
         parts = peaks if averaged and not measure.norm.averages else int(averaged)
         pairs = self.spectra(channel)
         bare_signals = [bare for bare, _ in pairs]
@@ -336,7 +336,8 @@ class AffineModel:
         if bare.vectors.size * len(self._changes) > MAX_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"
             raise ModelError(f"{size} are needed; give fewer operating points, open numbers or samples", "problem")
-        return _stacked(bare, [sampled(column).vectors for column in column_signals], self._keep_all)
+        columns = (sampled(column).vectors for column in column_signals)
+        return _stacked(bare, columns, len(column_signals), self._keep_all)
 
 
 class _Change(NamedTuple):
@@ -382,11 +383,16 @@ def _loads(
     return PointLoads(point, wrench, forces, travel, parts, without_gas)
 
 
-def _stacked(bare: Rows, slopes: Sequence[Array], keep_all: bool) -> AffineNorm:
-    parts = (bare.vectors, *slopes)
-    used = np.array([keep_all or any(rows[:, k].any() for rows in parts) for k in range(bare.vectors.shape[1])])
+def _stacked(bare: Rows, slopes: Iterable[Array], count: int, keep_all: bool) -> AffineNorm:
+    """Return the norm of rows and their slopes, shape (k, d) for each of `count` columns, without unused components."""
+    slope = np.empty((*bare.vectors.shape, count))
+    used = np.array([keep_all or component.any() for component in bare.vectors.T])
+    # one column after another, because each is as large as the rows
+    for column, rows in enumerate(slopes):
+        slope[..., column] = rows
+        used |= [is_used or component.any() for is_used, component in zip(used, rows.T, strict=True)]
     used[:1] |= not used.any()
+    if used.all():
+        return AffineNorm(bare.norm, bare.vectors, slope, bare.grid)
     # rows contiguous in memory, which products with them need
-    constant, *moved = (np.compress(used, rows, axis=1) for rows in (bare.vectors, *slopes))
-    slope = np.stack(moved, axis=-1) if moved else np.zeros((*constant.shape, 0))
-    return AffineNorm(bare.norm, constant, slope, bare.grid)
+    return AffineNorm(bare.norm, np.compress(used, bare.vectors, axis=1), np.compress(used, slope, axis=1), bare.grid)

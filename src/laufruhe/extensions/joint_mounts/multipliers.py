@@ -11,7 +11,8 @@ from laufruhe.extensions.joint_mounts.mounted_loads import coarser
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, interpolate_duals, lower_bound
-from laufruhe.solvers.cones.conic import restrict_rows, rows_near, solve_cones
+from laufruhe.solvers.cones.cone_program import restrict_rows, rows_near
+from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 
 ROWS, MIN_SAMPLES = (1000, 3000), 24

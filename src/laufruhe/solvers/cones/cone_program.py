@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineNorm, AffineProblem, typical_size
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import seconds_left
-from laufruhe.numerics.norms import Cones
+from laufruhe.numerics.norms import Cones, Grid, lengths
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
 
@@ -330,3 +330,15 @@ def project_on_sets(problem: AffineProblem, x: Array) -> Array:
     for domain in problem.domains:
         x[domain.columns] = domain.project(x)
     return x
+
+
+def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
+    """Return indices of a norm's vectors (rows) whose length at x, shape (n,), exceeds `share` times `maximum` [SI]."""
+    return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
+
+
+def restrict_rows(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
+    """Restrict a norm to the vectors (rows) with these indices."""
+    return replace(
+        norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))
+    )

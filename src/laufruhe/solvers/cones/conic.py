@@ -13,17 +13,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.prove.certificate import Multipliers, excludes, is_moved
 from laufruhe.solvers.cones.cone_program import (
     ConicSolution,
     build_program,
     project_on_sets,
     read_solution,
+    restrict_rows,
+    rows_near,
     run_clarabel,
 )
 from laufruhe.solvers.cones.equations import equations_of
@@ -131,18 +131,6 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
             for peak, rows, near_rows in zip(is_peak, row_sets, rows_near_limit, strict=True)
         ]
     return _solve(problem, equations)
-
-
-def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Return indices of a norm's vectors (rows) whose length at x, shape (n,), exceeds `share` times `maximum` [SI]."""
-    return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
-
-
-def restrict_rows(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
-    """Restrict a norm to the vectors (rows) with these indices."""
-    return replace(
-        norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))
-    )
 
 
 def _solve(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:

@@ -1,22 +1,30 @@
-"""Newton's method for sums of smooth norms, within the sets of the decisions and cones of few rows (P10).
+"""Newton's method for sums of smooth norms, within the sets of the decisions and limits (P10).
 
-It starts from least squares. Terms and limits of few rows, such as masses, are cones of each step. The lower bound of
-its own dual rows proves the optimum; without that proof a cone program of all rows follows. If the loads of an optimum
-are not unique, that program chooses them too.
+It starts from least squares. Terms and limits of few rows, such as masses, are cones of each step, and so are the rows
+near a limited peak; other limits are linear there. The lower bound of its own dual rows proves the optimum; without
+that proof a cone program of all rows follows. If the loads of an optimum are not unique, that program chooses them too.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem, typical_size
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.norms import MEAN, NORMS, Grid
 from laufruhe.prove.certificate import ROUNDING, Multipliers, flatten_interior, lower_bound, minorant
-from laufruhe.solvers.cones.cone_program import build_program, project_on_sets, read_solution, run_clarabel
+from laufruhe.solvers.cones.cone_program import (
+    build_program,
+    project_on_sets,
+    read_solution,
+    restrict_rows,
+    rows_near,
+    run_clarabel,
+)
 
 MAX_STEPS = 15
 """Largest number of Newton steps."""
@@ -27,7 +35,11 @@ NO_STEP = 1e-9
 TARGET, PROVEN = 1e-9, 1e-8
 """Relative gap at which the steps end, and largest gap of an optimum that needs no cone program."""
 FEW_ROWS = 64
-"""Largest number of rows of a term or limit that is a cone of each step."""
+"""Largest number of rows of a term or limit that is a cone of each step as a whole."""
+NEAR_LIMIT = 0.9
+"""Share of a limit on a peak from which rows are cones of a step."""
+EXCESS = 1e-8
+"""Largest relative excess over a limit that is a rounding error of the solver."""
 DAMPING = 1e-10
 """Relative increase of the diagonal of a curvature; x stays in directions that do not change the objective."""
 MOVING, CURVED = 1e-14, 1e-7
@@ -72,7 +84,8 @@ def newton_solution(problem: AffineProblem) -> Step | None:
     value, bound = problem.objective(x), lower_bound(problem, multipliers)
     if value - bound.value > PROVEN * value:
         bound = lower_bound(problem, flatten_interior(problem, x, bound))
-    return (x, bound.multipliers) if value - bound.value <= PROVEN * value else None
+    is_proven = value - bound.value <= PROVEN * value and problem.violation(x) <= EXCESS
+    return (x, bound.multipliers) if is_proven else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +127,15 @@ class NewtonProgram:
             Directions in which the smooth terms have to be curved, shape (n, m); without curvature the result is None.
         """
         problem, is_zero, end, last = self.problem, x == 0.0, None, math.inf
+        cones = self.no_cones
         for _ in range(MAX_STEPS):
             gradient, curvature = self.derivatives(x)
             if directions is not None and _smallest(directions.T @ curvature @ directions) <= CURVED:
                 return None
+            prices = cones.shadow_prices(problem)
+            for price, (_, norm) in zip(prices, problem.limits, strict=True):
+                if price > 0.0 and len(norm.grid.weights) > FEW_ROWS and norm.norm.is_smooth:
+                    curvature += price * _derivatives(norm, x)[1]
             step = self.minimise(gradient, curvature, x)
             if step is None:
                 break
@@ -127,12 +145,16 @@ class NewtonProgram:
                 return x, self.multipliers(x, cones)
             if improvement >= last:
                 break
-            candidates = (x + share * (target - x) for share in SHARES)
-            y = next((y for y in candidates if problem.objective(y) <= value * (1.0 + SAME)), None)
-            if y is None:
+            penalties = [2.0 * price for price in cones.shadow_prices(problem)]
+            merit = self._merit(x, penalties)
+            candidates = (
+                (y, merit - self._merit(y, penalties)) for y in (x + share * (target - x) for share in SHARES)
+            )
+            y, fall = next(((y, fall) for y, fall in candidates if fall >= -SAME * merit), (x, -math.inf))
+            if fall == -math.inf:
                 break
             # without a fall of the objective, dual rows have to improve
-            last = WORTHWHILE * improvement if value - problem.objective(y) <= ROUNDING * value else math.inf
+            last = WORTHWHILE * improvement if fall <= ROUNDING * value else math.inf
             x = np.where(is_zero & (np.abs(y) <= NO_STEP * problem.scales), 0.0, y)
             end = x, cones
         return None if end is None else (end[0], self.multipliers(*end))
@@ -153,6 +175,10 @@ class NewtonProgram:
         )
         return Multipliers(terms, cones.limits)
 
+    def _merit(self, x: Array, penalties: Sequence[float]) -> float:
+        excesses = (max(norm.value(x) - maximum, 0.0) for maximum, norm in self.problem.limits)
+        return self.problem.objective(x) + sum(p * excess for p, excess in zip(penalties, excesses, strict=True))
+
     def _improvement(self, gradient: Array, x: Array, cones: Multipliers) -> float:
         # upper bound of the fall of the objective from x, by its gradient and dual rows
         affine = minorant(self.cones, cones)
@@ -163,11 +189,9 @@ class NewtonProgram:
         """Return gradient and curvature of the smooth terms at x, shapes (n,) and (n, n) (P10)."""
         gradient, curvature = np.zeros(len(x)), np.zeros((len(x), len(x)))
         for weight, norm in self.terms:
-            rows = norm.rows(x)
-            across, along, outward = norm.norm.second_derivative(norm.grid, rows)
-            slope = norm.pullback(norm.norm.subgradient(norm.grid, rows))
-            gradient += weight * slope
-            curvature += weight * (_curvature(norm, across, rows, along) - outward * np.outer(slope, slope))
+            first, second = _derivatives(norm, x)
+            gradient += weight * first
+            curvature += weight * second
         return gradient, curvature
 
     def least_squares(self, x: Array) -> tuple[Array, Array]:
@@ -205,16 +229,19 @@ class NewtonProgram:
         -------
         y, shape (n,), and the dual rows of the cones; None if Clarabel does not confirm a solution.
         """
-        problem, n = self.cones, len(x)
-        if not problem.terms:
+        problem, n = self.problem, len(x)
+        if not self.cones.terms:
             sizes = np.sqrt(np.maximum(np.diag(curvature), 0.0))
             units = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
             matrix = curvature * np.outer(units, units) + DAMPING * np.eye(n)
             y = x - units * np.linalg.solve(matrix, gradient * units)
             if np.array_equal(project_on_sets(problem, y.copy()), y) and problem.violation(y) <= 0.0:
                 return y, self.no_cones
-        if any(len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits):
+        parts = [part for maximum, norm in problem.limits if (part := _LimitPart.of(maximum, norm, x)) is not None]
+        if len(parts) < len(problem.limits):
             return None
+        limits = tuple((maximum, part.norm) for (maximum, _), part in zip(problem.limits, parts, strict=True))
+        problem = replace(self.cones, limits=limits)
         blocks, starts, rows, cost = build_program(problem, None)
         units = problem.units
         size = max(float(np.abs(gradient * units).max(initial=0.0)), self.problem.objective(x)) or 1.0
@@ -231,10 +258,46 @@ class NewtonProgram:
             return None
         solution = read_solution(problem, blocks, starts, raw)
         assert solution.x is not None
-        terms, limits = (
-            tuple(z / scale for z in part) for part in (solution.multipliers.terms, solution.multipliers.limits)
-        )
-        return solution.x, Multipliers(terms, limits)
+        duals = solution.multipliers
+        rows_of_limits = (part.spread(z / scale) for part, z in zip(parts, duals.limits, strict=True))
+        return solution.x, Multipliers(tuple(z / scale for z in duals.terms), tuple(rows_of_limits))
+
+
+@dataclass(frozen=True, eq=False)
+class _LimitPart:
+    """Limit as a cone of a step, and its dual rows from those of the cone."""
+
+    norm: AffineNorm
+    spread: Callable[[Array], Array]
+
+    @classmethod
+    def of(cls, maximum: float, norm: AffineNorm, x: Array) -> _LimitPart | None:
+        """Return the cone of a limit near x, shape (n,); None if its norm has none."""
+        if len(norm.grid.weights) <= FEW_ROWS:
+            return cls(norm, lambda z: z)
+        if norm.norm.is_largest:
+            rows = np.union1d(0, rows_near(maximum, norm, x, NEAR_LIMIT))
+
+            def spread(z: Array) -> Array:
+                placed = np.zeros_like(norm.constant)
+                placed[rows] = z
+                return placed
+
+            return cls(restrict_rows(norm, rows), spread)
+        if not norm.norm.is_smooth:
+            return None
+        subgradient = norm.subgradient(x)
+        slope = norm.pullback(subgradient)
+        tangent = np.array([[norm.value(x) - slope @ x]])
+        grid = Grid(np.ones(1), 1)
+        return cls(AffineNorm(MEAN, tangent, slope[None, None], grid), lambda z: float(z[0, 0]) * subgradient)
+
+
+def _derivatives(norm: AffineNorm, x: Array) -> tuple[Array, Array]:
+    rows = norm.rows(x)
+    across, along, outward = norm.norm.second_derivative(norm.grid, rows)
+    gradient = norm.pullback(norm.norm.subgradient(norm.grid, rows))
+    return gradient, _curvature(norm, across, rows, along) - outward * np.outer(gradient, gradient)
 
 
 def _is_curved(norm: AffineNorm) -> bool:
