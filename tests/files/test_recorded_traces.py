@@ -22,7 +22,7 @@ from typer.testing import CliRunner, Result
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError, LaufruheError
-from laufruhe.files.number_tables import number_table
+from laufruhe.files.number_tables import Unit, number_table, unit_in
 from laufruhe.files.reader import load
 from laufruhe.machine import PressureTrace
 from laufruhe.physics.recorded_gas import GasFacts, gas_facts
@@ -74,7 +74,7 @@ ENGINE = 'cylinders = 1\nbore = "80 mm"\nstroke = "90 mm"\nrod_length = "150 mm"
         ("labview.lvm", 0.002, "", "'Trigger'"),
         ("simulation.csv", 0.002, "", "'Volume (Cylinder 1)'"),
         ("gauge.csv", 0.002, "", "gas exchange dead centre"),
-        ("floating.csv", 0.002, 'peg = { at = "-180 deg", to = "1 bar" }', "raised by 3.2 bar"),
+        ("floating.csv", 0.002, 'peg = { at = "-180 deg", to = "1 bar" }', "moved by 3.2 bar"),
     ],
 )
 def test_files_of_benches_give_the_torque_behind_them(
@@ -252,6 +252,11 @@ FORMS = [
          rows(TURNS, cycle_pressure(np.arange(360.0, 2520.0))), said="Of 3 cycles"),
     form("headings before every cycle",
          2 * rows(A, P, by=";", head="Cycle;Test 7\nKW;PZYL\n°;bar\n"), said="Of 2 cycles"),
+    form("LabVIEW, an angle for each channel",
+         "LabVIEW Measurement\t\nX_Columns\tMulti\n***End_of_Header***\t\n\t\nChannels\t2\n"
+         "Y_Unit_Label\t\tbar\t\tV\nX_Dimension\tAngle\tAngle\n***End_of_Header***\n"
+         "X_Value\tPressure\tX_Value\tTrigger\tComment\n"
+         + rows(A, P, A, 0 * A, by="\t", decimal=",").replace("\n", "\t\n")),
     form("blank lines and remarks", "".join(f"{a};{p:.5f};{'peak' * int(a == 19)}\n\n" for a, p in PAIRS)),
     form("a footer", rows(A, P) + "end of data\n"),
     form("date and counts over the numbers", rows(A, P, head="Test of 2024-02-10\n720 2 1\n")),
@@ -263,7 +268,7 @@ FORMS = [
     form("columns by number", rows(np.arange(720), P, A, 0 * A), gas="angle_column = 3\npressure_column = 2"),
     form("mean of named columns",
          rows(A, 0.9 * P, 5 * P, 1.1 * P, head="CA,a,b,c\n"), gas='pressure_column = ["a", "c"]'),
-    form("floating, pegged", rows(A, P - 3), gas='peg = { at = -180, to = "1 bar" }', said="raised by 3 bar"),
+    form("floating, pegged", rows(A, P - 3), gas='peg = { at = -180, to = "1 bar" }', said="moved by 3 bar"),
     form("gauge by key", rows(A, P - 1), gas="gauge = true"),
     form("workbook", workbook([["notes"], ["n", 1]], [["TEST DATA"], [None, "PCYL1", "INJ1"], ["deg", "bar", "-"],
          *((float(np.float32(a)), float(p), 0.0) for a, p in PAIRS)]), ending="xlsx"),
@@ -289,6 +294,31 @@ def test_every_form_gives_one_torque(content: str | bytes, gas: str, said: str, 
     assert not problem.plausibility_warnings
 
 
+@pytest.mark.parametrize(
+    ("text", "dimension", "name", "is_gauge"),
+    [
+        *((text, "rad", "deg", False) for text in ("deg", "°", "[deg]", "(°CA)", "°KW", "deg. CA", "CAD", "Grad")),
+        *((text, "rad", "deg", False) for text in ("deg CA aTDC", "CA°", "degCA")),
+        *((text, "rad", "rad", False) for text in ("rad", "[rad]", "Radian")),
+        *((text, "Pa", "bar", False) for text in ("bar", "Bar", "[bar]", "bar(a)", "bara", "bar abs", "bar_a")),
+        *((text, "Pa", "bar", True) for text in ("barg", "bar(g)", "bar gauge", "barü", "bar_g")),
+        *((text, "Pa", text, False) for text in ("kPa", "MPa", "Pa", "hPa", "mbar", "psi", "atm")),
+        ("psig", "Pa", "psi", True), ("kg/cm²", "Pa", "kp/cm^2", False), ("N/mm^2", "Pa", "N/mm^2", False),
+        ("V", "V", "v", False), ("ms", "s", "ms", False),
+    ],
+)  # fmt: skip
+def test_units_of_headings(text: str, dimension: str, name: str, is_gauge: bool) -> None:
+    assert unit_in(text) == Unit(dimension, name, is_gauge)
+
+
+@pytest.mark.parametrize(
+    "text", ["", "CA", "KW", "CA_deg", "PCYL1", "p", "-", "mm^3", "A", "cycle_1", "deg bTDC", "PA2"]
+)
+def test_words_that_are_no_units(text: str) -> None:
+    """An angle before the dead centre counts backwards."""
+    assert unit_in(text) is None
+
+
 REFUSED = {
     "nothing": ("", "", "has no columns of crank angle and pressure; give a file with both"),
     "no numbers": ("hello world\nfoo\n", "", "has no columns of crank angle and pressure"),
@@ -308,6 +338,11 @@ REFUSED = {
                       "may have the pressure of the cylinder in 'PEIN', 'PCYL1'; name one by pressure_column"),
     "no such heading": (rows(A, P, P, head=NAMED), 'pressure_column = "PCYL"', 'column = "PCYL": is no heading'),
     "no such column": (rows(A, P), "pressure_column = 5", "pressure_column = 5: is not among 2 columns; count"),
+    "no choice of cycles": (rows(A, P), 'cycles = "best"', 'gas.cycles = "best": is no choice of cycles; write "mean"'),
+    "no number of a cycle": (rows(A, P), "cycles = 0", "gas.cycles = 0: is no choice of cycles"),
+    "half a column": (rows(A, P), "angle_column = 1.5", "gas.angle_column = 1.5: is neither name nor number"),
+    "no column": (rows(A, P), "pressure_column = []", "names no column; name one"),
+    "half a column among others": (rows(A, P), "pressure_column = [2.5]", "[1] = 2.5: is neither name nor number"),
     "no such cycle": (rows(A, P, P), "cycles = 3", "gas.cycles = 3: is not among 2 cycles; count them from 1"),
     "no such cycle of one": (rows(A, P), "cycles = 3", "gas.cycles = 3: is not in the file, which has one cycle"),
     "no dead centre": (rows(A, P), 'angle_zero = "OT"', 'gas.angle_zero = "OT": is no dead centre; write "firing"'),

@@ -34,13 +34,15 @@ _BINARY = {
     b"MDF ": "an MDF file",
 }
 """First bytes of files that are not read, and their names."""
-_ANGLE = re.compile(r"(?:(?:°|deg(?:rees?)?|grad)(?:ca|kw|cra|cad|crank|atdc)?|cad|cadeg|dca)|rad(?:ians?)?")
+_ANGLE = re.compile(
+    r"(?:ca|kw)?(?:°|deg(?:rees?)?|grad)(?:ca|kw|cra|cad|crank|crankangle)?(?:a(?:fter)?tdcf?)?|cad|dca|rad(?:ians?)?"
+)
 _OTHER = {"s": "s", "sec": "s", "ms": "s", "us": "s", "µs": "s", "v": "V", "mv": "V", "volt": "V"}
 _PRESSURES = {
     "bar": "bar", "mbar": "mbar", "pa": "Pa", "hpa": "hPa", "kpa": "kPa", "mpa": "MPa", "psi": "psi", "atm": "atm",
     "at": "kp/cm^2", "kp/cm2": "kp/cm^2", "kgf/cm2": "kp/cm^2", "kg/cm2": "kp/cm^2", "n/mm2": "N/mm^2",
 }  # fmt: skip
-_GAUGE, _ABSOLUTE = ("g", "(g)", "gauge", "ü"), ("a", "(a)", "abs", "absolute")
+_GAUGE, _ABSOLUTE = ("g", "_g", "gauge", "ü"), ("a", "_a", "abs", "_abs", "absolute")
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class NumberTable:
 
 def unit_in(text: str) -> Unit | None:
     """Return the unit that a text is, such as "bar", "[°KW]" or "kPa abs"; None for other texts."""
-    plain = re.sub(r"[\s.^-]+", "", text.strip().strip("[]()<>").lower()).replace("º", "°").replace("²", "2")
+    plain = re.sub(r"[\s.^()<>\[\]-]+", "", text.lower()).replace("º", "°").replace("²", "2")
     if _ANGLE.fullmatch(plain):
         return Unit("rad", "rad" if plain.startswith("rad") else "deg")
     if plain in _OTHER:

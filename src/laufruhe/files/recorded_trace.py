@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+from pydantic import PlainValidator, WithJsonSchema
 
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
@@ -27,7 +28,7 @@ _UNLIKE, _MANY = 0.7, 0.2
 """Correlation with the mean below which a cycle is unlike the others, and the largest share of such cycles."""
 _LARGER = 3.0
 """Range of a column over that of the first pressure from which the first may be no cylinder pressure."""
-_FEWEST = 4
+_FEWEST, _LISTED = 4, 3
 _WHOLE = 0.95
 """Least share of the points of the longest cycle that a cycle has."""
 _NEAR_FIRING = math.radians(60.0)
@@ -35,6 +36,30 @@ _NEAR_FIRING = math.radians(60.0)
 _PEG_WIDTH = math.radians(5.0)
 """Angle to either side over which the pressure is averaged to be pegged."""
 _ZEROS = {"firing": 0.0, "gas exchange": math.tau}
+
+
+def _column(raw: Any) -> str | int:
+    if isinstance(raw, bool) or not isinstance(raw, str | int):
+        raise f.refusal('is neither name nor number of a column; write for example "PCYL1" or 2')
+    return raw
+
+
+def _cycles_of_key(raw: Any) -> str | int:
+    if raw in ("mean", "worst") or (isinstance(raw, int) and not isinstance(raw, bool) and raw > 0):
+        return raw  # type: ignore[no-any-return]
+    raise f.refusal('is no choice of cycles; write "mean", "worst" or a number counted from 1')
+
+
+Column: TypeAlias = Annotated[
+    str | int,
+    PlainValidator(_column),
+    WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "integer", "minimum": 1}]}),
+]
+CyclesChoice: TypeAlias = Annotated[
+    str | int,
+    PlainValidator(_cycles_of_key),
+    WithJsonSchema({"anyOf": [{"enum": ["mean", "worst"]}, {"type": "integer", "minimum": 1}]}),
+]
 
 
 class PegTable(Table):
@@ -51,15 +76,15 @@ class RecordedTable(Table):
 
     file: str = f.required("Text file, .xlsx or .mat file of crank angle and pressure, beside the problem.")
     sheet: str | None = f.optional("Sheet of a spreadsheet; by default that with the most rows of numbers.")
-    angle_column: str | int | None = f.optional("Name or number of the column of crank angles, if it is not evident.")
-    pressure_column: str | int | list[str | int] | None = f.optional(
+    angle_column: Column | None = f.optional("Name or number of the column of crank angles, if it is not evident.")
+    pressure_column: Annotated[list[Column], f.ListOrSingle(Column)] | None = f.optional(
         "Name or number of the column of pressures, or several that are cycles of the cylinder."
     )
     angle_unit: str | None = f.optional("Unit of the angles, if it is not in the file; deg by default.")
     pressure_unit: str | None = f.optional("Unit of the pressures, if it is not in the file; bar by default.")
     gauge: bool | None = f.optional("true: pressures count from crankcase_pressure. By default they are absolute.")
     peg: PegTable | None = f.optional("Moves a floating pressure to a known one, at one angle.")
-    cycles: Literal["mean", "worst"] | int = f.optional(
+    cycles: CyclesChoice = f.optional(
         "Of several cycles: their mean, the one with the highest pressure, or that with this number.", "mean"
     )
     smooth: bool = f.optional("false keeps the noise of the measurement.", True)
@@ -78,6 +103,9 @@ class RecordedFile:
             raise self.refused(f"has {counted(len(self.values), 'row')}, too few for a cycle", "give one every degree")
         self.angle_column = self._angle_column()
         self.pressure_columns = self._pressure_columns()
+        names = [self.name(column) for column in self.pressure_columns]
+        pressures = f"{names[0]} to {names[-1]}" if len(names) > _LISTED else ", ".join(names)
+        self.said.insert(0, f"Crank angle from {self.name(self.angle_column)}, pressure from {pressures}.")
 
     def refused(self, rule: str, remedy: str, key: str = "file") -> Refused:
         """Return a refusal of the file, or of a key about it."""
@@ -89,14 +117,16 @@ class RecordedFile:
         return f"'{self.numbers.names[column]}'" if self.numbers.names[column] else f"column {column + 1}"
 
     def _column(self, word: str | int, key: str) -> int:
-        names = self.numbers.names
+        names, where = self.numbers.names, f"{self.where}.{key}"
         if isinstance(word, int):
             if not 1 <= word <= len(names):
-                raise self.refused(f"is not among {counted(len(names), 'column')}", "count them from 1", key)
+                raise Refused(where, word, f"is not among {counted(len(names), 'column')}", "count them from 1")
             return word - 1
         plain = [name.strip().lower() for name in names]
         if word.strip().lower() not in plain:
-            raise self.refused("is no heading of the file", nearest(word, [n for n in names if n] or ["1"]), key)
+            named = [name for name in names if name]
+            remedy = nearest(word, named) if named else f"give its number, 1 to {len(names)}"
+            raise Refused(where, word, "is no heading of the file", remedy)
         return plain.index(word.strip().lower())
 
     def _angle_column(self) -> int:
@@ -108,7 +138,8 @@ class RecordedFile:
         if of_unit or of_name:
             return (of_unit or of_name)[0]
         turning = [k for k in range(len(units)) if _rises(values[:, k]) and _turns(values[:, k])]
-        if len(turning) > 1:
+        # each channel may have a column of the same angles
+        if any(not np.array_equal(values[:, k], values[:, turning[0]]) for k in turning):
             names = ", ".join(map(self.name, turning))
             raise self.refused(f"may have its crank angles in {names}", "name one by angle_column")
         rising = [k for k in range(len(units)) if _rises(values[:, k])]
@@ -122,9 +153,7 @@ class RecordedFile:
     def _pressure_columns(self) -> list[int]:
         words = self.table.pressure_column
         if words is not None:
-            columns = [
-                self._column(word, "pressure_column") for word in (words if isinstance(words, list) else [words])
-            ]
+            columns = [self._column(word, "pressure_column") for word in words]
             if not columns:
                 raise self.refused("names no column", "name one", "pressure_column")
             return columns
@@ -209,7 +238,7 @@ def recorded_trace(
         rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
         pressures = pressures + rise
         at = math.degrees(table.peg.at)
-        file.said.append(f"Pressures are raised by {_bar(rise)}, to {_bar(table.peg.to)} at {at:.6g} deg.")
+        file.said.append(f"Pressures are moved by {_bar(rise)}, to {_bar(table.peg.to)} at {at:.6g} deg.")
     if pressures.min() <= 0.0:
         rule = f"has pressures down to {_bar(pressures.min())}, which are not absolute"
         raise file.refused(rule, 'write gauge = true, or peg = { at = "-180 deg", to = "1 bar" } with what is known')
