@@ -254,7 +254,7 @@ FORMS = [
          2 * rows(A, P, by=";", head="Cycle;Test 7\nKW;PZYL\n°;bar\n"), said="Of 2 cycles"),
     form("LabVIEW, an angle for each channel",
          "LabVIEW Measurement\t\nX_Columns\tMulti\n***End_of_Header***\t\n\t\nChannels\t2\n"
-         "Y_Unit_Label\t\tbar\t\tV\nX_Dimension\tAngle\tAngle\n***End_of_Header***\n"
+         "Y_Unit_Label\tbar\t\tV\t\nX_Dimension\tAngle\t\tAngle\t\n***End_of_Header***\n"
          "X_Value\tPressure\tX_Value\tTrigger\tComment\n"
          + rows(A, P, A, 0 * A, by="\t", decimal=",").replace("\n", "\t\n")),
     form("blank lines and remarks", "".join(f"{a};{p:.5f};{'peak' * int(a == 19)}\n\n" for a, p in PAIRS)),
