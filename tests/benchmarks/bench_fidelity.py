@@ -23,21 +23,31 @@ import numpy as np  # noqa: E402
 from pages import PAGES, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
-from laufruhe.fidelity.automatic import automatic, choose  # noqa: E402
-from laufruhe.load_models.batch import BatchNorm, Designs, prepare  # noqa: E402
+from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE  # noqa: E402
+from laufruhe.load_models.batch import prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
-from laufruhe.numerics.norms import NORMS, Grid  # noqa: E402
+from laufruhe.numerics.norms import NORMS  # noqa: E402
 from laufruhe.physics.fidelity import Fidelity  # noqa: E402
 from laufruhe.physics.shaking_loads import forget  # noqa: E402
 from laufruhe.problem import channels  # noqa: E402
 from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
 from laufruhe.problem.measure import Measure, Term  # noqa: E402
 from laufruhe.problem.problem import Problem  # noqa: E402
+from laufruhe.solvers import solve  # noqa: E402
 from random_decisions import random_decisions  # noqa: E402
 
 OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000
+BATCHED = ("tractor-four-lanchester", "tractor-six", "vee-two-90", "inline-five-shafts")
+SOLVED = (
+    "tractor-single", "tractor-two", "tractor-three", "tractor-four-lanchester", "tractor-six", "inline-five-shafts",
+    "vee-two-90", "vee-six-60", "vee-six-90", "vee-eight-cross", "vee-eight-flat", "twin-parallel-180",
+    "twin-parallel-270", "twin-parallel-360", "twin-boxer", "flat-four", "flat-twelve", "inline-eight", "inline-ten",
+    "inline-five-open", "two-stroke-two", "two-stroke-three", "two-stroke-five", "geared-twin",
+    "opposed-pistons-masses", "single-counter-shaft", "two-machines", "radial-seven", "vee-eight-open",
+    "tractor-four-shaft-heights",
+)  # fmt: skip
 
 
 def seconds(work: Callable[[], object], repeats: int = 5) -> float:
@@ -52,104 +62,69 @@ def product_rate() -> float:
     return 2.0 * 1200**3 / seconds(lambda: a @ a, 12)
 
 
-def four_cylinder() -> list[str]:
-    """Automatic at 1e-3 against exact at 720 samples, like for like."""
-    problem = load(ROOT / "problems" / "tractor-four-lanchester.toml")
-    exact = replace(problem, fidelity=Fidelity(samples=720))
-    auto = automatic(problem, 1e-3)
-    cheap, whole = prepare(auto), prepare(exact, prune=False)
-    values = random_decisions(problem, DESIGNS)
-    engine = problem.design(list(values[0]))
-    unseen, heavier, known = (
-        [seconds(work(p, engine), 200) for p in (exact, auto)] for work in (_other_rods, _other_pistons, _other_rotors)
-    )
-    x = np.concatenate([[1.0], *(d.columns_of(u) for d, u in zip(cheap.model.domains, values[0], strict=True))])
-    one_whole, one = (seconds(lambda d=d: d.objective_from_features(x[None]), 2000) for d in (whole, cheap))
-    empty = _one_row(cheap)
-    floor = seconds(lambda: empty.objective_from_features(x[None]), 2000)
-    many_whole, many = (seconds(lambda d=d: d.objective(values), 12) for d in (whole, cheap))
-    choosing = seconds(lambda: (forget(), choose(problem, 1e-3)), 3)
-    rate = product_rate()
-    operations = sum(2 * norm.rows.size for _, norm in cheap.terms)
-    both = seconds(lambda: cheap.objective(values, threads=2), 12)
-    error = float(np.abs(cheap.objective(values[:2000]) / whole.objective(values[:2000]) - 1.0).max())
+def automatic(problem: Problem) -> Problem:
+    """The problem at fidelity `auto` with its default tolerance."""
+    return problem.at(replace(problem.fidelity, tolerance=DEFAULT_TOLERANCE))
 
-    def line(what: str, pair: Sequence[float]) -> str:
-        return f"| {what} | {1e6 * pair[0]:.1f} us | {1e6 * pair[1]:.1f} us | {pair[0] / pair[1]:.1f} |"
 
-    return [
-        "## Automatic at 1e-3 against exact at 720 samples",
+def solves() -> list[str]:
+    """One solve with its error estimate, exact and automatic in turns, of ready problems that take little time."""
+    lines = [
+        "## One solve, automatic at 1e-3 against exact",
         "",
-        "Mean mount force of `problems/tractor-four-lanchester.toml`; exact samples the whole cycle, nothing pruned.",
+        "`laufruhe.solve` and its error estimate, exact and automatic in turns, the least of 5 each.",
         "",
-        "| what | exact | auto | ratio |",
+        "| problem | exact | auto | ratio |",
         "| --- | ---: | ---: | ---: |",
-        line("from an engine object whose rods were never seen", unseen),
-        line("from an engine object, the masses of its pistons new", heavier),
-        line("from an engine object, the rotors new", known),
-        line("one design of a prepared scene, the decisions new", (one_whole, one)),
-        f"| {DESIGNS} designs of a prepared scene in one call | {many_whole:.2f} s | {many:.3f} s "
-        f"| {many_whole / many:.1f} |",
+    ]
+    for name in SOLVED:
+        problem = load(ROOT / "problems" / f"{name}.toml")
+        pair = [problem, automatic(problem)]
+        times = [[_solve_time(each) for each in pair] for _ in range(6)][1:]
+        exact, auto = (min(column) for column in zip(*times, strict=True))
+        lines.append(f"| {name} | {1e3 * exact:.0f} ms | {1e3 * auto:.0f} ms | {auto / exact:.2f} |")
+    return [*lines, ""]
+
+
+def _solve_time(problem: Problem) -> float:
+    forget()
+    return spent(lambda: solve(problem).error_estimate)
+
+
+def batches() -> list[str]:
+    """Batches of random designs with all preparation, exact and automatic in turns."""
+    lines = [
+        "## Many designs, automatic at 1e-3 against exact",
         "",
-        f"One design of a prepared scene is a handful of NumPy calls: on a single row they take {1e6 * floor:.1f} us. "
-        f"With no angle left at all the ratio could be {one_whole / floor:.1f}, so ten times is out of reach there. "
-        "From an engine object both pay for the rotors, the mounts and the objects, and, where rods are new, "
-        "for the gas. Where there is much to do, in batches, what is left out is what is saved. "
-        f"From exact engine objects with new rotors to automatic and prepared it is {known[0] / one:.0f} times: "
-        f"{known[0] / one_whole:.0f} by preparing, {one_whole / one:.1f} by what is left out.",
+        "Random designs in one call, with all preparation. The error is the largest of all designs.",
         "",
-        f"Choosing takes {1e3 * choosing:.0f} ms, once for a scene. "
-        f"Largest disagreement over 2000 random designs {error:.1e}.",
+        "| problem | designs | exact | auto | ratio | largest error |",
+        "| --- | ---: | ---: | ---: | ---: | ---: |",
+    ]
+    for name in BATCHED:
+        problem = load(ROOT / "problems" / f"{name}.toml")
+        for count in (1000, 10_000, DESIGNS):
+            values = random_decisions(problem, count)
+            exact, auto = (
+                min(spent(lambda own=own, v=values: prepare(own).objective(v)) for _ in range(3))
+                for own in (problem, automatic(problem))
+            )
+            found, truth = (prepare(own).objective(values) for own in (automatic(problem), problem))
+            error = float(np.abs(found / truth - 1.0).max())
+            lines.append(
+                f"| {name} | {count:,} | {1e3 * exact:.1f} ms | {1e3 * auto:.1f} ms | {auto / exact:.2f} "
+                f"| {error:.1e} |"
+            )
+    designs, rate = prepare(automatic(load(ROOT / "problems" / f"{BATCHED[0]}.toml"))), product_rate()
+    values = random_decisions(designs.model.problem, DESIGNS)
+    one, both = (seconds(lambda t=t: designs.objective(values, t), 5) for t in (1, 2))
+    return [
+        *lines,
         "",
-        f"Batch throughput on one core: {DESIGNS / many / 1e6:.2f} million designs a second, "
-        f"{operations * DESIGNS / many / 1e9:.1f} billion operations of its matrix products a second, "
-        f"{operations * DESIGNS / many / rate:.2f} of this machine's large matrix product "
-        f"({rate / 1e9:.1f} billion). "
-        f"Squares, roots and sums of the norm are not counted as work. Two threads: {many / both:.2f} times as fast.",
+        f"`{BATCHED[0]}` once prepared: {DESIGNS / one / 1e6:.2f} million designs a second on one core, beside a "
+        f"large matrix product of {rate / 1e9:.1f} billion operations. Two threads: {one / both:.2f} times as fast.",
         "",
     ]
-
-
-def _other_rods(problem: Problem, engine: Engine) -> Callable[[], object]:
-    """Objective of engines whose rods differ in length from call to call."""
-    return _other_parts(problem, engine, "rod_length")
-
-
-def _other_pistons(problem: Problem, engine: Engine) -> Callable[[], object]:
-    """Objective of engines whose pistons differ in mass from call to call."""
-    return _other_parts(problem, engine, "reciprocating_mass")
-
-
-def _other_parts(problem: Problem, engine: Engine, number: str) -> Callable[[], object]:
-    count = iter(range(1, 10**9))
-
-    def work() -> object:
-        factor = 1.0 + 1e-9 * next(count)
-        parts = tuple(replace(p, **{number: factor * getattr(p, number)}) for p in engine.slider_cranks)
-        return objective_value(problem, evaluate(problem, replace(engine, slider_cranks=parts)))
-
-    return work
-
-
-def _other_rotors(problem: Problem, engine: Engine) -> Callable[[], object]:
-    """Objective of engines whose unbalances differ from call to call."""
-    count = iter(range(1, 10**9))
-
-    def work() -> object:
-        factor = 1.0 + 1e-9 * next(count)
-        rotors = tuple(replace(rotor, unbalance=factor * rotor.unbalance) for rotor in engine.rotors)
-        return objective_value(problem, evaluate(problem, replace(engine, rotors=rotors)))
-
-    return work
-
-
-def _one_row(designs: Designs) -> Designs:
-    """The same calls with nothing to do."""
-    terms = tuple(
-        (weight, BatchNorm(norm.norm, np.ascontiguousarray(norm.rows[:, :, :1]), Grid(norm.grid.weights[:1], 1)))
-        for weight, norm in designs.terms
-    )
-    return replace(designs, terms=terms)
 
 
 def pruned() -> list[str]:
@@ -256,7 +231,7 @@ def main() -> None:
     """Measure and write."""
     lines = ["# Fidelity, batches and growth", "", "Processor time, the least of several calls on one core.", ""]
     table, found = growth()
-    text = "\n".join([*lines, *four_cylinder(), *pruned(), *table]) + "\n"
+    text = "\n".join([*lines, *solves(), *batches(), *pruned(), *table]) + "\n"
     publish(OUT, text)
     draw(found, OUT.with_suffix(".png"))
 

@@ -1,4 +1,4 @@
-"""Speed against accuracy of every ready problem.
+"""Speed against accuracy of ready problems, and the times of a trade beside the same calls made separately.
 
 Writes results/benchmarks/trade.md and its picture, and the page of each problem to results/trade.
 """
@@ -7,18 +7,24 @@ from __future__ import annotations
 
 import importlib
 import json
+import math
 import re
 import time
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from pages import PAGES, processor_seconds, publish
+from bench_fidelity import SOLVED
+from pages import PAGES, processor_seconds, publish, spent
 
+import laufruhe
 from laufruhe.cli.fidelity import traded
-from laufruhe.fidelity.automatic import NO_GAS, RIGID, TWO_ORDER
+from laufruhe.fidelity.error_bounds import ErrorReference
+from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.cores import processors
-from laufruhe.studies.trade import KEEPS
-from problem_files import READY
+from laufruhe.physics.shaking_loads import forget
+from laufruhe.studies.trade import KEEPS, NO_GAS, RIGID, TWO_ORDER, Batch, ladder, measured
+from problem_files import PROBLEMS
 
 FOLDER = PAGES.parent / "trade"
 SHOWN = (
@@ -64,19 +70,52 @@ def draw(trades: list[dict[str, Any]]) -> None:
     style.save(drawn.figure, PAGES / "trade.png")
 
 
+def separate_calls() -> list[str]:
+    """Times by a trade at fidelity `auto`, and of the public calls after it."""
+    lines = [
+        "## A trade beside separate calls",
+        "",
+        "Processor time of each call by the trade, and of the same public call after it, the least of a few.",
+        "",
+        "| problem | call | trade | separate call | ratio |",
+        "| --- | --- | ---: | ---: | ---: |",
+    ]
+    for name in SOLVED[:10]:
+        problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+        scale, batch = ErrorReference.of(problem), Batch(problem)
+        (variant,) = (variant for rung, variant in ladder(scale) if rung == "auto 0.001")
+        row = measured("auto 0.001", variant, scale, batch)
+        calls: list[tuple[str, float, Callable[[], object]]] = [
+            ("evaluate", row.evaluation, lambda own=variant: laufruhe.evaluate(own)),
+            ("solve", row.solve, lambda own=variant: laufruhe.solve(own)),
+        ]
+        if math.isfinite(row.batch):
+            calls.append(("10,000 designs", row.batch, lambda own=variant, b=batch: prepare(own).objective(b.values)))
+        for call, seconds, work in calls:
+            alone = min(_alone(work) for _ in range(50 if seconds < 5e-3 else 5))
+            lines.append(f"| {name} | {call} | {1e3 * seconds:.2f} ms | {1e3 * alone:.2f} ms | {seconds / alone:.2f} |")
+    return [*lines, ""]
+
+
+def _alone(work: Callable[[], object]) -> float:
+    forget()
+    return spent(work)
+
+
 def main() -> None:
     """Measure, and keep the table alone."""
     started, before = time.perf_counter(), processor_seconds()
-    *_, as_json = traded(READY, FOLDER, print)
-    seconds, spent = time.perf_counter() - started, processor_seconds() - before
+    *_, as_json = traded([PROBLEMS / f"{name}.toml" for name in SOLVED], FOLDER, print)
+    seconds, total = time.perf_counter() - started, processor_seconds() - before
     (FOLDER / "trades.json").write_text(as_json(), encoding="utf-8")
     # the pages of single problems are not kept
     text = re.sub(r"\[([\w-]+)\]\(\1\.md\)", r"`\1`", (FOLDER / "README.md").read_text(encoding="utf-8"))
-    made = f"Made in {seconds:.0f} s with {processors()} processes, which took {spent:.0f} s of a processor together."
+    made = f"Made in {seconds:.0f} s with {processors()} processes, which took {total:.0f} s of a processor together."
     picture = "![Error and regret of the usual fidelities over all ready problems](trade.png)"
     head, table = text.split("\n\n| ", 1)
     draw(json.loads(as_json()))
-    publish(PAGES / "trade.md", f"{head}\n\n{picture}\n\n| {table.rstrip()}\n\n{made}")
+    separate = "\n".join(separate_calls())
+    publish(PAGES / "trade.md", f"{head}\n\n{picture}\n\n| {table.rstrip()}\n\n{made}\n\n{separate}")
 
 
 if __name__ == "__main__":

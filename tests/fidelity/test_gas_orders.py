@@ -15,7 +15,6 @@ from cli import scenes
 from fidelity.scenes import finer, random_elastic_problem, random_problem
 from lanes import first_fast
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
-from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import ErrorReference, reference
 from laufruhe.files.reader import load
 from laufruhe.load_models import uneven_model
@@ -25,6 +24,7 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
+from laufruhe.studies.trade import ladder
 from problem_files import PROBLEMS, written
 
 EVERY = 10_000

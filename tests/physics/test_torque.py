@@ -278,4 +278,4 @@ def test_two_orders_reach_the_torque() -> None:
     assert errors[2] == pytest.approx(errors[1] / 16.0, rel=0.1)
     asked = problem.changed(objective=(Term(Measure(*MEASURES["rms crank torque"])),), decisions=(), limits=())
     scale = ErrorReference(asked, reference(asked))
-    assert 1e-3 < scale.relative_loss(Fidelity("two-order", 720)) < 0.2
+    assert 1e-3 < scale.relative_change(Fidelity("two-order", 720)) < 0.2

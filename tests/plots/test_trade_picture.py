@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PathCollection
 
 from cli import scenes
 from laufruhe.plots import trade
@@ -20,8 +21,8 @@ ROWS = 16
 
 def _trade(errors: list[float]) -> Trade:
     rows = tuple(
-        TradeRow(f"fidelity {k}, 720 steps", error, error, 1e-5 * (k + 1.0), 2e-5, 0.01, 1e-3, 100_000, 0.5, 0.0,
-            1e-3 if k % 3 else math.nan)
+        TradeRow(f"fidelity {k}, 720 steps", error, 2.0 * error, 1e-5 * (k + 1.0), math.nan, math.nan,
+                 0.01 * (k + 1.0), error, 1e5, math.nan, math.nan, math.nan)
         for k, error in enumerate(errors)
     )  # fmt: skip
     unused = cast(Any, None)
@@ -34,16 +35,17 @@ def _trade(errors: list[float]) -> Trade:
 def test_names_cover_neither_each_other_nor_the_panel(errors: list[float]) -> None:
     figure = trade.figure(_trade(errors))
     assert faults_of(figure) == []
-    axes = figure.axes[0]
-    names = [text for text in axes.texts if text.get_text().startswith("fidelity")]
-    assert [name.get_text() for name in names] == [f"fidelity {k}, 720 steps" for k in range(len(errors))]
     canvas = cast(FigureCanvasAgg, figure.canvas)
     canvas.draw()
     renderer = canvas.get_renderer()
-    places = [name.get_window_extent(renderer) for name in names]
-    assert not any(one.overlaps(other) for one, other in combinations(places, 2))
-    panel = axes.get_window_extent()
-    assert all(box.x0 > panel.x1 and box.x1 < figure.bbox.x1 for box in places)
+    assert len(figure.axes) == 2
+    for axes in figure.axes:
+        names = [text for text in axes.texts if text.get_text().startswith("fidelity")]
+        assert [name.get_text() for name in names] == [f"fidelity {k}, 720 steps" for k in range(len(errors))]
+        places = [name.get_window_extent(renderer) for name in names]
+        assert not any(one.overlaps(other) for one, other in combinations(places, 2))
+        panel = axes.get_window_extent()
+        assert all(box.x0 > panel.x1 and box.x1 < figure.bbox.x1 for box in places)
 
 
 def test_names_stand_in_the_order_of_their_errors() -> None:
@@ -57,7 +59,8 @@ def test_dots_of_errors_too_small_to_tell_do_not_pile_up() -> None:
     """They stand in a band under the axis, no two on each other."""
     figure = trade.figure(_trade([0.0] * 12 + [1e-5, 1.0]))
     axes = figure.axes[0]
-    dots = np.concatenate([np.asarray(found.get_offsets()) for found in axes.collections[:2]])
+    (found,) = (each for each in axes.collections if isinstance(each, PathCollection))
+    dots = np.asarray(found.get_offsets())
     assert len(dots) == 14
     pixels = axes.transData.transform(dots)
     assert min(math.dist(one, other) for one, other in combinations(pixels, 2)) > 0.9 * trade.DOT * figure.dpi

@@ -9,17 +9,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from laufruhe.cli.screen import typed
 from laufruhe.errors import SolverError, refused
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
-from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import current_executor, executor_for, unordered_map, worker_count
-from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import open_kinds
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -28,7 +24,7 @@ from laufruhe.report import explain, files
 from laufruhe.report import trade as report
 from laufruhe.report.document import Document
 from laufruhe.report.web_page import as_html
-from laufruhe.studies.trade import Trade, effort, seconds, trade, traded_part
+from laufruhe.studies.trade import Trade, effort, timed, trade, traded_part
 
 Pages = dict[str, bytes]
 """Contents of files by their names."""
@@ -43,23 +39,15 @@ def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
 
 
 def _times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    """Return milliseconds of one design with the physics that the objective needs, and with all of it."""
-    works: list[Callable[[], object]] = []
-    if problem.load_terms:
-        exact = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
-        for fidelity, prune in ((choice.fidelity, True), (exact, False)):
-            # the time does not depend on the other decisions
-            fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
-            designs = prepare(fixed, prune)
-            works.append(partial(designs.objective_from_features, np.zeros((1, 1 + designs.columns))))
-    else:
-        needed_part = problem if choice.numbers[0] else replace(problem, points=())
-        works = [
-            lambda: objective_value(needed_part, evaluate(needed_part)),
-            lambda: objective_value(problem, evaluate(problem)),
-        ]
-    needed, whole = (1e3 * seconds(work) for work in works)
-    return needed, whole
+    # milliseconds of an evaluation with the physics that the objective needs, and with all of it
+    exact = problem.at(problem.fidelity.exact(problem.fidelity.samples))
+    needed = problem.at(choice.fidelity) if choice.numbers[0] else replace(problem, points=())
+    short, whole = (1e3 * timed(partial(_objective, variant))[1] for variant in (needed, exact))
+    return short, whole
+
+
+def _objective(problem: Problem) -> float:
+    return objective_value(problem, evaluate(problem))
 
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:

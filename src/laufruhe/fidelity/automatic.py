@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.errors import UncarriedLoadError, plural
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, signals
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, relative, signals
 from laufruhe.fidelity.options import has_gas
 from laufruhe.machine import Engine
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -24,14 +24,6 @@ SAMPLES = tuple(48 * k for k in (1, 2, 3, 4, 5, 6, 8, 10, 12, 15, 18, 20, 24, 30
 GAS_SAMPLES = (720, 1440, 2880, REFERENCE_SAMPLES)
 PHYSICS_SHARE, GAS_SHARE, PART_SHARE = 0.5, 0.25, 0.1
 """Fractions of the tolerance: for all omitted physics, for the gas samples, and for the omission of one part."""
-TRIED = (1e-2, 1e-3, 1e-4)
-"""Tolerances at which a trade, the comparison of fidelities, tries the automatic choice."""
-TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
-"""Names of variants of a trade that reports mention."""
-GAS_ORDERS = 12
-"""Last order of the gas in the variant of a trade with fewer orders of gas."""
-TIME_ORDERS, TIME_SAMPLES = 12, 360
-"""Orders and samples of the variant of a trade in the time domain; more orders take minutes."""
 
 
 @dataclass(frozen=True)
@@ -101,22 +93,15 @@ class Choice:
 
 
 def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engine | None = None) -> Choice:
-    """Return the cheapest fidelity whose relative error of the objective is within the tolerance (F10).
+    """Return the cheapest fidelity whose relative error of a design's objective is within the tolerance (F10).
 
-    The error is bounded at one design, by default that of the problem; this needs a reference that is exact enough. If
-    the objective is zero, all parts of the physics that are not zero are computed. An uneven crank speed stays uneven.
+    By default the design is that of the problem. If the objective is zero, all parts of the physics that are not zero
+    are computed. An uneven crank speed stays uneven.
     """
-    return choose_from_scale(ErrorReference.of(problem, engine), tolerance)
-
-
-def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
-    """Return the cheapest fidelity whose relative error is within a tolerance.
-
-    `scale` is the evaluation at exact fidelity to which errors are relative.
-    """
-    allowed_error = max(tolerance - scale.relative_reference_error, 0.0)
-    fidelity = _cheapest(scale, allowed_error, replace(scale.best.fidelity, tolerance=tolerance))
-    estimate = scale.relative_loss(fidelity) + scale.relative_sampling_error(fidelity) + scale.relative_reference_error
+    scale = ErrorReference.of(problem, engine)
+    doubt = relative(scale.doubt, scale.value)
+    fidelity = _cheapest(scale, max(tolerance - doubt, 0.0), replace(scale.best.fidelity, tolerance=tolerance))
+    estimate = scale.relative_change(fidelity) + doubt
     pruned = full = 0
     for term in scale.terms:
         spectra = signals(term.measure, scale.best)
@@ -137,7 +122,7 @@ def choose_from_scale(scale: ErrorReference, tolerance: float) -> Choice:
 
 def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelity) -> Fidelity:
     """Return the cheapest fidelity whose relative error from all options together is at most `allowed_error` (F10)."""
-    problem, loss = reference.problem, reference.relative_loss
+    problem, loss = reference.problem, reference.relative_change
     # at an uneven speed, gas and inertia affect all loads
     is_even = not fidelity.has_uneven_speed
     fidelity = replace(fidelity, gas_samples=REFERENCE_SAMPLES)
@@ -159,9 +144,7 @@ def _cheapest(reference: ErrorReference, allowed_error: float, fidelity: Fidelit
             is_sufficient = False
         fidelity = rigid if is_sufficient else _with_few_modes(reference, fidelity, PART_SHARE * allowed_error)
     if is_even:
-        lost, steps = loss(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
-        sampling_error = reference.relative_sampling_error
-        fidelity = _first(fidelity, "samples", steps, lambda f: lost + sampling_error(f) <= allowed_error)
+        fidelity = _first(fidelity, "samples", (*SAMPLES, REFERENCE_SAMPLES), lambda f: loss(f) <= allowed_error)
     return fidelity
 
 
@@ -183,12 +166,12 @@ def _with_few_modes(reference: ErrorReference, fidelity: Fidelity, allowed_loss:
 
     Modes that open rotors excite stay.
     """
-    maximum = reference.relative_loss(fidelity) + allowed_loss
+    maximum = reference.relative_change(fidelity) + allowed_loss
     result, modes = fidelity, reference.excited_modes
     for mode in sorted(set(modes) - reference.open_rotor_modes, key=lambda mode: reference.mode_contributions[mode]):
         modes = tuple(m for m in modes if m != mode)
         candidate = replace(fidelity, modes=modes)
-        if reference.relative_loss(candidate) > maximum:
+        if reference.relative_change(candidate) > maximum:
             break
         result = candidate
     return result
@@ -220,7 +203,7 @@ def _omitted_parts(reference: ErrorReference, fidelity: Fidelity) -> list[Omitte
 
     def omit(what: str, why: str, **restored: Any) -> None:
         whole = replace(fidelity, **restored)
-        share = reference.relative_loss(fidelity, reference.evaluation(whole))
+        share = reference.relative_change(fidelity, whole)
         parts.append(OmittedPart(what, why if share > 0.0 else "the objective does not count them", share, whole))
 
     for part in (ROD, GAS):
@@ -252,7 +235,7 @@ def _omitted_parts(reference: ErrorReference, fidelity: Fidelity) -> list[Omitte
         repeated = f"{reference.repeats - 1} of {reference.repeats} parts of the cycle"
         parts.append(OmittedPart(repeated, "the loads repeat after each"))
     finer = replace(fidelity, samples=REFERENCE_SAMPLES, gas_samples=fidelity.gas_steps)
-    share = reference.relative_sampling_error(fidelity) + reference.relative_sampling_error(finer)
+    share = reference.relative_change(fidelity, finer)
     between = f"angles between {fidelity.samples} steps"
     return [*parts, OmittedPart(between, "the force runs smoothly through them", share, finer)]
 
@@ -262,55 +245,3 @@ def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
     shapes = mounting.modes
     named = [f"{k} ({shapes.names[k - 1]}, {shapes.frequencies[k - 1]:.3g} Hz)" for k in modes]
     return f"{plural('mode', len(named))} {', '.join(named)}"
-
-
-def automatic(problem: Problem, tolerance: float, scale: ErrorReference | None = None) -> Problem:
-    """Return the problem at the cheapest fidelity within `tolerance`; `scale` is the reference if it is known."""
-    if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
-        # simulations have no error bound for omitted orders
-        return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    return problem.at(choose_from_scale(scale or ErrorReference.of(problem), tolerance).fidelity)
-
-
-def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
-    """Return the fidelities that `laufruhe trade` compares, as pairs (name, problem at this fidelity) (F13).
-
-    `scale` is the evaluation of the problem to which errors are relative.
-    """
-    problem, mounting = scale.problem, scale.mounting
-    has_gas = GAS.is_there(problem)
-    gas_samples = EXACT.samples if has_gas else None
-    variants = [
-        ("two-order, 48 steps", Fidelity("two-order", 48, gas_samples=gas_samples)),
-        (TWO_ORDER, Fidelity("two-order", 720)),
-    ]
-    if ROD.is_there(problem):
-        variants.append(("exact, rod of two masses, 720 steps", Fidelity(samples=720, **ROD.less)))
-    if has_gas:
-        variants.append((NO_GAS, Fidelity(samples=720, **GAS.less)))
-        variants.append((f"exact, gas to order {GAS_ORDERS}, 720 steps", Fidelity(samples=720, gas_orders=GAS_ORDERS)))
-    for orders, samples in ((4, 96), (8, 192), (24, 360)):
-        fidelity = Fidelity(samples=samples, orders=orders, gas_samples=gas_samples)
-        variants.append((f"orders to {orders}, {samples} steps", fidelity))
-    if any(term.measure.is_inside for term in scale.terms):
-        is_beam = problem.fidelity.crankshaft == "beam"
-        beam = "crankshaft as a beam", Fidelity(crankshaft="beam")
-        variants.append(("crankshaft cut", Fidelity()) if is_beam else beam)
-    if mounting is not None and scale.terms:
-        variants.append((RIGID, Fidelity(samples=720, mounts="rigid")))
-        cut, words = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
-        variants.append((f"{words}, {TIME_SAMPLES} steps", cut))
-        if mounting.dynamic.has_law:
-            variants.append((f"in time, {words}", replace(cut, mounts="time")))
-        # the one and the three modes of largest response
-        by_strength = sorted(scale.mode_contributions, key=lambda mode: -scale.mode_contributions[mode])
-        for count in (1, 3):
-            if count < len(by_strength):
-                modes = tuple(sorted(by_strength[:count]))
-                name = f"{plural('mode', len(modes))} {', '.join(map(str, modes))}, 720 steps"
-                variants.append((name, Fidelity(samples=720, modes=modes)))
-    variants += [(f"exact, {samples} steps", Fidelity(samples=samples)) for samples in (720, 1440, 2880)]
-    rungs = [(name, problem.at(fidelity)) for name, fidelity in variants]
-    if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
-        return [("mounts alone, no loads", replace(problem, points=())), *rungs]
-    return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance, scale)) for tolerance in TRIED]

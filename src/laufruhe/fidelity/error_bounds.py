@@ -1,7 +1,7 @@
-"""Proven bounds of the difference between a cheaper model and the reference (F6-F9).
+"""Errors of cheaper models and of samples, and what the omitted physics costs a decision (F6-F9, F16).
 
-A measure of a load is a norm. By the triangle inequality, omitting a part of a signal changes its norm by at most the
-norm of that part. The curvature of the signal bounds the sampling error of a mean or maximum.
+The error of one design is its change to a finer model, plus the doubt about that model. For all designs together the
+triangle inequality holds: omitting a part of a signal changes its norm by at most the norm of that part.
 """
 
 from __future__ import annotations
@@ -19,7 +19,15 @@ from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation, evaluate, value_of_loads, with_common_base
+from laufruhe.problem.dependence import keeps_omitted, open_kinds
+from laufruhe.problem.evaluation import (
+    Evaluation,
+    evaluate,
+    objective_value,
+    one_period,
+    value_of_loads,
+    with_common_base,
+)
 from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.problem import Problem
 
@@ -37,9 +45,7 @@ def reference(problem: Problem, engine: Engine | None = None, samples: int = REF
 
     The crank speed is uneven if it is in the problem. By default the design is that of the problem as given.
     """
-    fidelity = problem.fidelity
-    best = replace(EXACT, samples=samples, crank_inertia=fidelity.crank_inertia, crankshaft=fidelity.crankshaft)
-    return evaluate(replace(problem, fidelity=best), engine)
+    return evaluate(problem.at(problem.fidelity.exact(samples)), engine)
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
@@ -70,7 +76,8 @@ def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int
     if not measure.is_load:
         return 0.0
     shares = measure.shares([loads.point for loads in evaluation.loads])
-    return measure.norm.sampling_bound(signals(measure, evaluation), shares, evaluation.samples, finest)
+    spectra, steps = one_period(evaluation.engine.cycle.base_order, signals(measure, evaluation), evaluation.samples)
+    return measure.norm.sampling_bound(spectra, shares, steps, math.ceil(finest * steps / evaluation.samples))
 
 
 class ErrorReference:
@@ -90,8 +97,7 @@ class ErrorReference:
         self.problem, self.best = problem, best
         self.terms = [term for term in problem.objective if term.measure.is_load]
         self.value = value_of_loads(problem, best)
-        self._losses: dict[Fidelity, float] = {}
-        self._sampling_errors: dict[Fidelity, float] = {}
+        self._values: dict[Fidelity, float] = {}
 
     @classmethod
     def of(cls, problem: Problem, engine: Engine | None = None) -> ErrorReference:
@@ -102,66 +108,48 @@ class ErrorReference:
         """Return the evaluation of the same design at another fidelity."""
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
-    def largest_change(self, ours: Evaluation, theirs: Evaluation) -> float:
-        """Return an upper bound of the difference of the objective between two evaluations of one design (F6)."""
-        total = 0.0
-        for term in self.terms:
-            pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
-            left_out = [x + y.mapped(np.negative) for x, y in pairs]
-            # weight of each operating point, zero for points that do not count
-            shares = term.measure.shares([loads.point for loads in self.best.loads])
-            total += term.weight * term.measure.norm.upper_bound(left_out, shares)
-        return total
+    def value_at(self, fidelity: Fidelity) -> float:
+        """Return the objective of loads and masses of the same design at another fidelity [SI]."""
+        key = replace(fidelity, tolerance=None)
+        if key not in self._values:
+            self._values[key] = value_of_loads(self.problem, self.evaluation(key))
+        return self._values[key]
 
-    def sampling_error(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-        """Return an upper bound of the sampling error of the objective of an evaluation (F7, F8)."""
-        return sum(term.weight * measure_sampling_error(term.measure, evaluation, finest) for term in self.terms)
+    def relative_change(self, fidelity: Fidelity, other: Fidelity | None = None) -> float:
+        """Return the relative change of the objective between a fidelity and another one, by default the reference."""
+        value = self.value if other is None else self.value_at(other)
+        return relative(abs(self.value_at(fidelity) - value), self.value)
+
+    def sampling_error(self, evaluation: Evaluation) -> float:
+        """Return the sampling error of the objective of an evaluation (F7, F8)."""
+        return sum(term.weight * measure_sampling_error(term.measure, evaluation) for term in self.terms)
 
     @cached_property
     def gas_step_error(self) -> float:
-        """Upper bound of the error of the reference from the steps of the gas torque, in units of the objective (F9).
+        """Error of the objective of the reference from the steps of the gas torque (F9).
 
-        With kinks in closed form the error falls at least in proportion to the step. The change to half as many steps
-        is therefore at least the remaining error.
+        With kinks in closed form the error falls at least in proportion to the step. The largest change to a half and
+        to a third of the steps is therefore at least the remaining error.
         """
-        fidelity = self.best.fidelity
-        if all(fidelity.gas_of(loads.point) is None for loads in self.best.loads):
+        gas_steps = self.best.fidelity.gas_steps
+        still = replace(without_time(self.best.fidelity), samples=self.best.samples, gas_samples=gas_steps)
+        if all(still.gas_of(loads.point) is None for loads in self.best.loads):
             return 0.0
-        return self.largest_change(self.evaluation(replace(fidelity, gas_samples=fidelity.gas_steps // 2)), self.best)
+        coarser = (replace(still, gas_samples=gas_steps // times) for times in (2, 3))
+        return max(abs(self.value_at(fidelity) - self.value_at(still)) for fidelity in coarser)
 
-    @property
-    def relative_reference_error(self) -> float:
-        """Upper bound of the error of the reference itself, relative to its objective (F9)."""
-        return relative(self.gas_step_error, self.value) + ROUNDING
-
-    def relative_loss(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
-        """Return an upper bound of the relative change of the objective by a fidelity (F6).
-
-        The change is against the reference, or against the evaluation `than`.
-        """
-        if than is not None:
-            return relative(self.largest_change(self.evaluation(fidelity), than), self.value)
-        key = replace(fidelity, tolerance=None)
-        if key not in self._losses:
-            self._losses[key] = relative(self.largest_change(self.evaluation(key), self.best), self.value)
-        return self._losses[key]
-
-    def relative_sampling_error(self, fidelity: Fidelity) -> float:
-        """Return an upper bound of the relative sampling error of a fidelity (F7, F8)."""
-        key = replace(fidelity, tolerance=None)
-        if key not in self._sampling_errors:
-            self._sampling_errors[key] = relative(self.sampling_error(self.evaluation(key)), self.value)
-        return self._sampling_errors[key]
+    @cached_property
+    def doubt(self) -> float:
+        """Error of the reference itself, in the unit of the objective (F7-F9)."""
+        return self.sampling_error(self.best) + self.gas_step_error + ROUNDING * self.value
 
     def error_of(self, evaluation: Evaluation) -> float:
-        """Return an upper bound of the error of the objective of an evaluation of the same design (F6-F9).
+        """Return the error of the objective of an evaluation of the same design: change and doubt (F6).
 
         The error is relative to the objective of this evaluation, and infinite if only that objective is zero.
         """
         value = value_of_loads(self.problem, evaluation)
-        sampling_error = self.sampling_error(evaluation, self.best.samples)
-        bound = self.largest_change(evaluation, self.best) + sampling_error + self.gas_step_error
-        return relative(bound + ROUNDING * value, value)
+        return relative(abs(value - self.value) + self.doubt, value)
 
     @cached_property
     def repeats(self) -> int:
@@ -215,46 +203,93 @@ class ErrorReference:
 
     @cached_property
     def mode_contributions(self) -> dict[int, float]:
-        """Upper bound of the relative contribution of each excited mode to the objective (F6)."""
+        """Relative change of the objective without each excited mode."""
         other_modes = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
         return {
-            mode: self.relative_loss(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()
+            mode: self.relative_change(replace(self.best.fidelity, modes=modes)) for mode, modes in other_modes.items()
         }
 
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
-    """Return an upper bound of the relative error of the objective from samples of loads and gas (F7-F9).
+    """Return the relative error of the objective from samples of loads and gas (F7-F9a).
 
-    The physics is that of the fidelity of `evaluation`. The bound is infinite if only the objective is zero.
+    The physics is that of the fidelity of `evaluation`. The error is infinite if only the objective is zero.
     """
     scale = ErrorReference(problem, evaluation)
-    bound = scale.sampling_error(evaluation) + ROUNDING * scale.value
-    return relative(bound + sum(gas_sampling_errors(problem, evaluation)), scale.value)
+    steps = gas_step_bound(problem, evaluation) if evaluation.fidelity.has_uneven_speed else scale.gas_step_error
+    error = scale.sampling_error(evaluation) + steps + trace_error(problem, evaluation)
+    return relative(error + ROUNDING * scale.value, scale.value)
 
 
-def gas_sampling_errors(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
-    """Return upper bounds of the objective's errors from samples of the gas torque, and from trace points (F9, F9a).
+def _norm_of_change(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
+    pairs = zip(signals(measure, ours), signals(measure, theirs), strict=True)
+    shares = measure.shares([loads.point for loads in ours.loads])
+    return measure.norm.upper_bound([x + y.mapped(np.negative) for x, y in pairs], shares)
 
-    Both are in the unit of the objective, and the same for all designs, because unbalances do not change the gas.
+
+def largest_change(problem: Problem, ours: Evaluation, theirs: Evaluation) -> float:
+    """Return an upper bound of the change of the objective between two evaluations of a design [SI] (F6).
+
+    It is the norm of the difference of the loads. If this is the same for all designs, so is the bound.
     """
-    fidelity = evaluation.fidelity
+    terms = [term for term in problem.objective if term.measure.is_load]
+    return sum(term.weight * _norm_of_change(term.measure, ours, theirs) for term in terms)
+
+
+def regret_bound(problem: Problem, design: Evaluation, lower_bound: float) -> float | None:
+    """Return an upper bound of the relative excess of a design's exact objective over the best one (F16).
+
+    `lower_bound` is that of the objective at the fidelity of the problem [SI]. The result is None if the omitted loads
+    may differ between designs, if they change a limit, or if the bound says nothing.
+    """
+    fidelity, kinds = problem.fidelity, open_kinds(problem)
+    samples, steps = (max(count, EXACT.samples) for count in (design.samples, fidelity.gas_steps))
+    exact = replace(fidelity.exact(samples), gas_samples=steps)
+    evaluation = evaluate(problem.at(exact), design.engine)
+    omitted = 0.0
+    if exact != replace(fidelity, samples=samples, gas_samples=fidelity.gas_steps, tolerance=None):
+        terms, limits = ([part.measure for part in parts] for parts in (problem.objective, problem.limits))
+        if any(_norm_of_change(m, design, evaluation) > 0.0 if m.is_load else m.depends_on_loads for m in limits):
+            return None
+        if not all(m.is_mass or (m.is_load and keeps_omitted(m.channel, kinds, problem)) for m in terms):
+            return None
+        omitted = largest_change(problem, design, evaluation)
+    value, minimum = objective_value(problem, evaluation), lower_bound - omitted
+    return max(value / minimum - 1.0, 0.0) if minimum > 0.0 and math.isfinite(value) else None
+
+
+def without_time(fidelity: Fidelity) -> Fidelity:
+    """Return a fidelity with mounts in the frequency domain if it integrates them in time, which takes long."""
+    return replace(fidelity, mounts="frequency") if fidelity.mounts == "time" else fidelity
+
+
+def gas_step_bound(problem: Problem, evaluation: Evaluation) -> float:
+    """Return a bound of the error of the objective from gas samples, the same for all designs (F9).
+
+    Unbalances do not change the gas. The error at twice the steps is at most the change to twice the steps.
+    """
+    fidelity = without_time(evaluation.fidelity)
     if not (fidelity.has_uneven_speed or any(fidelity.gas_of(loads.point) for loads in evaluation.loads)):
-        return 0.0, 0.0
+        return 0.0
     scale = ErrorReference(problem, evaluation)
-    # mounts in the frequency domain, because integration in time takes long
-    still = replace(fidelity, mounts="frequency") if fidelity.mounts == "time" else fidelity
-    initial = evaluation if still is fidelity else scale.evaluation(still)
-    finer = replace(still, samples=2 * fidelity.samples, gas_samples=2 * fidelity.gas_steps)
-    # the error at twice the steps is at most the change to twice the steps
-    steps = 2.0 * scale.largest_change(initial, scale.evaluation(finer))
+    initial = evaluation if fidelity is evaluation.fidelity else scale.evaluation(fidelity)
+    finer = replace(fidelity, samples=2 * fidelity.samples, gas_samples=2 * fidelity.gas_steps)
+    return 2.0 * largest_change(problem, initial, scale.evaluation(finer))
+
+
+def trace_error(problem: Problem, evaluation: Evaluation) -> float:
+    """Return the error of the objective from the points of measured traces, the same for all designs (F9a)."""
+    fidelity = without_time(evaluation.fidelity)
     if not any(isinstance(fidelity.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
-        return steps, 0.0
+        return 0.0
+    initial = evaluation if fidelity is evaluation.fidelity else evaluate(problem.at(fidelity), evaluation.engine)
     changes, cycle = [], evaluation.engine.cycle
     for change in (lambda gas: _straight(gas, cycle), _thinned):
         points = tuple(replace(point, gas=change(fidelity.gas_of(point))) for point in problem.points)
-        changed = evaluate(replace(problem, points=points, fidelity=still), evaluation.engine)
-        changes.append(sum(term.weight * _norm_of_difference(term.measure, initial, changed) for term in scale.terms))
-    return steps, min(changes)
+        changed = evaluate(replace(problem, points=points, fidelity=fidelity), evaluation.engine)
+        terms = ErrorReference(problem, evaluation).terms
+        changes.append(sum(term.weight * _norm_of_difference(term.measure, initial, changed) for term in terms))
+    return min(changes)
 
 
 def _norm_of_difference(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
-from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE, automatic
+from laufruhe.fidelity.automatic import DEFAULT_TOLERANCE
 from laufruhe.fidelity.options import OPTIONS
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
@@ -32,7 +32,7 @@ class FidelityTable(Table):
     closed: ClassVar[str] = "sets the accuracy of the computation, not the engine"
 
     kinematics: Literal["exact", "two-order", "auto"] = f.optional(
-        "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",
+        "Motion of the pistons; auto is exact, and takes fewer samples for many designs.",
         "exact",
     )
     tolerance: f.Tolerance | None = f.optional("Relative error of the objective that auto may make.")
@@ -65,5 +65,4 @@ def with_fidelity(problem: Problem, table: FidelityTable) -> Problem:
         fidelity = replace(EXACT, **values)
     except ChoiceError as error:
         raise Refused(f"fidelity.{error.key}", getattr(table, error.key), error.rule, error.remedy) from None
-    problem = replace(problem, fidelity=fidelity)
-    return automatic(problem, table.tolerance or DEFAULT_TOLERANCE) if is_auto else problem
+    return problem.at(replace(fidelity, tolerance=(table.tolerance or DEFAULT_TOLERANCE) if is_auto else None))

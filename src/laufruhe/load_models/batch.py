@@ -24,6 +24,12 @@ from laufruhe.problem.problem import Problem
 CACHE_BYTES = 1 << 19
 """Size of the block of rows that one thread works on [bytes]."""
 _MIN_BLOCK = 16
+CHECKED, FEW_DESIGNS = 32, 3000
+"""Number of designs of a batch whose exact objectives decide how many samples an automatic fidelity takes, and number
+of designs below which deciding takes longer than it saves."""
+FEWEST, GROWTH, SHARE = 24, 1.5, 0.5
+"""Fewest samples of a period, least factor between two numbers of samples, and share of the tolerance that the error
+of checked designs may take."""
 _PARTS_OF_COMPLEX = 2
 
 
@@ -35,11 +41,51 @@ class BatchNorm:
     ----------
     rows
         Coefficients R of k load rows, shape (components, features, k).
+    source
+        Norm of the load rows before equal rows are merged; None if no samples may be left out.
     """
 
     norm: Norm
     rows: Array
     grid: Grid
+    source: AffineNorm | None = None
+
+    @classmethod
+    def merged(cls, norm: Norm, rows: Array, weights: Array, source: AffineNorm | None = None) -> BatchNorm:
+        """Return a norm of rows, shape (components, features, k), in which equal rows are merged."""
+        rows, weights = _merged(rows, weights)
+        return cls(norm, np.ascontiguousarray(rows), Grid(weights, len(weights)), source)
+
+    @cached_property
+    def coarser(self) -> tuple[BatchNorm, ...]:
+        """The same norm at fewer samples, fewest first."""
+        if self.source is None or self.source.grid.kinks:
+            return ()
+        steps, rows, weights = self.source.grid.steps, feature_rows(self.source), self.source.grid.weights
+        norms, count = list[BatchNorm](), 0.0
+        for samples in (n for n in range(FEWEST, steps) if steps % n == 0):
+            if samples >= GROWTH * count:
+                count, times = samples, steps // samples
+                norms.append(BatchNorm.merged(self.norm, rows[:, :, ::times], times * weights[::times]))
+        return tuple(norms)
+
+    def values_within(self, tolerance: float, features: Array, threads: int = 1) -> Array:
+        """Return the norm of each design as `values` does, to a relative error of `tolerance` (F11).
+
+        Fewer samples are taken if designs spread over the batch, and the smallest norms, stay within the tolerance.
+        """
+        if len(features) < FEW_DESIGNS or not tolerance:
+            return self.values(features, threads)
+        spread = features[:: len(features) // CHECKED]
+        exact = self.values(spread)
+        for norm in self.coarser:
+            if np.all(np.abs(norm.values(spread) - exact) <= SHARE * tolerance * exact):
+                norms = norm.values(features, threads)
+                smallest = np.argpartition(norms, CHECKED)[:CHECKED]
+                exact_smallest = self.values(features[smallest])
+                if np.all(np.abs(norms[smallest] - exact_smallest) <= SHARE * tolerance * exact_smallest):
+                    return norms
+        return self.values(features, threads)
 
     def values(self, features: Array, threads: int = 1) -> Array:
         """Return the norm of a load for many designs, shape (designs,).
@@ -104,6 +150,11 @@ class Designs:
     model: AffineModel
     norms: Mapping[Measure, BatchNorm]
 
+    @property
+    def tolerance(self) -> float:
+        """Relative error that the objective may have: that of an automatic fidelity, or zero."""
+        return self.model.problem.fidelity.tolerance or 0.0
+
     def objective(self, values: Array | ComplexArray, threads: int = 1) -> Array:
         """Return the objective of each design, shape (designs,), from complex values (designs, decisions) (C4)."""
         return self.objective_from_features(self.features(values), threads)
@@ -130,13 +181,16 @@ class Designs:
         """
         total = np.zeros(len(features))
         for term in self.model.problem.objective:
-            total += term.weight * self.values(term.measure, features, threads)
+            total += term.weight * self.values(term.measure, features, threads, self.tolerance)
         return total
 
-    def values(self, measure: Measure, features: Array, threads: int = 1) -> Array:
-        """Return a measure of each design [SI], shape (designs,); numbers of the mounting are equal for all."""
+    def values(self, measure: Measure, features: Array, threads: int = 1, tolerance: float = 0.0) -> Array:
+        """Return a measure of each design [SI], shape (designs,), to a relative error of `tolerance`.
+
+        Numbers of the mounting are equal for all.
+        """
         if measure in self.norms:
-            return self.norms[measure].values(features, threads)
+            return self.norms[measure].values_within(tolerance, features, threads)
         return np.full(len(features), self.model.bare.value(measure))
 
     def slack(self, limit: Limit, values: Array) -> Array:
@@ -173,11 +227,10 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
     def batched(measure: Measure) -> BatchNorm:
         # peaks have the finer samples of the exact evaluation (M6)
         norm = model.norm(measure, samples * (measure.norm.refinement if measure.is_load else 1))
-        rows, grid = feature_rows(norm), norm.grid
+        rows = feature_rows(norm)
         if prune and norm.norm.is_monotone_in_lengths:
-            rows, weights = _merged(rows, grid.weights)
-            grid = Grid(weights, len(weights))
-        return BatchNorm(norm.norm, np.ascontiguousarray(rows), grid)
+            return BatchNorm.merged(norm.norm, rows, norm.grid.weights, norm)
+        return BatchNorm(norm.norm, np.ascontiguousarray(rows), norm.grid)
 
     measures = [term.measure for term in problem.load_terms] + [limit.measure for limit in problem.load_limits]
     return Designs(model, {measure: batched(measure) for measure in measures})

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from laufruhe.errors import ModelError
@@ -89,6 +89,15 @@ class Fidelity:
             raise ChoiceError("modes", modes, "need mounts in the frequency domain", "leave one of the two out")
         if len(set(modes)) != len(modes) or not all(1 <= mode <= MODES for mode in modes):
             raise ChoiceError("modes", modes, f"must be different numbers from 1 to {MODES}", "1 is the lowest mode")
+
+    def exact(self, samples: int) -> Fidelity:
+        """Return the fidelity with all physics, for the same crankshaft model and inertia of the crank."""
+        return replace(EXACT, samples=samples, crank_inertia=self.crank_inertia, crankshaft=self.crankshaft)
+
+    @property
+    def is_exact(self) -> bool:
+        """True if no physics is left out."""
+        return self == replace(self.exact(self.samples), gas_samples=self.gas_samples, tolerance=self.tolerance)
 
     @property
     def has_uneven_speed(self) -> bool:

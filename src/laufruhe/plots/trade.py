@@ -1,23 +1,22 @@
-"""Time against error of every fidelity, its regret as colour."""
+"""Time of the calls of users at every fidelity against regret and error."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import prepare
-from laufruhe.plots.style import Page, heading, page, styled
+from laufruhe.plots.style import BLUE, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
-from laufruhe.studies.trade import Trade, TradeRow
+from laufruhe.studies.trade import DESIGNS, Trade
 
-MIN_ERROR, MIN_REGRET = 1e-7, 1e-8
+MIN_ERROR = 1e-7
 PANEL, DOT = (5.4, 4.4), 0.13
 """Width and height of the panel, and room of a dot [inch]."""
 NAME_HEIGHT = 0.036
@@ -33,56 +32,83 @@ def _power(value: float) -> str:
     return typeset(f"10^{exponent}") if exponent < -3 and math.isclose(value, 10.0**exponent) else f"{value:g}"
 
 
+@dataclass(frozen=True)
+class _Panel:
+    """Times [s] of fidelities, what they are off by, and bounds of that, NaN where nothing is known."""
+
+    x: str
+    y: str
+    names: tuple[str, ...]
+    times: Array
+    errors: Array
+    bounds: Array
+
+
+def _panels(trade: Trade) -> list[_Panel]:
+    nan, rows = math.nan, trade.rows
+    regrets = [(row.name, row.solve, row.regret if row.decides else nan, row.regret_bound) for row in rows]
+    kinds = [("time of one solve [s]", "regret of the design", regrets)]
+    values = [(row.name, row.evaluation, row.error, row.estimate) for row in rows]
+    if all(math.isnan(regret) for *_, regret, _ in regrets):
+        kinds = [("time of one evaluation [s]", "relative error of the objective", values)]
+    batches = [(row.name, row.batch, row.batch_error, nan) for row in rows]
+    kinds.append((f"time of {DESIGNS:,} designs [s]", "largest relative error of a design", batches))
+    panels = []
+    for x, y, numbers in kinds:
+        known = [row for row in numbers if math.isfinite(row[1]) and math.isfinite(row[2])]
+        if known:
+            names, times, errors, bounds = zip(*known, strict=True)
+            panels.append(_Panel(x, y, names, np.array(times), np.maximum(errors, 0.0), np.array(bounds)))
+    return panels
+
+
 def has_picture(trade: Trade) -> bool:
     """Return True if the fidelities differ in more than time."""
-    return any(row.error > 0.0 for row in trade.rows)
+    return any(panel.errors.max() > 0.0 for panel in _panels(trade))
 
 
 def figure(trade: Trade) -> Figure:
-    """Draw evaluation time against error, the Pareto front joined."""
+    """Draw the time of each call against what a fidelity is off by, the Pareto front joined."""
     prepare([trade.problem.title])
     return _drawn(trade)
 
 
 @styled()
 def _drawn(trade: Trade) -> Figure:
-    sheet = page(1, 1, PANEL)
-    axes, rows = sheet.panels[0], trade.rows
-    times = np.array([1e6 * row.evaluation for row in rows])
-    axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
-    axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
-    errors = _places(axes, np.array([row.error for row in rows]), times)
-    front: list[TradeRow] = []
-    for row in sorted(rows, key=lambda row: (row.evaluation, row.error)):
-        if not front or row.error < front[-1].error:
-            front.append(row)
-    joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= MIN_ERROR)
-    axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
-    decides = np.array([row.decides and not math.isnan(row.regret) for row in rows])
-    axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
-    regrets = [max(row.regret, MIN_REGRET) for row, is_drawn in zip(rows, decides, strict=True) if is_drawn]
-    dots = axes.scatter(
-        times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(MIN_REGRET, 1.0), s=55, zorder=3,
-        edgecolors=INK, linewidths=0.5,
+    panels = _panels(trade)
+    sheet = page(len(panels), 1, PANEL, gap=0.9)
+    for axes, panel in zip(sheet.panels, panels, strict=True):
+        _draw(axes, panel)
+    heading(
+        sheet.figure, "Speed against accuracy", "Every fidelity: processor time of the calls that users make.", [],
+        "Line: fidelities that no other beats in both. Thin line upwards: bound that the call states. "
+        "Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip
+    return sheet.figure
+
+
+def _draw(axes: Axes, panel: _Panel) -> None:
+    times = panel.times
+    axes.set(xscale="log", yscale="log", xlabel=panel.x, ylabel=panel.y)
+    axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
+    errors = _places(axes, panel.errors, times)
+    front: list[int] = []
+    for k in np.lexsort((panel.errors, times)):
+        if not front or panel.errors[k] < panel.errors[front[-1]]:
+            front.append(int(k))
+    joined = [k for k in front if panel.errors[k] >= MIN_ERROR]
+    axes.plot(times[joined], errors[joined], color=FAINT, lw=1.1, zorder=2)
+    axes.vlines(times, errors, np.fmax(errors, np.minimum(panel.bounds, axes.get_ylim()[1])), color=BLUE, lw=0.8)
+    axes.scatter(times, errors, s=45, zorder=3, color=BLUE, edgecolors=INK, linewidths=0.5)
     if times.max() < _FEW_DECADES * times.min():
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
     # the band under the axis has its own label
-    minimum = 1.01 * MIN_ERROR if min(row.error for row in rows) < MIN_ERROR else 0.0
+    minimum = 1.01 * MIN_ERROR if panel.errors.min() < MIN_ERROR else 0.0
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > minimum else ""))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
-    _name(axes, rows, times, errors)
-    if regrets:
-        _colour_bar(sheet, dots)
-    hollow = "" if decides.all() else " Hollow: no design, or one beyond a limit."
-    heading(
-        sheet.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
-        f"Line: fidelities that no other beats in time and error. Regrets below {_power(MIN_REGRET)} are drawn there."
-        f"{hollow} Computed with Laufruhe.", trade.problem.title,
-    )  # fmt: skip
-    return sheet.figure
+    _name(axes, panel.names, times, errors)
 
 
 def _places(axes: Axes, errors: Array, times: Array) -> Array:
@@ -108,21 +134,12 @@ def _places(axes: Axes, errors: Array, times: Array) -> Array:
     return np.where(small, minimum * 10.0 ** (-decades * DOT * (levels + 0.75)), errors)
 
 
-def _colour_bar(drawn: Page, dots: PathCollection) -> None:
-    place, high = drawn.panels[0].get_position(), drawn.figure.get_size_inches()[1]
-    above = drawn.figure.add_axes((place.x0 + 0.3 * place.width, place.y1 + 0.3 / high, 0.7 * place.width, 0.1 / high))
-    bar = drawn.figure.colorbar(dots, cax=above, orientation="horizontal", format=_PLAIN)
-    bar.ax.tick_params(labelsize=SMALL, which="major")
-    bar.ax.minorticks_off()
-    bar.ax.text(-0.02, 0.5, "regret of its optimum", transform=bar.ax.transAxes, ha="right", va="center", fontsize=9)
-
-
-def _name(axes: Axes, rows: tuple[TradeRow, ...], times: Array, errors: Array) -> None:
+def _name(axes: Axes, names: tuple[str, ...], times: Array, errors: Array) -> None:
     (left, right), (low, high) = (np.log10(side) for side in (axes.get_xlim(), axes.get_ylim()))
     # of dots at one height, the nearest to the names gets the lowest name, so that no line crosses another name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
     across = (np.log10(times) - left) / (right - left)
-    for row, x, y, height in zip(rows, across, heights, spread(heights, NAME_HEIGHT), strict=True):
+    for name, x, y, height in zip(names, across, heights, spread(heights, NAME_HEIGHT), strict=True):
         axes.plot([x, _NAMES - 0.005], [y, height], transform=axes.transAxes, color="#c4c4c4", lw=0.6, zorder=1,
                   clip_on=False)  # fmt: skip
-        axes.text(_NAMES, height, row.name, transform=axes.transAxes, size=SMALL, va="center", color=INK, zorder=1)
+        axes.text(_NAMES, height, name, transform=axes.transAxes, size=SMALL, va="center", color=INK, zorder=1)

@@ -12,6 +12,7 @@ from enum import StrEnum
 
 from laufruhe.errors import ModelError
 from laufruhe.extension import extensions, objects
+from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.channels import CHANNELS, Channel
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.problem import Problem
@@ -170,6 +171,18 @@ def open_kinds(problem: Problem) -> frozenset[Kind]:
 def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
     """Return True if a channel may change with decisions of these kinds; UNKNOWN counts as a change."""
     return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)
+
+
+def keeps_omitted(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
+    """Return True if the loads that the fidelity omits are the same whatever these kinds of decisions are (F16).
+
+    Every fidelity keeps the loads of rotors. Other mounts, or an uneven speed, change what they do.
+    """
+    fidelity = problem.fidelity
+    same = fidelity.mounts == EXACT.mounts and fidelity.modes is None and not fidelity.has_uneven_speed
+    of_rotors = (Kind.UNBALANCE, Kind.PLACE) if same else ()
+    entries = ((kind, dependence(channel, kind, problem)) for kind in kinds)
+    return all(x is Dependence.NONE or (kind in of_rotors and x is not Dependence.UNKNOWN) for kind, x in entries)
 
 
 def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:

@@ -86,7 +86,7 @@ class Evaluation(EvaluatedDesign):
             signals = [signal.series for signal in signals]
         # signals that repeat within the cycle need one period only
         base = self.engine.cycle.base_order
-        periodic, samples = _one_period(base, signals, measure.norm.refinement * self.samples)
+        periodic, samples = one_period(base, signals, measure.norm.refinement * self.samples)
         with np.errstate(invalid="ignore" if self.resonance else None):
             value = load_rows(measure, [loads.point for loads in self.loads], periodic, self.engine, samples).value
         return (value if math.isfinite(value) or not self.resonance else math.inf,)
@@ -237,7 +237,7 @@ def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_
     signal = channel.signal(evaluation.loads[k])
     if not np.all(np.isfinite(signal.coefficients)):
         return [CycleMeasures(math.inf, math.inf, math.inf)] * signal.coefficients.shape[1]
-    (periodic,), samples = _one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
+    (periodic,), samples = one_period(evaluation.engine.cycle.base_order, [signal], BETWEEN * evaluation.samples)
     fine, coarse = (lengths(part.sample(samples)) for part in (periodic, periodic.series))
     top = np.maximum(fine.max(axis=0), lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0))
     cached[k, channel] = [
@@ -247,8 +247,8 @@ def place_measures(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_
     return cached[k, channel]
 
 
-def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
-    # signals over their common period, and the number of samples in it
+def one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
+    """Return signals over their common period, and the number of samples in it of `samples` over the cycle."""
     period_base = common_base([signal.repeat_order() for signal in signals])
     periods = period_base / base
     if periods.denominator > 1 or samples % periods.numerator:

@@ -93,6 +93,11 @@ class Measure(MeasureQuery):
         return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.depends_on_loads)
 
     @property
+    def depends_on_loads(self) -> bool:
+        """True if the measure may depend on loads of pistons, rods and gas."""
+        return not self.is_mass and (self.channel.depends_on_loads or self.channel.depends_on_torque)
+
+    @property
     def is_cylinder_resolved(self) -> bool:
         """True for a number of the crankshaft's torsion, which is no sum over the cylinders."""
         return self.channel.depends_on_loads and self.channel.is_number and not self.is_mounting

@@ -41,7 +41,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     lines += [
         "Cost:",
         f"  {pruned} of {exact} samples of force components{ratio}",
-        f"  one more design: {trimmed(milliseconds[0], 3)} ms; with exact physics: {trimmed(milliseconds[1], 3)} ms",
+        f"  one evaluation: {trimmed(milliseconds[0], 3)} ms; with exact physics: {trimmed(milliseconds[1], 3)} ms",
     ]
     return "\n".join(lines) + "\n"
 

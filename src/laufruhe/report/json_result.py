@@ -95,7 +95,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
             "measured_at": result.final.samples,
-            "error_estimate": result.error_estimate,
+            **_attributes(result, "error_estimate regret_bound"),
         },
         "timing": dict(result.timing),
         "versions": versions(),

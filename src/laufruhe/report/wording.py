@@ -91,10 +91,13 @@ def fidelity_of(result: Result) -> str:
     text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
         return text
-    chosen = "" if f.tolerance is None else f" Chosen for an error of {f.tolerance:g}."
-    if result.error_estimate < NEGLIGIBLE:
-        return f"{text}{chosen} Numerical error of the objective: negligible."
-    return f"{text}{chosen} Numerical error of the objective: at most {100.0 * result.error_estimate:.1g} %."
+    if f.tolerance is not None:
+        text += f" Chosen for an error of {f.tolerance:g}."
+    error = "negligible" if result.error_estimate < NEGLIGIBLE else f"at most {100.0 * result.error_estimate:.1g} %"
+    text += f" Numerical error of the objective: {error}."
+    if result.regret_bound is None or f.is_exact:
+        return text
+    return f"{text} By exact physics, the best design is better by at most {100.0 * result.regret_bound:.2g} %."
 
 
 def fired(result: Result) -> str:

@@ -200,9 +200,10 @@ def _fill(numbers: Array, rows: Indices, problem: Problem, others: Sequence[int]
         # evaluations one by one name the reason
         return False
     features = designs.features(np.delete(values[rows], others, axis=1))
-    columns = [designs.values(measure, features) for measure in _measures(problem)]
-    limits = zip(problem.limits, columns[len(problem.objective) :], strict=True)
-    numbers[rows] = np.stack([*columns, *(designs.slack(limit, column) for limit, column in limits)], axis=1)
+    terms = [designs.values(term.measure, features, tolerance=designs.tolerance) for term in problem.objective]
+    limits = [designs.values(limit.measure, features) for limit in problem.limits]
+    slack = [designs.slack(limit, column) for limit, column in zip(problem.limits, limits, strict=True)]
+    numbers[rows] = np.stack([*terms, *limits, *slack], axis=1)
     return True
 
 

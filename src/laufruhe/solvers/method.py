@@ -61,7 +61,7 @@ class Method:
     solver
         Return the best design with its certificate; `imported` returns one whose module is imported when it is called.
     refines_fidelity
-        True if a better fidelity is chosen when the design needs it (F11).
+        True if more steps of the gas are taken when the design needs them (F9).
     known_channels
         Channels with formulas of its own, for any dependence but UNKNOWN.
     accepts_norm
@@ -116,5 +116,5 @@ class Method:
         return all(value is Dependence.NONE or value in self.dependences[kind] for kind, value in by_kind.items())
 
     def solve(self, problem: Problem) -> Result:
-        """Return the best design, with a better fidelity if the design needs it (F11)."""
+        """Return the best design, with more steps of the gas if the design needs them (F9)."""
         return solve_accurately(problem, self.solver) if self.refines_fidelity else self.solver(problem)

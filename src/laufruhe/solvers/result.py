@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from laufruhe.errors import LaufruheWarning, ModelError
+from laufruhe.fidelity.error_bounds import regret_bound
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
@@ -186,6 +187,13 @@ class Result(ResultContent):
     def error_estimate(self) -> float:
         """Relative error of the objective from sampling the cycle, computed at first use."""
         return self.error()
+
+    @cached_property
+    def regret_bound(self) -> float | None:
+        """Largest relative excess of the exact objective of the design over the best one; None if unknown (F16)."""
+        if self.objective is None or self.certificate is None or self.details is not None:
+            return None
+        return regret_bound(self.problem, self.final, self.certificate.lower_bound)
 
     @property
     def designs(self) -> dict[str, Evaluation]:

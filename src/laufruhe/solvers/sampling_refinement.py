@@ -128,12 +128,18 @@ def sampling_overestimate(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _gap_disagreement(result: Result) -> float:
-    """Return the sampling error of the objective over its tolerance, if it changes the proof, else zero."""
+    """Return the sampling error of the objective in tolerances if the file forbids it or the proof changes, else zero.
+
+    An automatic fidelity states the error that it allows (F11).
+    """
     problem, proof, objective = result.problem, result.certificate, result.objective
     if proof is None or objective is None or not result.status.has_design or not problem.search.proves:
         return 0.0
     excess = _sampling_error(problem, result.measured)
     value = objective.value - excess
+    demanded = problem.fidelity.tolerance
+    if demanded is not None and abs(excess) > demanded * value:
+        return max(abs(excess) / (demanded * value), LARGE_ERROR) if value > 0.0 else LARGE_ERROR
     if abs(excess) <= SMALL_ERROR * problem.tolerance * value:
         return 0.0
     zero_level = numerical_zero(problem, result.final.engine)

@@ -1,4 +1,4 @@
-"""Speed against accuracy of every fidelity, measured on one problem (F13, F14)."""
+"""Speed against accuracy of every fidelity, measured by the calls that users make (F13, F14)."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ import tracemalloc
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
-from laufruhe.errors import ModelError, SolverError
-from laufruhe.fidelity.automatic import TIME_ORDERS, TIME_SAMPLES, ladder
+from laufruhe.errors import ModelError, SolverError, plural
+from laufruhe.fidelity.automatic import GAS, ROD
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, ErrorReference, reference
-from laufruhe.load_models.affine import AffineModel
-from laufruhe.machine import Engine
+from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import is_time_over
 from laufruhe.numerics.workers import SERIAL, working_on
-from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.steady_state import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
@@ -27,49 +27,65 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers import evaluate_only, solve
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.warm_start import first_search, is_convex, reoptimise, solve_by_cones
+from laufruhe.studies.swept import solve_scene
 
-REFERENCE_STEPS = 1440
-"""Steps over the period for the optimum from which a regret is measured."""
+T = TypeVar("T")
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
 KEEPS = 1e-3
 """Largest relative violation of a limit, at the reference, with which a design counts as a decision."""
-_MIN_TIME, _LONG, _MAX_REPEATS = 0.02, 0.1, 50
+DESIGNS = 10_000
+"""Number of designs of the batch."""
+FASTER = 1.01
+"""Factor on the speed at every operating point of the scene that stands for those of a sweep."""
+TRIED = (1e-2, 1e-3, 1e-4)
+"""Tolerances at which a trade tries the automatic choice."""
+TWO_ORDER, NO_GAS, RIGID = "two-order, 720 steps", "exact without gas, 720 steps", "rigid mounts, 720 steps"
+"""Names of fidelities that reports mention."""
+GAS_ORDERS = 12
+"""Last order of the gas in the fidelity with fewer orders of gas."""
+TIME_ORDERS, TIME_SAMPLES = 12, 360
+"""Orders and samples in the time domain; more orders take minutes."""
+_REPEATED, _MAX_REPEATS, _LONG = 0.3, 50, 2.0
+"""Time [s] and number of calls after which a call is not repeated, and time of a solve that is made once only."""
 
 
 @dataclass(frozen=True)
 class TradeRow:
-    """Measurements of one fidelity on one problem.
+    """Measurements of one fidelity on one problem; NaN where a call is not possible, or takes too long to repeat.
 
     Attributes
     ----------
     error, estimate
-        Error of the objective of the initial design relative to the reference, and its bound.
-    evaluation, gradient, solve, fresh
-        Times [s]: the objective of another design with the problem prepared (with all preparation if that is not
-        possible), the same with its gradient, an optimum (processor time), and the objective with all preparation.
-        NaN where nothing is open, or this fidelity cannot decide the problem.
+        Error of the objective of the initial design relative to the reference, and its estimate.
+    evaluation, solve, scene, batch
+        Processor time [s] of `evaluate`, of `solve`, of a scene of a sweep, and of `DESIGNS` designs in one batch,
+        all with preparation.
+    batch_error
+        Largest relative error of the objective of a design of the batch.
     memory
-        Largest memory of an evaluation with all preparation [byte].
+        Largest memory of `solve`, or of `evaluate` if nothing is open, by tracemalloc [byte].
     optimum, violation
         Reference objective of the design that this fidelity decides, and the largest relative violation of a limit by
-        this design at the reference; NaN as above.
-    regret
-        Relative excess of `optimum` over the best known objective; NaN as above, and for an objective of zero.
+        this design at the reference.
+    regret, regret_bound
+        Relative excess of `optimum` over the best known objective, and the bound that `solve` states.
     """
 
     name: str
     error: float
     estimate: float
     evaluation: float
-    gradient: float
     solve: float
-    fresh: float
-    memory: int
+    scene: float
+    batch: float
+    batch_error: float
+    memory: float
     optimum: float
     violation: float
+    regret_bound: float
     regret: float = math.nan
 
     @property
@@ -128,31 +144,78 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     if len(problem.ranks) > 1:
         left_out.insert(0, f"The trade takes the first of {len(problem.ranks)} objectives.")
     problem = traded_part(problem)
-    scale = ErrorReference.of(problem)
-    say("solving the reference")
-    decided = _Decided(scale)
-    rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], TradeRow]()
-    for name, variant in ladder(scale):
-        say(name)
-        # several tolerances may select the same physics
-        physics = replace(variant.fidelity, tolerance=None), len(variant.points)
-        row = replace(measured[physics], name=name) if physics in measured else _row(name, variant, scale, decided)
-        measured[physics] = row
-        if is_time_over():
-            # a time limit may have cut the last row short
-            break
-        rows.append(row)
-    else:
-        is_complete = True
+    scale, rows, is_complete = ErrorReference.of(problem), list[TradeRow](), False
+    batch = Batch(problem)
+    with working_on(SERIAL):
+        for name, variant in ladder(scale):
+            say(name)
+            row = measured(name, variant, scale, batch)
+            if is_time_over():
+                # a time limit may have cut the last row short
+                break
+            rows.append(row)
+        else:
+            is_complete = True
     if not rows:
         raise SolverError("the time limit ended before any fidelity was measured; raise the time limit")
     say("uneven crank speed")
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
-    return Trade(
-        problem, tuple(decided.regretted(row) for row in rows), decided.initial_value, decided.minimum, flywheel,
-        _price_of_time(problem), tuple(left_out), is_complete,
-    )  # fmt: skip
+    minimum = min((row.optimum for row in rows if row.violation <= FEASIBLE), default=math.nan)
+    if minimum <= numerical_zero(problem):
+        # a zero objective has no relative regret
+        minimum = 0.0
+    elif minimum > 0.0:
+        rows = [replace(row, regret=row.optimum / minimum - 1.0) for row in rows]
+    value = objective_value(problem, scale.best)
+    return Trade(problem, tuple(rows), value, minimum, flywheel, _price_of_time(problem), tuple(left_out), is_complete)
+
+
+def ladder(scale: ErrorReference) -> list[tuple[str, Problem]]:
+    """Return the fidelities that a trade compares, as pairs (name, problem at this fidelity) (F13).
+
+    `scale` is the reference of the problem.
+    """
+    problem, mounting = scale.problem, scale.mounting
+    has_gas = GAS.is_there(problem)
+    gas_samples = EXACT.samples if has_gas else None
+    variants = [
+        ("two-order, 48 steps", Fidelity("two-order", 48, gas_samples=gas_samples)),
+        (TWO_ORDER, Fidelity("two-order", 720)),
+    ]
+    if ROD.is_there(problem):
+        variants.append(("exact, rod of two masses, 720 steps", Fidelity(samples=720, **ROD.less)))
+    if has_gas:
+        variants.append((NO_GAS, Fidelity(samples=720, **GAS.less)))
+        variants.append((f"exact, gas to order {GAS_ORDERS}, 720 steps", Fidelity(samples=720, gas_orders=GAS_ORDERS)))
+    for orders, samples in ((4, 96), (8, 192), (24, 360)):
+        fidelity = Fidelity(samples=samples, orders=orders, gas_samples=gas_samples)
+        variants.append((f"orders to {orders}, {samples} steps", fidelity))
+    if any(term.measure.is_inside for term in scale.terms):
+        is_beam = problem.fidelity.crankshaft == "beam"
+        beam = "crankshaft as a beam", Fidelity(crankshaft="beam")
+        variants.append(("crankshaft cut", Fidelity()) if is_beam else beam)
+    if mounting is not None and scale.terms:
+        variants.append((RIGID, Fidelity(samples=720, mounts="rigid")))
+        cut, words = Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS), f"orders to {TIME_ORDERS}"
+        variants.append((f"{words}, {TIME_SAMPLES} steps", cut))
+        if mounting.dynamic.has_law:
+            variants.append((f"in time, {words}", replace(cut, mounts="time")))
+        # the one and the three modes of largest response
+        by_strength = sorted(scale.mode_contributions, key=lambda mode: -scale.mode_contributions[mode])
+        for count in (1, 3):
+            if count < len(by_strength):
+                modes = tuple(sorted(by_strength[:count]))
+                name = f"{plural('mode', len(modes))} {', '.join(map(str, modes))}, 720 steps"
+                variants.append((name, Fidelity(samples=720, modes=modes)))
+    variants += [(f"exact, {samples} steps", Fidelity(samples=samples)) for samples in (720, 1440, 2880)]
+    rungs = [(name, problem.at(fidelity)) for name, fidelity in variants]
+    if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
+        return [("mounts alone, no loads", replace(problem, points=())), *rungs]
+    return [
+        *rungs,
+        *((f"auto {tolerance:g}", problem.at(replace(EXACT, tolerance=tolerance))) for tolerance in TRIED),
+    ]
 
 
 def traded_part(problem: Problem) -> Problem:
@@ -165,120 +228,81 @@ def is_open(problem: Problem) -> bool:
     return bool(problem.decisions or problem.phasing)
 
 
-def is_local(problem: Problem) -> bool:
-    """Return True if the optimum may be one of many, and is searched for."""
-    return is_open(problem) and not is_convex(problem)
-
-
 def effort(problem: Problem) -> tuple[bool, int]:
-    """Return a sort key for the duration of a trade: searches last, then by the number of decisions."""
-    return is_local(problem), len(problem.decisions)
+    """Return a sort key for the duration of a trade: open stars and mounts last, then by the number of decisions."""
+    return problem.phasing is not None or bool(problem.mount_decisions), len(problem.decisions)
 
 
-class _Decided:
-    """Designs of the reference and of each fidelity, which start from it (F14).
+class Batch:
+    """Random designs of a problem whose decisions are unbalances, with their objectives by the exact model."""
 
-    `initial_value` is the reference objective of the initial design. `minimum` is the reference objective of the best
-    known design that keeps the limits. It is zero for an objective that cancels, and NaN if no design is known.
-    """
+    def __init__(self, problem: Problem) -> None:
+        self._exact: Array | None = None
+        with suppress(ModelError):
+            if problem.decisions and problem.load_terms:
+                designs = prepare(problem.at(EXACT.exact(REFERENCE_SAMPLES)))
+                rng = np.random.default_rng(0)
+                sizes, turns = rng.random((2, DESIGNS, len(problem.decisions)))
+                sets = [decision.set for decision in problem.decisions]
+                self.values = np.stack([
+                    (s.lower + (s.upper - s.lower) * sizes[:, k])
+                    * np.exp(1j * (s.angles[0] + (s.angles[1] - s.angles[0]) * turns[:, k]))
+                    for k, s in enumerate(sets)
+                ], axis=1)  # fmt: skip
+                self._exact = designs.objective(self.values)
 
-    def __init__(self, scale: ErrorReference) -> None:
-        self._problem = problem = scale.problem
-        self.initial_value, self.minimum = objective_value(problem, scale.best), math.nan
-        self._known: Result | None = None
-        sampled = problem.at(Fidelity(samples=REFERENCE_STEPS))
-        engine = None
-        with suppress(SolverError, ModelError):
-            if is_open(problem) and is_convex(problem):
-                engine = solve_by_cones(sampled, REFERENCE_STEPS)
-            elif is_open(problem):
-                self._known = first_search(sampled)
-                engine = None if self._known is None else self._known.final.engine
-        if engine is not None:
-            self.of(engine)
-
-    def of(self, engine: Engine) -> tuple[float, float]:
-        """Return the objective of a design by the reference model, and its largest relative violation of a limit."""
-        problem = self._problem
-        final = reference(problem, engine)
-        value, violation = objective_value(problem, final), final.violation(problem.limits)
-        if violation <= FEASIBLE and not self.minimum <= value:
-            # a zero objective has no relative regret
-            self.minimum = 0.0 if value <= numerical_zero(problem, engine) else value
-        return value, violation
-
-    def by(self, variant: Problem) -> Engine | None:
-        """Return the design that is optimal at a fidelity; None if no design within the limits is found."""
-        # a tolerance would choose modes anew for every design of open mounts
-        variant = variant.at(replace(variant.fidelity, tolerance=None))
-        with working_on(SERIAL), suppress(SolverError, ModelError):
-            if is_convex(variant):
-                return solve_by_cones(variant)
-            return None if self._known is None else reoptimise(variant, self._known)
-        return None
-
-    def regretted(self, row: TradeRow) -> TradeRow:
-        """Return a row with its regret; call it after all designs are known."""
-        return replace(row, regret=row.optimum / self.minimum - 1.0) if self.minimum > 0.0 else row
+    def by(self, variant: Problem) -> tuple[float, float]:
+        """Return the time of the batch at a fidelity [s], and its largest relative error."""
+        if self._exact is None or variant.fidelity.mounts == "time":
+            return math.nan, math.nan
+        values, spent = timed(lambda: prepare(variant).objective(self.values))
+        return spent, float(np.max(np.abs(values - self._exact) / np.where(self._exact > 0.0, self._exact, math.inf)))
 
 
-def _row(name: str, variant: Problem, scale: ErrorReference, decided: _Decided) -> TradeRow:
-    """Return time and error of a fidelity; its regret needs the best design of all and follows later."""
-    evaluation, truth = evaluate(variant), decided.initial_value
-    value = objective_value(variant, evaluation)
-    prepared, gradient = _prepared_times(variant)
-    solve_time = optimum = violation = math.nan
+def _decide(problem: Problem) -> Result:
+    # as `laufruhe.solve` does
+    return solve(replace(problem, sharply=True), diagnose=True)
+
+
+def measured(name: str, variant: Problem, scale: ErrorReference, batch: Batch) -> TradeRow:
+    """Measure a fidelity, all but its regret."""
+    truth = objective_value(variant, scale.best)
+    initial, evaluate_time = timed(lambda: evaluate_only(variant, allow_resonance=True))
+    value = objective_value(variant, initial.final)
+    solve_time = scene_time = optimum = violation = bound = math.nan
     if is_open(variant) and variant.fidelity.mounts != "time":
-        started = time.process_time()
-        engine = decided.by(variant)
-        if engine is not None:
-            solve_time = time.process_time() - started
-            optimum, violation = decided.of(engine)
-
-    def from_scratch() -> None:
-        forget()
-        objective_value(variant, evaluate(variant))
-
-    fresh = seconds(from_scratch)
-    tracemalloc.start()
-    try:
-        from_scratch()
-        memory = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+        with suppress(SolverError, ModelError):
+            result, solve_time = timed(lambda: _decide(variant))
+            bound = math.nan if result.regret_bound is None else result.regret_bound
+            if result.status.has_design:
+                best = reference(variant, result.final.engine)
+                optimum, violation = objective_value(variant, best), best.violation(variant.limits)
+            if solve_time < _LONG and variant.points:
+                points = tuple(replace(point, speed=FASTER * point.speed) for point in variant.points)
+                scene = replace(variant, points=points)
+                scene_time = timed(lambda: solve_scene(scene))[1]
+    memory = math.nan
+    if not solve_time >= _LONG:
+        with suppress(SolverError, ModelError):
+            memory = peak_memory(
+                lambda: _decide(variant) if solve_time < _LONG else evaluate_only(variant, allow_resonance=True)
+            )
+    spent, batch_error = batch.by(variant)
     return TradeRow(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
-        # the bound is relative to the computed value; the table states it relative to the reference
-        estimate=scale.error_of(evaluation) * value / truth if truth > 0.0 else 0.0,
-        evaluation=fresh if math.isnan(prepared) else prepared,
-        gradient=gradient,
+        # the error is relative to the computed value; the table states it relative to the reference
+        estimate=scale.error_of(initial.final) * value / truth if truth > 0.0 else 0.0,
+        evaluation=evaluate_time,
         solve=solve_time,
-        fresh=fresh,
+        scene=scene_time,
+        batch=spent,
+        batch_error=batch_error,
         memory=memory,
         optimum=optimum,
         violation=violation,
+        regret_bound=bound,
     )
-
-
-def _prepared_times(variant: Problem) -> tuple[float, float]:
-    if not variant.load_terms or variant.fidelity.mounts == "time":
-        return math.nan, math.nan
-    model = AffineModel(variant)
-    affine = model.at(model.full_samples)
-    x = affine.start
-
-    def value_and_gradient() -> tuple[float, Array]:
-        value, gradient = 0.0, np.zeros(len(x))
-        for weight, norm in affine.terms:
-            rows = norm.rows(x)
-            z = norm.norm.subgradient(norm.grid, rows)
-            value += weight * float(np.vdot(z, rows))
-            gradient += weight * (z.reshape(-1) @ norm.slope.reshape(-1, len(x)))
-        return value, gradient
-
-    gradient = seconds(value_and_gradient) if variant.unbalances else math.nan
-    return seconds(lambda: affine.objective(x)), gradient
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
@@ -322,11 +346,23 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
     return inertia, (changed - even) / even if even > 0.0 else 0.0
 
 
-def seconds(work: Callable[[], object]) -> float:
-    """Return the shortest time of a call [s]."""
+def timed(work: Callable[[], T]) -> tuple[T, float]:
+    """Return what a call returns, and its least processor time of a few calls [s], each without cached loads."""
     times: list[float] = []
-    while sum(times) < _LONG and (len(times) <= 3 or (sum(times) < _MIN_TIME and len(times) <= _MAX_REPEATS)):
-        started = time.perf_counter()
+    while not times or (sum(times) < _REPEATED and len(times) < _MAX_REPEATS):
+        forget()
+        started = time.process_time()
+        result = work()
+        times.append(time.process_time() - started)
+    return result, min(times)
+
+
+def peak_memory(work: Callable[[], object]) -> int:
+    """Return the largest memory of a call in Python and NumPy by tracemalloc [byte], without cached loads."""
+    forget()
+    tracemalloc.start()
+    try:
         work()
-        times.append(time.perf_counter() - started)
-    return min(times)
+        return tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()

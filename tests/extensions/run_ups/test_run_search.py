@@ -15,7 +15,6 @@ from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.peaks import RunPeaks
 from laufruhe.extensions.run_ups.runs import run_loads, runs_of
-from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import ErrorReference
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Engine
@@ -27,6 +26,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status
+from laufruhe.studies.trade import ladder
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "soft-single-run-up-mounts.toml"

@@ -95,7 +95,7 @@ class Maximum(Norm):
         for signal, share in zip(signals, shares, strict=True):
             if share > 0.0:
                 size, step = fine_lengths(signal, coarse, times)
-                curvatures.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
+                curvatures.append(step**2 / 8.0 * float(curvature(signal).max(initial=0.0)))
                 kink_lengths = lengths(signal.values(signal.kink_angles)).max(axis=0, initial=0.0)
                 maximum, minimum = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
                 errors.append(

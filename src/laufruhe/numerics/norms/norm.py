@@ -376,26 +376,13 @@ def amplitudes(signal: Spectrum) -> Array:
     return np.asarray(total + lengths(signal.kinks.beyond(len(signal.coefficients), float(signal.base))[0]))
 
 
-def curvature(signal: Spectrum) -> tuple[Array, Array]:
-    """Return upper bounds of the second derivative by crank angle at each place, shape (places,).
-
-    The first bounds its maximum between kinks, the second its mean with the jumps of slope at kinks.
-    """
+def curvature(signal: Spectrum) -> Array:
+    """Return an upper bound of the second derivative by crank angle between kinks at each place, shape (places,)."""
     smooth = signal.smooth
-    bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
-    maximum, mean = amplitudes(bent), np.sqrt(mean_square(bent))
+    maximum = amplitudes(Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None]))
     if signal.kinks is None:
-        return maximum, mean
-    size = lengths(signal.kinks.curvature(signal.period))
-    kinks = lengths(np.abs(signal.kinks.jumps[:, 1]).sum(axis=0)) / signal.period
-    return maximum + size.max(axis=0), mean + size.mean(axis=0) + kinks
-
-
-def jumped(signal: Spectrum) -> Array:
-    """Return the sum of the jumps of the signal's value over its period, per radian, shape (places,)."""
-    if signal.kinks is None:
-        return np.zeros(signal.coefficients.shape[1])
-    return lengths(np.abs(signal.kinks.jumps[:, 0]).sum(axis=0)) / signal.period
+        return np.asarray(maximum)
+    return np.asarray(maximum + lengths(signal.kinks.curvature(signal.period)).max(axis=0))
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:

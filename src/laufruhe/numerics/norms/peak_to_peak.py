@@ -141,7 +141,7 @@ class PeakToPeak(Norm):
                 continue
             samples = signal.sample(coarse * times).swapaxes(0, 1)
             step = 2.0 * math.pi / float(signal.base) / (coarse * times)
-            curvatures.append(step**2 / 8.0 * 2.0 * float(curvature(signal)[0].max(initial=0.0)))
+            curvatures.append(step**2 / 8.0 * 2.0 * float(curvature(signal).max(initial=0.0)))
             for place, kink_values in zip(samples, signal.values(signal.kink_angles).swapaxes(0, 1), strict=True):
                 diameter, starts = _reach(place, kink_values), (place[first::times] for first in range(times))
                 errors.append(max(diameter - _reach(start, kink_values) for start in starts))

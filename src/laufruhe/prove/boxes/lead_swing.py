@@ -107,5 +107,5 @@ def largest_torque(torque: Spectrum) -> float:
     swing = torque.with_coefficients(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(swing.coefficients), 64)
     values = np.concatenate([swing.sample(steps), swing.values(swing.kink_angles)])
-    curvatures = curvature(swing.mapped(lambda values: values[:, None, None]))[0]
+    curvatures = curvature(swing.mapped(lambda values: values[:, None, None]))
     return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * curvatures.max(initial=0.0))

@@ -186,7 +186,7 @@ class LeadBoxes:
         kinks: list[tuple[Array, Array, Array]] = []
         for weight, signal in zip(shares[shares > 0.0], self.model.counted(measure, s), strict=True):
             square += weight * float(np.mean(mean_square(signal.series.derivative.derivative)))
-            maximum.append(curvature(signal)[0])
+            maximum.append(curvature(signal))
             places = signal.coefficients.shape[1]
             if signal.kinks is None:
                 kinks += [(np.zeros(0),) * 3] * places
