@@ -8,16 +8,16 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any, TypeAlias
 
-from laufruhe.errors import Complaint, ModelError
+from laufruhe.errors import Complaint
 from laufruhe.files.complaints import Refused
-from laufruhe.files.engine import EngineTable, cycle_of, layout_of
+from laufruhe.files.engine import EngineTable, cycle_of, layout_of, moving_parts
 from laufruhe.files.numbering import ALTERNATING, BY_BANK, KEYS, USUAL, place_order
 from laufruhe.files.toml_text import toml_value
-from laufruhe.machine import Cycle
+from laufruhe.machine import Cycle, SliderCrank
 from laufruhe.machine.firing import from_one, intervals_of
-from laufruhe.machine.layouts import Layout, even_throws, firing_angles
 from laufruhe.numerics.exact_angles import Turn, as_turn, reduced_turn
 
 Pair: TypeAlias = tuple[int, int]
@@ -33,15 +33,39 @@ _NUMBERINGS: tuple[Mapping[str, Any], ...] = tuple(
 
 @dataclass(frozen=True)
 class _Fit:
-    """Firing intervals from cylinder 1 [rad], and pairs of cylinders that should be in step but are not."""
+    """Order of a table that its crank allows, with the slider-cranks of its cylinders."""
 
-    intervals: tuple[float, ...]
-    pairs: tuple[Pair, ...]
+    table: EngineTable
+    parts: Sequence[SliderCrank]
 
-    @property
+    @cached_property
+    def intervals(self) -> tuple[float, ...]:
+        """Firing intervals from cylinder 1 [rad]."""
+        cycle, start = cycle_of(self.table), as_turn(self.parts[0].firing_angle)
+        turns = (reduced_turn(as_turn(part.firing_angle) - start, cycle.turns) for part in self.parts)
+        return intervals_of(cycle, sorted(map(float, turns)))
+
+    @cached_property
     def spread(self) -> float:
         """Difference between the longest and the shortest interval [rad]."""
         return max(self.intervals) - min(self.intervals)
+
+    @cached_property
+    def pairs(self) -> tuple[Pair, ...]:
+        """Pairs of cylinders that should be in step but are not: opposed ones, or those at equal ends of a row."""
+        kind, parts = self.table.kind, self.parts
+        if kind.cylinders_per_throw > 1 or kind.banks > 2:
+            return ()
+        from_front = sorted(range(len(parts)), key=lambda k: -parts[k].x)
+        sides = [[k for k in from_front if parts[k].bank == bank] for bank in dict.fromkeys(p.bank for p in parts)]
+        if len(sides) == kind.banks == 2:
+            due = sorted(zip(*sides, strict=True))
+        elif len(sides) == 1 and self.table.throws is None and cycle_of(self.table) is Cycle.FOUR_STROKE:
+            row = sides[0] if len(parts) % 2 == 0 else []
+            due = list(zip(row[: len(row) // 2], row[::-1], strict=False))
+        else:
+            return ()
+        return tuple((a, b) for a, b in due if not _is_whole(parts[a].star_turn - parts[b].star_turn))
 
 
 @contextmanager
@@ -59,12 +83,12 @@ def explained_orders(table: EngineTable) -> Iterator[None]:
         raise Refused(_WHERE, order, fault, _remedy(table, order)) from None
 
 
-def order_warnings(table: EngineTable) -> tuple[Complaint, ...]:
+def order_warnings(table: EngineTable, parts: Sequence[SliderCrank]) -> tuple[Complaint, ...]:
     """Return a warning about a firing order that its crank allows, but that other numbers of the cylinders explain."""
     order = table.listed_order
-    fit = None if order is None or table.firing_intervals or not table.kind.takes("numbering") else _fit(table)
-    if order is None or fit is None or len(order) < 3:
+    if order is None or len(order) < 3 or table.firing_intervals or not table.kind.takes("numbering"):
         return ()
+    fit = _Fit(table, parts[: len(order)])
     if fit.pairs and table.kind.banks > 1:
         rule = f"moves opposed pistons in one direction, not against each other: cylinders {_pairs(fit.pairs)}"
         return (Complaint(_WHERE, _text(order), rule, _remedy(table, order)),)
@@ -72,7 +96,8 @@ def order_warnings(table: EngineTable) -> tuple[Complaint, ...]:
         rule = f"makes a crank that differs from its mirror image: cylinders {_pairs(fit.pairs)} are not in step"
         return (Complaint(_WHERE, _text(order), rule, _exchange(table, order)),)
     is_stated = any(table.value_of(key) is not None for key in KEYS if table.kind.takes(key))
-    reading = None if is_stated or table.throws is None else _reading(table)
+    # nothing is more even than even firing
+    reading = None if is_stated or table.throws is None or fit.spread < _CLEAR else _reading(table)
     if reading is None or reading[1].spread > fit.spread - _CLEAR:
         return ()
     now, then = _degrees(fit.intervals), _degrees(reading[1].intervals)
@@ -190,43 +215,11 @@ def _renumbered(table: EngineTable, keys: Mapping[str, Any]) -> EngineTable:
 
 
 def _fit(table: EngineTable) -> _Fit | None:
-    """Return how the order of a table fires; None if its crank does not allow the order."""
-    cycle, order = cycle_of(table), table.listed_order or []
+    # none if the crank does not allow the order
     try:
-        layout = layout_of(table)
-        throws = table.listed_throws or layout.throws or even_throws(cycle, layout, order)
-        angles = firing_angles(cycle, layout, throws, order)
-    except (ModelError, Refused):
+        return _Fit(table, moving_parts(table, gas=False)[0][: len(table.listed_order or ())])
+    except Refused:
         return None
-    start = as_turn(angles[from_one(order)[0] - 1])
-    turns = sorted(float(reduced_turn(as_turn(angle) - start, cycle.turns)) for angle in angles)
-    is_row = table.throws is None and cycle is Cycle.FOUR_STROKE and len({*layout.pins}) == len(order)
-    due = _opposed(layout) or (_mirrored(layout) if is_row else ())
-    centres = [layout.dead_centre(throws, k) for k in range(len(order))]
-    return _Fit(
-        intervals_of(cycle, turns), tuple(pair for pair in due if not _is_whole(centres[pair[0]] - centres[pair[1]]))
-    )
-
-
-def _opposed(layout: Layout) -> tuple[Pair, ...]:
-    # cylinders side by side on opposed banks, each on a throw of its own
-    sides = [[k for k in _from_front(layout) if layout.banks[k] == bank] for bank in dict.fromkeys(layout.banks)]
-    if len(sides) != 2 or len(sides[0]) != len(sides[1]):
-        return ()
-    pairs = list(zip(*sides, strict=True))
-    is_flat = _is_whole(as_turn(layout.banks[pairs[0][0]]) - as_turn(layout.banks[pairs[0][1]]) - Fraction(1, 2))
-    return tuple(sorted(pairs)) if is_flat and all(layout.pins[a] != layout.pins[b] for a, b in pairs) else ()
-
-
-def _mirrored(layout: Layout) -> tuple[Pair, ...]:
-    # cylinders at equal distances from the middle of a single row
-    row = _from_front(layout)
-    is_row = len(set(layout.banks)) == 1 and len(set(layout.positions)) == len(row) > 2 and len(row) % 2 == 0
-    return tuple(zip(row[: len(row) // 2], row[::-1], strict=False)) if is_row else ()
-
-
-def _from_front(layout: Layout) -> list[int]:
-    return sorted(range(len(layout.positions)), key=lambda k: -layout.positions[k])
 
 
 def _is_whole(turn: Turn) -> bool:

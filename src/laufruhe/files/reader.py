@@ -96,7 +96,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             with explained_orders(file.engine):
                 problem = _of_file(file, path)
             if problem.phasing is None:
-                problem = replace(problem, warnings=order_warnings(file.engine))
+                problem = replace(problem, warnings=order_warnings(file.engine, problem.engine.slider_cranks))
 
             def finished(problem_of_star: Problem, candidate: Candidate | None) -> Problem:
                 problem_of_star = replace(problem_of_star, rebuild=partial(_changed_drawing, closed, path, candidate))

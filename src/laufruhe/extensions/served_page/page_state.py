@@ -114,7 +114,7 @@ def _star(tables: Tables, _: str, value: Any) -> dict[str, Any]:
 
 
 def _open_crank(tables: Tables, _: str, __: Any) -> dict[str, Any]:
-    engine = dict(tables["engine"])
+    engine = {key: value for key, value in tables["engine"].items() if key != "firing_intervals"}
     if "cylinders" not in engine and isinstance(engine.get("firing_order"), list):
         engine["cylinders"] = len(engine["firing_order"])
     return {**tables, "engine": {**engine, "throws": "open", "firing_order": "open"}}
