@@ -400,6 +400,43 @@ def test_a_four_stroke_file_in_a_two_stroke_engine_is_refused(tmp_path: Path) ->
         problem_with(tmp_path, "f.csv", cycle="two-stroke")
 
 
+def test_turns_without_gas_exchange_are_refused(tmp_path: Path) -> None:
+    """A record of the turn around firing alone would give twice the work."""
+    turn = np.arange(-180.0, 180.0)
+    (tmp_path / "f.csv").write_text(rows(np.tile(turn, 4), np.tile(cycle_pressure(turn), 4)))
+    with pytest.raises(InputError, match="has the same pressures in both turns of its four-stroke cycle; check engine"):
+        problem_with(tmp_path, "f.csv")
+
+
+def test_a_rotary_engine_has_its_gas_exchange_after_540_degrees(tmp_path: Path) -> None:
+    text = """
+title = "Rotary"
+[engine]
+layout = "rotary"
+cycle = "four-stroke"
+cylinders = 1
+eccentricity = "15 mm"
+rotor_radius = "105 mm"
+rotor_width = "80 mm"
+rotor_mass = "4 kg"
+[gas]
+model = "trace"
+file = "f.csv"
+[[operating_points]]
+speed = "3000 rpm"
+"""
+    shaft = np.arange(-540.0, 540.0, 1.5)
+    figures = []
+    for late in (0.0, 540.0):
+        (tmp_path / "f.csv").write_text(rows(shaft + late, cycle_pressure(shaft / 1.5)))
+        (tmp_path / "r.toml").write_text(text)
+        facts, _, recording = facts_of(load(tmp_path / "r.toml"))
+        figures.append((facts.torque, facts.peak_angle))
+        assert ("gas exchange" in " ".join(recording)) == (late > 0.0)
+    assert figures[0] == pytest.approx(figures[1])
+    assert math.degrees(figures[0][1]) == pytest.approx(1.5 * 19.0, abs=1.5)
+
+
 def test_a_two_stroke_has_one_dead_centre(tmp_path: Path) -> None:
     turn = np.arange(-180.0, 180.0)
     (tmp_path / "f.csv").write_text(rows(turn, cycle_pressure(turn)))

@@ -35,7 +35,7 @@ _NEAR_FIRING = math.radians(60.0)
 """Largest angle between the peak pressure and its dead centre at which the peak tells which dead centre it is."""
 _PEG_WIDTH = math.radians(5.0)
 """Angle to either side over which the pressure is averaged to be pegged."""
-_ZEROS = {"firing": 0.0, "gas exchange": math.tau}
+_EXCHANGE = "gas exchange"
 
 
 def _column(raw: Any) -> str | int:
@@ -231,8 +231,10 @@ def recorded_trace(
     if smooth.cut_off is not None and table.smooth:
         angles, pressures = smooth.angles, smooth.pressures
         treatment = f"removed by a low-pass that halves order {smooth.cut_off:.3g} of crank speed"
-    file.said.append(f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}.")
-    angles = angles + _zero(file, angles, pressures, zero, period)
+    file.said += [f"Noise: {_bar(smooth.noise, 2)} rms, {treatment}."] if smooth.noise else []
+    _require_exchange(file, angles, pressures, cycle, period)
+    exchange = 0.5 * period if cycle is Cycle.FOUR_STROKE else 0.0
+    angles = angles + _zero(file, angles, pressures, zero, exchange, period)
     if table.peg is not None:
         since = np.mod(angles - table.peg.at + math.pi, period) - math.pi
         rise = table.peg.to - float(np.mean(pressures[np.abs(since) <= max(_PEG_WIDTH, float(np.abs(since).min()))]))
@@ -343,25 +345,29 @@ def _chosen(file: RecordedFile, cycles: Array) -> Array:
     return np.asarray(cycles[k])
 
 
+def _require_exchange(file: RecordedFile, angles: Array, pressures: Array, cycle: Cycle, period: float) -> None:
+    # one turn of a four-stroke has the burn, the other one the gas exchange
+    other = np.interp(angles + 0.5 * period, angles, pressures, period=period)
+    if cycle is Cycle.FOUR_STROKE and _correlation(pressures, other) > _ALIKE:
+        rule = "has the same pressures in both turns of its four-stroke cycle"
+        raise file.refused(rule, "check engine.cycle, or record the gas exchange too")
+
+
 def _zero(
-    file: RecordedFile, angles: Array, pressures: Array, zero: str | float | None, period: float
+    file: RecordedFile, angles: Array, pressures: Array, zero: str | float | None, exchange: float, period: float
 ) -> float:  # fmt: skip
-    """Return the crank angle after firing at which the file counts zero [rad]."""
+    """Return the crank angle after firing at which the file counts zero; `exchange` is that of gas exchange [rad]."""
     if isinstance(zero, float):
         return zero
+    if zero is not None:
+        return exchange if zero == _EXCHANGE else 0.0
     peak = float(angles[int(np.argmax(pressures))])
-    if zero is None:
-        zero = "firing"
-        from_exchange = abs(math.remainder(peak - math.tau, period))
-        opposite = np.abs(np.mod(angles - peak - math.tau + math.pi, period) - math.pi) < _NEAR_FIRING
-        rise = pressures - pressures.min()
-        if (
-            period > 1.5 * math.tau
-            and from_exchange < _NEAR_FIRING
-            and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
-        ):
-            zero = "gas exchange"
-        place = math.degrees(math.remainder(peak + _ZEROS[zero], period))
-        dead_centre = f"0 deg of the file is taken as the {zero} dead centre"
-        file.said.append(f"{dead_centre}; the peak then lies {place:.4g} deg after firing.")
-    return _ZEROS[zero]
+    opposite = np.abs(np.remainder(angles - peak - exchange + 0.5 * period, period) - 0.5 * period) < _NEAR_FIRING
+    rise = pressures - pressures.min()
+    is_near = abs(math.remainder(peak - exchange, period)) < _NEAR_FIRING
+    is_exchange = bool(exchange) and is_near and rise.max() > 2.0 * rise[opposite].max(initial=0.0)
+    start = exchange if is_exchange else 0.0
+    place = math.degrees(math.remainder(peak + start, period))
+    dead_centre = f"0 deg of the file is taken as the {_EXCHANGE if is_exchange else 'firing'} dead centre"
+    file.said.append(f"{dead_centre}; the peak then lies {place:.4g} deg after firing.")
+    return start
