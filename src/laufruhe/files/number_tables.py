@@ -238,8 +238,11 @@ def _of_spreadsheet(content: bytes, sheet: str | None) -> NumberTable:
         raise ModelError("is no spreadsheet that can be read; save it as .xlsx again") from error
     if sheet is not None and sheet not in rows_of:
         raise ModelError(f"has no sheet '{sheet}'; it has: {', '.join(rows_of)}")
-    tables = [_table(rows, ".") for title, rows in rows_of.items() if sheet in (None, title)]
-    return max(tables, key=lambda table: table.values.shape, default=_table([], "."))
+
+    def count(title: str) -> int:
+        return sum(sum(_number(cell, ".") is not None for cell in row) > 1 for row in rows_of[title])
+
+    return _table(rows_of.get(sheet or max(rows_of, key=count, default=""), []), ".")
 
 
 def _of_matlab(content: bytes) -> NumberTable:
