@@ -141,13 +141,16 @@ def _of_gas(engine: Engine, points: Sequence[OperatingPoint]) -> Iterator[Compla
                 "least pressure of the gas", lowest, rule, "check gauge and peg; pressures must be absolute"
             )
         lies_late = abs(facts.peak_angle) > LATEST_PEAK and facts.peak_pressure > 2.0 * abs(facts.least_pressure)
-        place = f"the peak of {peak} lies {math.degrees(facts.peak_angle) % 720.0:.4g} deg after the firing dead centre"
+        angle = math.degrees(facts.peak_angle)
+        place = f"the peak of {peak} lies {angle:.4g} deg after the firing dead centre"
+        half_turns = 180.0 * round(angle / 180.0)
+        check = f"check angle_zero; {half_turns:g} deg less would move the peak to {angle - half_turns:.4g} deg"
         if facts.imep < -_ROUNDING * facts.peak_pressure:
             rule = f"is {quantity_text(facts.torque, 'N m')}, so the gas takes work" + f", and {place}" * lies_late
-            remedy = "check angle_zero" if lies_late else "check angle_zero, unless the engine was motored"
+            remedy = check if lies_late and half_turns else "check angle_zero, unless the engine was motored"
             yield Complaint("mean torque of the gas", "", rule, remedy)
         elif lies_late:
-            yield Complaint("peak of the gas", "", place, "check angle_zero")
+            yield Complaint("peak of the gas", "", place, check if half_turns else "check angle_zero")
         if facts.power > MAX_POWER * facts.displacement:
             power = quantity_text(1e-3 * facts.power, "kW")
             rule = f"is {1e-6 * facts.power / facts.displacement:.3g} kW for each litre; racing engines reach 230 kW"
