@@ -232,3 +232,10 @@ def test_nothing_to_decide() -> None:
     assert affine.size == 0
     exact = evaluate(p, samples=96 * 4).value(p.objective[0].measure)
     assert affine.objective(np.zeros(0)) == pytest.approx(exact, rel=1e-12)
+
+
+@pytest.mark.parametrize("bounds", [{"maximum": 1.5}, {"minimum": -2.0, "maximum": 0.0}, {"outside": (1.0, 2.0)}, {}])
+def test_slacks_of_many_values_are_those_of_each(bounds: dict[str, float]) -> None:
+    limit = Limit("mass", Measure(channels.BALANCER_MASS, NORMS["mean"]), **bounds)
+    values = np.linspace(-3.0, 4.0, 29)
+    assert list(limit.slacks(values)) == [limit.slack(float(value))[0] for value in values]

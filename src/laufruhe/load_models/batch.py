@@ -196,7 +196,7 @@ class Designs:
     def slack(self, limit: Limit, values: Array) -> Array:
         """Return the relative slack of a limit from the values of its measure, shape (designs,) (E15)."""
         if limit.measure in self.norms:
-            return np.array([limit.slack(value)[0] for value in values.tolist()])
+            return limit.slacks(values)
         return np.full(len(values), -self.model.bare.check_limit(limit).violation)
 
     @property

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,16 +169,28 @@ class Limit:
 
         The slack is relative to the bound, and negative if the value violates the limit. The bound is in SI units.
         """
-        sides = []
-        if self.minimum > -math.inf:
-            sides.append((value - self.minimum, self.minimum, "at least"))
-        if self.maximum < math.inf:
-            sides.append((self.maximum - value, self.maximum, "at most"))
+        sides = self._sides(value)
         if self.outside is not None:
             low, high = self.outside
-            sides.append(max((low - value, low, "at most"), (value - high, high, "at least")))
-        relative = ((slack / (abs(bound) or 1.0), bound, side) for slack, bound, side in sides)
-        return min(relative, default=(math.inf, 0.0, ""))
+            nearest = max((low - value, low, "at most"), (value - high, high, "at least"))
+            sides.append((nearest[0] / (abs(nearest[1]) or 1.0), *nearest[1:]))
+        return min(sides, default=(math.inf, 0.0, ""))
+
+    def slacks(self, values: Array) -> Array:
+        """Return the slack of each value relative to its bound, shape of `values`."""
+        if self.outside is not None:
+            return np.array([self.slack(value)[0] for value in values.tolist()])
+        slacks = [np.full(len(values), math.inf), *(slack for slack, *_ in self._sides(values))]
+        return np.asarray(np.min(slacks, axis=0))
+
+    def _sides(self, value: Any) -> list[tuple[Any, float, str]]:
+        # relative slack, bound and sense of the smallest and the largest allowed value
+        bounds = ((self.minimum, "at least", 1.0), (self.maximum, "at most", -1.0))
+        return [
+            (sign * (value - bound) / (abs(bound) or 1.0), bound, side)
+            for bound, side, sign in bounds
+            if math.isfinite(bound)
+        ]
 
 
 Side: TypeAlias = tuple[Limit, str]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -13,8 +14,9 @@ from laufruhe.present.tables import Table
 from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
 from laufruhe.report.strict_json import strict
-from laufruhe.report.table_files import write_book, write_csv
+from laufruhe.report.table_files import MAX_PAGE_ROWS, write_book, write_csv
 from laufruhe.report.web_page import as_html
+from laufruhe.studies.part import Part
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.text import Text
 
@@ -58,6 +60,8 @@ def write_study(
             rows = _flat(data)
             tables[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
             write_csv(tables[name], folder / f"{name}.csv")
+            if len(rows) > MAX_PAGE_ROWS:
+                del tables[name]
         if "png" in part.ends:
             pending[name] = draw(part.picture(data), folder / name)
     if tables:
@@ -83,6 +87,7 @@ def study_document(
         source = f" Source: {data.attrs['source']}" if data.attrs["source"] else ""
         blocks += [Heading(data.attrs["title"]), Paragraph(f"{data.attrs['kind'].capitalize()}.{source}", marked=True)]
         blocks += [block for text in part.table(data) for block in blocks_of(text)]
+        blocks += [Paragraph(text, marked=True) for text in _left_out(part, data)]
         if "png" in part.ends:
             blocks.append(Illustration(part.name, data.attrs["title"], is_captioned=False))
     if datasets:
@@ -102,10 +107,25 @@ def blocks_of(text: Text) -> Iterator[Block]:
         yield Paragraph(f"{text.omitted} more rows are in the CSV file.")
 
 
+def _left_out(part: Part, data: xr.Dataset) -> Iterator[str]:
+    """Yield a sentence if the table of a part is too long for a page of the workbook, or for a CSV file."""
+    count = math.prod(data.drop_dims(_dims_across(data)).sizes.values())
+    if "csv" not in part.ends:
+        yield f"All {count:,} rows are in `{part.name}.nc`; a CSV file and the workbook hold fewer."
+    elif count > MAX_PAGE_ROWS:
+        files_of_part = f"`{part.name}.csv` and `{part.name}.nc`"
+        yield f"All {count:,} rows are in {files_of_part}; a page of the workbook holds at most {MAX_PAGE_ROWS:,}."
+
+
+def _dims_across(data: xr.Dataset) -> set[str]:
+    # dimensions that become columns of a row per point
+    return {str(values.dims[1]) for values in data.data_vars.values() if values.dims[:1] == ("point",) != values.dims}
+
+
 def _flat(data: xr.Dataset) -> Any:
     """Return a row per point; values per mount, decision or measure become a column each."""
     across = {name: values for name, values in data.data_vars.items() if values.dims[:1] == ("point",) != values.dims}
-    narrow = data.drop_dims({str(values.dims[1]) for values in across.values()})
+    narrow = data.drop_dims(_dims_across(data))
     units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
     rows = narrow.to_dataframe().rename(columns={name: _headed(name, unit) for name, unit in units.items()})
     rows.index.names = [_headed(str(name), units.get(str(name), "")) for name in rows.index.names]

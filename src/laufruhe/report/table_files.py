@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import chain, count
 from pathlib import Path
@@ -19,6 +19,8 @@ from laufruhe.present.tables import Table
 _FORMULA = re.compile(r"(?!-?$|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?(?: ?%| [\w ./*^°²³]*)?$)[=+\-@\t＝＋－＠]")
 """Start of a text that a spreadsheet may compute: a sign that no plain number with its unit follows."""
 _OPTIONS = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
+MAX_PAGE_ROWS = 10_000
+"""Largest number of rows of a page of the workbook of a study; longer tables are in their CSV and netCDF files."""
 _CREATED = datetime(2000, 1, 1, tzinfo=UTC)
 
 
@@ -27,7 +29,13 @@ def write_csv(table: Table, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(map(_csv_cell, table.head))
-        writer.writerows(map(_csv_cell, row) for row in table.rows)
+        writer.writerows(zip(*map(_csv_column, zip(*table.rows, strict=True)), strict=True))
+
+
+def _csv_column(cells: Sequence[Any]) -> Sequence[Any]:
+    # most columns of long tables are plain numbers, and need no conversion
+    is_plain = set(map(type, cells)) == {float} and all(map(math.isfinite, cells))
+    return cells if is_plain else list(map(_csv_cell, cells))
 
 
 def _csv_cell(cell: Any) -> Any:

@@ -18,7 +18,7 @@ from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.units import readable
 
 MAX_DRAWS = 1_000_000_000
-MAX_TABLED = 100_000
+MAX_TABLED = 50_000
 """Largest number of draws, over all cases, that are also written as CSV."""
 LISTED = (5.0, 50.0, 95.0)
 CURVE = np.arange(1, 400) / 4.0
