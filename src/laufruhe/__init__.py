@@ -188,8 +188,8 @@ def evaluate_many(
 ) -> pd.DataFrame:
     """Evaluate many designs of one problem, and return a table with a row for each.
 
-    Designs that differ in unbalances share one model, and take some 30 microseconds each. Others are evaluated one by
-    one.
+    Designs that differ in unbalances share one model, and take some 10 to 30 microseconds each. Others are evaluated
+    one by one.
 
     Parameters
     ----------

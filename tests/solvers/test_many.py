@@ -50,7 +50,7 @@ def test_a_design_has_the_values_that_it_has_alone(name: str) -> None:
         assert table.objective[row] == pytest.approx(alone.objective.value, rel=1e-9)
         for limit in alone.limits:
             assert table[limit.name][row] == pytest.approx(limit.value, rel=1e-9)
-        assert bool(table.feasible[row]) == (alone.final.violation(problem.limits) <= 1e-6)
+        assert bool(table.feasible[row]) == (alone.final.violation(problem.limits) <= 1e-5)
 
 
 def test_designs_of_every_form_are_equal() -> None:
@@ -89,6 +89,7 @@ def test_a_design_that_cannot_be_built_says_why_and_the_others_stay() -> None:
     assert not table.feasible[1]
 
 
+@pytest.mark.slow
 def test_processes_change_nothing() -> None:
     problem = ready("single-stroke-offset")
     designs = drawn(problem, 110)

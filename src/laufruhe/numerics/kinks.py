@@ -92,7 +92,7 @@ class SignalKinks:
         k, degrees = self.jumps.shape[:2]
         powers = [m - derivative for m in range(degrees)]
         table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
-        factors = np.einsum("mp,kmd->pkd", table, self.jumps.reshape(k, degrees, -1))
+        factors = (table.T @ self.jumps.reshape(k, degrees, -1)).swapaxes(0, 1)
         return np.asarray(factors.reshape(-1, k, *self.jumps.shape[2:]))
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
@@ -195,7 +195,10 @@ def _distinct(angles: Array) -> tuple[Indices, Indices]:
     # starts of equal angles in their order
     steps = np.round(angles / SAME_ANGLE)
     order = np.argsort(steps, kind="stable")
-    return np.flatnonzero(np.diff(steps[order], prepend=-math.inf)), order
+    steps = steps[order]
+    is_first = np.ones(len(steps), dtype=bool)
+    is_first[1:] = steps[1:] != steps[:-1]
+    return np.flatnonzero(is_first), order
 
 
 def _kinks_with_jumps(angles: Array, jumps: Array) -> SignalKinks | None:
@@ -246,8 +249,9 @@ def kink_nodes(breaks: Array, period: float) -> KinkNodes:
     first, order = _distinct(places)
     places = places[order[first]]
     # an interval ends at the next kink
-    gaps = np.diff(places, append=places[:1] + period)
-    return KinkNodes(places, np.minimum(np.stack([gaps, np.roll(gaps, 1)], axis=1), _WIDTH) * [1.0, -1.0])
+    ends = np.concatenate([places[-1:] - period, places, places[:1] + period])
+    gaps = np.minimum(ends[1:] - ends[:-1], _WIDTH)
+    return KinkNodes(places, np.stack([gaps[1:], -gaps[:-1]], axis=1))
 
 
 def _within(angles: Array, period: float) -> Array:

@@ -285,7 +285,7 @@ class Mapped(Spectrum):
         """Kinks of the source, mapped."""
         return self._resolved.kinks
 
-    @property
+    @cached_property
     def components(self) -> NDArray[np.bool_]:
         """Mask of the components that the map makes of those of the source, shape (...)."""
         used = self.source.components
@@ -390,7 +390,7 @@ class Superposition(Spectrum):
     @cached_property
     def components(self) -> NDArray[np.bool_]:
         """Mask of the components that have a nonzero coefficient in any part."""
-        return np.asarray(np.any([signal.components for _, signal in self.parts], axis=0))
+        return reduce(np.logical_or, (signal.components for _, signal in self.parts))
 
     @cached_property
     def step(self) -> int:
@@ -509,13 +509,14 @@ def spectrum_with_kinks(
         return Spectrum(base, whole.coefficients[: samples // 2 + 1])
     # samples on a jump are taken on its later side
     later, nodes = angles + SAME_ANGLE, kink_nodes(breaks, period)
-    at_nodes, values = np.split(signal(np.concatenate([nodes.angles, later])), [-samples])
-    kinks = nodes.kinks(at_nodes)
+    values = signal(np.concatenate([nodes.angles, later]))
+    kinks = nodes.kinks(values[:-samples])
     if kinks is None:
         return spectrum_of(signal(angles), base)
     if len(kinks.angles) > maximum:
         kinks = kinks.strongest(maximum)
-    smooth = (spectrum_of(values - kinks.values(later, period), base).coefficients.T * _delay(samples, base)).T
+    remainder = spectrum_of(values[-samples:] - kinks.values(later, period), base)
+    smooth = (remainder.coefficients.T * _delay(samples, base)).T
     return Spectrum(base, smooth + kinks.coefficients(len(smooth), float(base)), kinks)
 
 

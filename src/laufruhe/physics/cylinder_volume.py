@@ -88,12 +88,14 @@ class ChargedCylinder:
         There is none but at a dead centre: valves open and close there, and heat is added there at once.
         """
         flat = np.ravel(angles)
-        turns = (flat[:, None] - dead_centres(self.part)) / math.tau
-        jumps = np.flatnonzero(np.any(np.abs(turns - np.rint(turns)) <= JUMP_WIDTH / math.tau, axis=1))
+        turns = [(flat - centre) / math.tau for centre in dead_centres(self.part)]
+        top, bottom = (np.abs(turn - np.rint(turn)) <= JUMP_WIDTH / math.tau for turn in turns)
+        jumps = np.flatnonzero(top | bottom)
         sides = np.concatenate([flat, flat[jumps] - JUMP_WIDTH, flat[jumps] + JUMP_WIDTH])
-        values, before, after = np.split(self._one_sided(closed, sides), [len(flat), len(flat) + len(jumps)])
+        values = self._one_sided(closed, sides)
+        before, after = values[len(flat) :].reshape(2, -1)
         values[jumps] = 0.5 * (before + after)
-        return values.reshape(np.shape(angles))
+        return values[: len(flat)].reshape(np.shape(angles))
 
     def _one_sided(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         top, bottom = dead_centres(self.part)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.exact_angles import Turn, as_turn, star_orders
-from laufruhe.numerics.spectrum import Mapped, Shared, Spectrum, shared, spectrum_with_kinks
+from laufruhe.numerics.spectrum import Mapped, Spectrum, shared, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
 from laufruhe.physics.rigid_body import ROLL
@@ -23,7 +23,7 @@ from laufruhe.physics.rigid_body import ROLL
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
     """Return the wrench of the gas: a roll moment, the reaction to its crank torque (L5; eq. 1)."""
-    return Mapped(_roll_moment(engine.cycle, engine.slider_cranks, gas, fidelity), _as_wrench)
+    return _gas_loads(engine.cycle, engine.slider_cranks, gas, fidelity)
 
 
 def _as_wrench(moment: NDArray[Any]) -> NDArray[Any]:
@@ -31,19 +31,19 @@ def _as_wrench(moment: NDArray[Any]) -> NDArray[Any]:
 
 
 @lru_cache(maxsize=64)
-def _roll_moment(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fidelity: Fidelity) -> Shared:
+def _gas_loads(cycle: Cycle, parts: tuple[SliderCrank, ...], gas: GasModel, fidelity: Fidelity) -> Mapped:
     # equal mechanisms differ only in their firing angles
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
     for part in parts:
         alike[alike_under(gas, part), part.shaft.ratio].append(part)
     stars = (_star(gas_coefficients(gas, star[0], cycle, fidelity), cycle, star) for star in alike.values())
     total = Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
-    return shared(reduce(add, stars, total))
+    return Mapped(shared(reduce(add, stars, total)), _as_wrench)
 
 
 def forget_gas() -> None:
     """Clear the cache of stars of gas torque, for timing."""
-    _roll_moment.cache_clear()
+    _gas_loads.cache_clear()
 
 
 def _star(torque: Spectrum, cycle: Cycle, parts: Sequence[SliderCrank]) -> Spectrum:

@@ -85,13 +85,19 @@ def _fixed(coefficients: ComplexArray) -> ComplexArray:
     return coefficients
 
 
-@lru_cache(maxsize=256)
 def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, highest: int | None = None) -> ComplexArray:
     """Return the coefficients of s''/r in the local crank angle, shape (highest + 1,) (C8, K10).
 
     c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...). As many orders are taken as matter if `highest` is left out.
     """
-    highest = orders_needed(rod_ratio, offset_ratio) if highest is None else highest
+    needed = orders_needed(rod_ratio, offset_ratio)
+    highest = needed if highest is None else highest
+    return _acceleration_orders(rod_ratio, offset_ratio, highest + needed)[: highest + 1]
+
+
+@lru_cache(maxsize=256)
+def _acceleration_orders(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
+    # roll moments need more orders than forces, and both share these
     h = np.arange(highest + 1)
     out = np.zeros(highest + 1, dtype=complex)
     if rod_ratio > 0.0:
@@ -121,7 +127,7 @@ def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, hig
     Times m r^2 (n w)^2 it is the roll moment of the reciprocating mass.
     """
     count = highest + orders_needed(rod_ratio, offset_ratio)
-    acceleration = piston_acceleration_orders(rod_ratio, offset_ratio, count)
+    acceleration = _acceleration_orders(rod_ratio, offset_ratio, count)
     arm = ratio * _two_sided(acceleration / (1j * np.maximum(np.arange(count + 1), 1)))
     if rod_ratio > 0.0:
         arm[count] += offset_ratio / rod_ratio

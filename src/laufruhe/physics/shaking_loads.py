@@ -43,8 +43,8 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     if fidelity.has_uneven_speed:
         return uneven_loads(engine, point, fidelity)
     gas, cycle, square = fidelity.gas_of(point), engine.cycle, point.speed**2
-    turning = rotor_loads((*engine.pins, *engine.rotors), 1.0, cycle)
-    parts = [(square, _moving_loads(cycle, engine.slider_cranks, fidelity)), (square, turning)]
+    turning = rotor_loads((*engine.pins, *engine.rotors), point.speed, cycle)
+    parts = [(square, _moving_loads(cycle, engine.slider_cranks, fidelity)), (1.0, turning)]
     if gas is not None:
         parts.append((1.0, fidelity.truncated(gas_loads(engine, gas, fidelity))))
     total = Superposition(*parts)

@@ -108,7 +108,7 @@ def blocks_of(text: Text) -> Iterator[Block]:
 
 
 def _left_out(part: Part, data: xr.Dataset) -> Iterator[str]:
-    """Yield a sentence if the table of a part is too long for a page of the workbook, or for a CSV file."""
+    # a sentence if the table of a part is too long for a page of the workbook, or for a CSV file
     count = math.prod(data.drop_dims(_dims_across(data)).sizes.values())
     if "csv" not in part.ends:
         yield f"All {count:,} rows are in `{part.name}.nc`; a CSV file and the workbook hold fewer."

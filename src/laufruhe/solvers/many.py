@@ -16,7 +16,6 @@ import numpy as np
 
 from laufruhe import units
 from laufruhe.errors import ModelError, wrong_call
-from laufruhe.load_models.affine import FEASIBLE
 from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices, Mask
 from laufruhe.numerics.workers import executor_for, unordered_map
@@ -26,6 +25,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import FEASIBILITY_TOL
 from laufruhe.solvers.prices import angle_name
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def evaluate_many(problem: Problem, designs: Any, jobs: int = 1) -> pd.DataFrame
         measures[heading], table[heading], attributes[heading] = measure, column, measure.unit
     is_evaluated = np.array([not message for message in messages], dtype=bool)
     frame = pd.DataFrame(table, index=index)
-    frame["feasible"] = inside & is_evaluated & np.all(slack >= -FEASIBLE, axis=1)
+    frame["feasible"] = inside & is_evaluated & np.all(slack >= -FEASIBILITY_TOL, axis=1)
     frame["message"] = messages
     frame.attrs["units"] = attributes
     return frame
