@@ -417,6 +417,24 @@ def test_the_stroke_is_the_travel_of_the_piston_with_an_offset_too() -> None:
     assert force == pytest.approx(8881.1, abs=0.05)
 
 
+def test_pistons_that_are_all_weighed_need_no_common_mass() -> None:
+    """First order of two opposed throws: the difference of the masses, times crank radius and speed squared."""
+    rows: list[Table] = [
+        {"x": "300 mm", "reciprocating_mass": "40 kg"},
+        {"x": "-300 mm", "throw": 180, "reciprocating_mass": "44 kg"},
+    ]
+    engine: Table = {
+        "layout": "parts",
+        "cycle": "two-stroke",
+        "stroke": "200 mm",
+        "rod_length": "400 mm",
+        "slider_cranks": rows,
+    }
+    problem = laufruhe.load({"title": "t", "engine": engine, "operating_points": [{"speed": "600 rpm"}]})
+    force = abs(shaking_loads(problem.engine, problem.points[0]).at(1)[2])
+    assert force == pytest.approx(4.0 * 0.1 * (20.0 * math.pi) ** 2, rel=1e-9)
+
+
 def test_a_piston_without_a_bore_has_no_gas_and_does_not_fire() -> None:
     """Two pistons together and a third rod below that drives a weight: the mean torque is that of two cylinders."""
     rows: list[Table] = [
