@@ -12,10 +12,12 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.extensions.torsion.physics import chain_of
+from laufruhe.machine.firing import from_one
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.problem import Problem
 from laufruhe.report.wording import fired
+from laufruhe.solvers.throws.throw_windows import firing_bounds, windows_of
 
 Table = dict[str, Any]
 SIZES: Table = {
@@ -134,7 +136,7 @@ def test_a_counter_clockwise_engine_is_the_mirror_image() -> None:
         {"first_bank": "right"},
         {"numbering": "alternating", "first_bank": "right", "first_end": "flywheel"},
         {"numbering": [6, 5, 4, 1, 2, 3]},
-        {"numbering": [2, 5, 4, 1, 6, 3]},
+        {"numbering": [2, 3, 6, 1, 4, 5]},
     ],
 )
 @pytest.mark.parametrize("deviation", [0, pytest.param(30, marks=pytest.mark.slow)])
@@ -165,6 +167,46 @@ def test_an_open_crank_is_decided_in_the_numbers_of_the_file(keys: Table, deviat
     assert best.firing_orders[0].neighbours == plain.phasing.ranking[0].firing_orders[0].neighbours
     intervals = loaded(written).engine.firing_intervals
     assert intervals == pytest.approx(best.firing_orders[0].intervals, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "engine",
+    [
+        {"layout": "inline", "numbering": [2, 1, 4, 3, 5], "cylinders": 5, "throws": "open"},
+        {
+            "layout": "vee",
+            "bank_angle": 90,
+            "split_pin_angle": 30,
+            "numbering": [2, 5, 4, 1, 6, 3],
+            "cylinders": 6,
+            "throws": "open",
+        },
+        {"layout": "inline", "numbering": [2, 1, 4, 3], "throws": [0, 180, 180, 0], "firing_order": "open"},
+    ],
+)
+def test_open_cranks_need_throws_in_their_order(engine: Table) -> None:
+    """Searches leave out mirror images, which swap the ends of a list of throws."""
+    with pytest.raises(InputError, match="counts throws out of their order along the crank"):
+        loaded(engine, objective={"minimise": "rms rocking couple"})
+
+
+@pytest.mark.parametrize("numbers", [[1, 2, 3, 4, 5], [5, 4, 3, 2, 1]])
+def test_every_firing_window_has_an_image_that_is_searched(numbers: list[int]) -> None:
+    """Mirror images exchange cylinders at equal distances from the middle, or turn the other way."""
+    engine = {"layout": "inline", "numbering": numbers, "cylinders": 5, "throws": "open"}
+    tables: Table = {
+        "phasing": {"intervals": {"largest_deviation": "40 deg"}},
+        "objective": {"minimise": "rms rocking couple"},
+    }
+    problem = loaded(engine, **tables)
+    phasing = problem.phasing
+    assert phasing is not None
+    searched = {window.order for window in windows_of(problem, phasing) or []}
+    everything = [window.order for window in firing_bounds(phasing).windows()]
+    assert len(searched) < len(everything)
+    for order in everything:
+        mirrored = tuple(6 - number for number in order)
+        assert searched & {from_one(image) for image in (order, mirrored, order[::-1], mirrored[::-1])}
 
 
 def test_bearings_and_discs_have_the_numbers_of_the_file() -> None:

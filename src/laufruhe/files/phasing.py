@@ -242,6 +242,13 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
         remedy = f"fix one of the two, or let the firing be uneven: {uneven}"
         raise Refused("engine.split_pin_angle", None, rule, remedy)
+    numbers = engine.value_of("numbering") if kind.takes("numbering") else None
+    if isinstance(numbers, list) and (phasing.throws is None or phasing.firing_order is None):
+        # mirror images of a crank exchange throws at equal ends of their list
+        places = list(phasing.layout(*phasing.minimum_geometry).throw_positions)
+        if places not in (sorted(places), sorted(places, reverse=True)):
+            rule = "counts throws out of their order along the crank, and open throws and firing orders need this order"
+            raise Refused("engine.numbering", numbers, rule, "number along the crank, or give throws and firing_order")
     # the layout refuses a count that is no multiple
     throws, remainder = divmod(count, kind.cylinders_per_throw)
     if isinstance(engine.throws, list) and not remainder and len(engine.throws) != throws:

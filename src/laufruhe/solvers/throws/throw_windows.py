@@ -42,14 +42,16 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     images = 4 if _has_mirror_images(problem, phasing) else 1
     windows = list(itertools.islice(firing.windows(), images * MAX_WINDOWS + 1))
     if images > 1 and len(windows) <= images * MAX_WINDOWS:
-        last = len(layout.positions) + 1
+        along = sorted(range(len(layout.positions)), key=lambda k: -layout.positions[k])
+        # numbers of the cylinders at equal distances from the middle
+        mirrored = {a + 1: b + 1 for a, b in zip(along, reversed(along), strict=True)}
         windows = [
             window
             for window in windows
             if window.order
             == min(
                 from_one(order)
-                for numbers in (window.order, tuple(last - number for number in window.order))
+                for numbers in (window.order, tuple(mirrored[number] for number in window.order))
                 for order in (numbers, numbers[::-1])
             )
         ]
