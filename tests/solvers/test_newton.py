@@ -12,7 +12,7 @@ import pytest
 from laufruhe import load
 from laufruhe.load_models import affine as affine_rows
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.numerics.norms import NORMS, Grid
+from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.certificate import lower_bound
@@ -210,23 +210,22 @@ def test_a_mass_in_the_objective_where_nothing_is_to_be_gained() -> None:
     assert lower_bound(problem, found[1]).value == pytest.approx(1.0, rel=1e-8)
 
 
-def test_derivatives_are_those_of_differences() -> None:
+@pytest.mark.parametrize("kind", [kind for kind in NORMS.values() if kind.is_smooth], ids=str)
+def test_derivatives_are_those_of_differences(kind: Norm) -> None:
     problem = AffineModel(load(PROBLEMS / "tractor-four-lanchester.toml")).at(360)
-    for name in ("mean", "rms", "rmq"):
-        terms = tuple((weight, replace(norm, norm=NORMS[name])) for weight, norm in problem.terms)
-        program = NewtonProgram.of(replace(problem, terms=terms))
-        assert program is not None
-        rng = np.random.default_rng(1)
-        x = 0.1 * problem.scales * rng.uniform(-1.0, 1.0, problem.size)
-        gradient, curvature = program.derivatives(x)
-        for k, size in enumerate(problem.scales):
-            step = np.zeros(problem.size)
-            step[k] = 1e-5 * size
-            values = [program.problem.objective(x + sign * step) for sign in (1.0, -1.0)]
-            assert (values[0] - values[1]) / (2.0 * step[k]) == pytest.approx(gradient[k], rel=1e-5, abs=1e-3)
-            ahead, behind = (program.derivatives(x + sign * step)[0] for sign in (1.0, -1.0))
-            expected = pytest.approx(curvature[:, k], rel=1e-3, abs=1e-2 / size)
-            assert (ahead - behind) / (2.0 * step[k]) == expected
+    terms = tuple((weight, replace(norm, norm=kind)) for weight, norm in problem.terms)
+    program = NewtonProgram.of(replace(problem, terms=terms))
+    assert program is not None
+    rng = np.random.default_rng(1)
+    x = 0.1 * problem.scales * rng.uniform(-1.0, 1.0, problem.size)
+    gradient, curvature = program.derivatives(x)
+    for k, size in enumerate(problem.scales):
+        step = np.zeros(problem.size)
+        step[k] = 1e-5 * size
+        values = [program.problem.objective(x + sign * step) for sign in (1.0, -1.0)]
+        assert (values[0] - values[1]) / (2.0 * step[k]) == pytest.approx(gradient[k], rel=1e-5, abs=1e-3)
+        ahead, behind = (program.derivatives(x + sign * step)[0] for sign in (1.0, -1.0))
+        assert (ahead - behind) / (2.0 * step[k]) == pytest.approx(curvature[:, k], rel=1e-3, abs=1e-2 / size)
 
 
 @pytest.mark.parametrize("name", ["mean", "maximum", "peak to peak"])
