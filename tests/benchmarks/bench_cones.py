@@ -98,6 +98,14 @@ def main() -> None:
         "| what | s | other s | ratio | MiB | other MiB | gap | other gap | difference of objectives |",
         "| --- | ---: | ---: | ---: | ---: | ---: | ---: | ---: | ---: |",
     ]
+    # first, because a process is counted with the memory of the one that starts it
+    for size in LARGE:
+        runs = [[measured(size, name) for name in WAYS] for _ in range(ROUNDS)]
+        a, b = (min((turn[k] for turn in runs), key=lambda run: run[0]) for k in (0, 1))
+        lines.append(
+            f"| {size} | {a[0]:.3f} | {b[0]:.3f} | {a[0] / b[0]:.2f} | {a[3]:.0f} | {b[3]:.0f} "
+            f"| {a[2]:.0e} | {b[2]:.0e} | {abs(a[1] - b[1]) / b[1]:.0e} |"
+        )
     problems = ready()
     best = [[math.inf] * len(problems) for _ in WAYS]
     for _ in range(ROUNDS):
@@ -107,13 +115,6 @@ def main() -> None:
                     times[k] = min(times[k], decided(problem, model)[0])
     own, other = (sum(times) for times in best)
     lines.append(f"| {len(problems)} ready problems | {own:.2f} | {other:.2f} | {own / other:.2f} | | | | | |")
-    for size in LARGE:
-        runs = [[measured(size, name) for name in WAYS] for _ in range(ROUNDS)]
-        a, b = (min((turn[k] for turn in runs), key=lambda run: run[0]) for k in (0, 1))
-        lines.append(
-            f"| {size} | {a[0]:.3f} | {b[0]:.3f} | {a[0] / b[0]:.2f} | {a[3]:.0f} | {b[3]:.0f} "
-            f"| {a[2]:.0e} | {b[2]:.0e} | {abs(a[1] - b[1]) / b[1]:.0e} |"
-        )
     publish(OUT, "\n".join(lines) + "\n")
 
 
