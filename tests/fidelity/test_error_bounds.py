@@ -37,8 +37,8 @@ def _errors(seed: int) -> tuple[float, float]:
     own = replace(problem, fidelity=_fidelity(rng))
     found, best = evaluate(own), reference(own, samples=1440)
     value = objective_value(own, found)
-    # steps that are no multiple of the reference's, so that both can be wrong in their own way
-    truth = objective_value(problem, evaluate(finer(problem, 4327)))
+    # many steps, no multiple of the reference's, so that both can be wrong in their own way
+    truth = objective_value(problem, evaluate(finer(problem, 14401)))
     return abs(value - truth) / value if value else 0.0, ErrorReference(own, best).error_of(found)
 
 
@@ -47,7 +47,7 @@ def _sampling_errors(seed: int) -> tuple[float, float]:
     rng = random.Random(seed)
     problem = random_problem(rng)
     own = replace(problem, fidelity=Fidelity(samples=rng.choice([48, 96, 360, 1440])))
-    found, truth = evaluate(own), objective_value(problem, evaluate(finer(problem, 4327)))
+    found, truth = evaluate(own), objective_value(problem, evaluate(finer(problem, 14401)))
     value = objective_value(own, found)
     return abs(value - truth) / value if value else 0.0, objective_error(own, found)
 

@@ -14,6 +14,7 @@ from laufruhe.load_models import batch
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.solvers.many import evaluate_many
 from problem_files import PROBLEMS, READY
 from random_decisions import random_decisions
 
@@ -71,6 +72,22 @@ def test_automatic_holds_over_the_bounds(name: str, tolerance: float) -> None:
     assert norm.coarser[0].rows.shape[2] < norm.rows.shape[2] // 8
     # of few designs each is exact, because deciding takes longer
     assert designs.objective(values[:-1]) == pytest.approx(exact[:-1], rel=1e-13)
+
+
+def test_a_table_of_many_designs_is_automatic_too() -> None:
+    """Its objective is within the tolerance, and its limits are exact."""
+    problem = load(PROBLEMS / "tractor-four-lanchester.toml")
+    assert problem.limits
+    rng, sizes = np.random.default_rng(5), {d.name: d.set.upper for d in problem.decisions}
+    designs = {name: size * rng.random(batch.FEW_DESIGNS) for name, size in sizes.items()}
+    tables = [
+        evaluate_many(problem.at(replace(problem.fidelity, tolerance=tolerance)), dict(designs))
+        for tolerance in (None, 1e-3)
+    ]
+    exact, cheap = (table["objective"].to_numpy() for table in tables)
+    assert 1e-7 < np.abs(cheap / exact - 1.0).max() <= 1e-3
+    name = problem.limits[0].name
+    assert tables[1][name].to_numpy() == pytest.approx(tables[0][name].to_numpy(), rel=1e-13)
 
 
 def test_a_design_that_needs_more_samples_is_seen() -> None:

@@ -33,7 +33,7 @@ class OmittedPart:
     Attributes
     ----------
     share
-        Upper bound of the relative change of the objective if the part is computed.
+        Relative change of the objective of the design if the part is computed.
     restored
         Fidelity with this part; None if the part is exactly zero.
     """
@@ -75,7 +75,7 @@ class Choice:
     Attributes
     ----------
     error_estimate
-        Upper bound of the relative error of the objective, for the design of the choice.
+        Relative error of the objective of the design, with the doubt about the reference.
     description
         Descriptions of the physics that is computed.
     left_out

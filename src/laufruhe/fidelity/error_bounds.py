@@ -60,7 +60,7 @@ def relative(bound: float, value: float) -> float:
 
 
 def measure_sampling_error(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Return an upper bound of the sampling error of a measure, in its unit; zero without samples (F7, F8).
+    """Return the sampling error of a measure, in its unit; zero without samples (F7, F8).
 
     The samples of the evaluation are compared with at least the number `finest`.
     """
