@@ -22,6 +22,7 @@ from typer.testing import CliRunner, Result
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError, LaufruheError
+from laufruhe.files import number_tables
 from laufruhe.files.number_tables import Unit, number_table, unit_in
 from laufruhe.files.reader import load
 from laufruhe.machine import PressureTrace
@@ -388,6 +389,13 @@ def test_files_are_known_by_their_bytes(tmp_path: Path) -> None:
     assert facts_of(problem_with(tmp_path, "f.dat"))[0].peak_pressure == pytest.approx(1e5 * P.max())
     (tmp_path / "g.dat").write_bytes(matlab(theta=A, p=P))
     assert facts_of(problem_with(tmp_path, "g.dat"))[0].peak_pressure == pytest.approx(1e5 * P.max())
+
+
+def test_a_small_book_that_unpacks_to_a_large_one_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "f.xlsx").write_bytes(workbook([*PAIRS]))
+    monkeypatch.setattr(number_tables, "MAX_UNPACKED", 10_000)
+    with pytest.raises(InputError, match="has more than 0 MB when unpacked; remove rows"):
+        problem_with(tmp_path, "f.xlsx")
 
 
 def test_a_sheet_that_is_not_there_is_named(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from laufruhe.files.complaints import Refused, errors_at_key
 from laufruhe.files.number_tables import NumberTable, number_table
 
-MAX_ROWS, MAX_BYTES = 100_000, 100_000_000
+MAX_ROWS, MAX_BYTES = 100_000, 30_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:

@@ -7,6 +7,7 @@ import csv
 import io
 import re
 import warnings
+import zipfile
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -27,6 +28,8 @@ _COMMENTS = ("#", "%", "!", "//")
 _WITH_COMMA = re.compile(r"[+-]?(?:\d+(?:,\d+)?|,\d+)(?:[eE][+-]?\d+)?")
 _BRACKETS = re.compile(r"[\[(<]([^\])>]+)[\])>]")
 _SAMPLE = 200
+MAX_UNPACKED = 300_000_000
+"""Largest number of bytes of the unpacked parts of a spreadsheet."""
 _BINARY = {
     b"\xd0\xcf\x11\xe0": "a workbook of the old kind (.xls)",
     b"\x89HDF": "an HDF5 file",
@@ -229,10 +232,16 @@ def _of_spreadsheet(content: bytes, sheet: str | None) -> NumberTable:
     import openpyxl
 
     try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > MAX_UNPACKED:
+            raise ModelError(f"has more than {MAX_UNPACKED // 1_000_000} MB when unpacked; remove rows")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
             rows_of = {page.title: list(page.iter_rows(values_only=True)) for page in book.worksheets}
+    except ModelError:
+        raise
     except Exception as error:
         # the library raises errors of zip and XML files of many kinds
         raise ModelError("is no spreadsheet that can be read; save it as .xlsx again") from error

@@ -295,10 +295,12 @@ def _cycles(file: RecordedFile, angles: Array, pressures: Array, period: float) 
     if len(back):
         late, early = (f"{math.degrees(angles[back[0] + side]):.6g} deg" for side in (1, 0))
         raise file.refused(f"has {late} after {early}", "sort its rows by angle")
-    step = float(np.median(np.diff(angles))) if len(angles) > 1 else 0.0
+    step = float(np.median(np.diff(angles)))
     new = np.concatenate([[True], (np.diff(angles) > 1e-3 * step) | np.any(np.diff(pressures, axis=0) != 0.0, axis=1)])
     angles, pressures = angles[new], pressures[new]
-    if len(angles) < 2 or angles[-1] - angles[0] <= period + 1e-3 * step:
+    if len(angles) < _FEWEST:
+        raise file.refused(f"has {counted(len(angles), 'angle')}, too few for a cycle", "give one every degree")
+    if angles[-1] - angles[0] <= period + 1e-3 * step:
         return angles, pressures.T
     index = np.floor((angles - angles[0]) / period + 1e-6).astype(int)
     counts = np.bincount(index)
