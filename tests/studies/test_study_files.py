@@ -66,7 +66,7 @@ LONGER = case("T", str(FOUR), 'set = { "engine.stroke" = "100 mm" }')
 BAD = [
     (study().replace('name = "p"', 'name = "My part/.."'), "must have small letters, digits and"),
     (study().replace(f"{PROBLEMS / 'tractor-single'}", f"{PROBLEMS / 'tractor-sweeps'}"),
-     "study: makes this a study file; a case of a study names a problem"),
+     "study: makes this a study file; name a problem file in the case"),
     (study(sweep=swept(FRACTION, "from = 0\nto = nan\npoints = 3")), "sweep[1].to = [NaN]: is not finite"),
     (study("counterweight fracton"), "did you mean 'counterweight fraction'?"),
     (study().replace('kind = "counterweight fraction"', ""), "study.parts[1].kind: is missing; use one of:"),

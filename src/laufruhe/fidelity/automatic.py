@@ -211,7 +211,7 @@ def _omitted_parts(reference: ErrorReference, fidelity: Fidelity) -> list[Omitte
             parts.append(OmittedPart(part.what, "the problem describes none"))
         elif not part.is_active(reference.problem, fidelity):
             omit(part.what, "the objective hardly sees its roll moment", **part.whole)
-    wrenches = [*(loads.wrench for loads in reference.best.loads), *reference.open_wrenches]
+    wrenches = [*(loads.wrench for loads in reference.best.loads), *reference.open_rotor_wrenches]
     idle = [name for k, name in enumerate(WRENCH) if not any(w.coefficients[:, k].any() for w in wrenches)]
     if idle:
         parts.append(OmittedPart("loads " + ", ".join(idle), "nothing drives them"))

@@ -163,7 +163,7 @@ class ErrorReference:
     def exciting_signals(self) -> list[Spectrum]:
         """Spectra of the loads on the block, of unit open unbalances, and of measured loads inside the crankcase."""
         inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
-        return [*(loads.wrench for loads in self.best.loads), *self.open_wrenches, *inside]
+        return [*(loads.wrench for loads in self.best.loads), *self.open_rotor_wrenches, *inside]
 
     @property
     def open_rotors(self) -> set[str]:
@@ -177,7 +177,7 @@ class ErrorReference:
         return None if self.best.engine.block is None else mounting_in(self.best.engine)
 
     @cached_property
-    def open_wrenches(self) -> list[Spectrum]:
+    def open_rotor_wrenches(self) -> list[Spectrum]:
         """Wrenches of unit unbalances of open rotors at their places, and with each open coordinate 1 m larger."""
         rotors = [replace(r, unbalance=1.0) for r in self.problem.engine.rotors if r.name in self.open_rotors]
         by_name = {rotor.name: rotor for rotor in rotors}
@@ -191,7 +191,7 @@ class ErrorReference:
         """Numbers of the natural modes that open rotors can excite, 1 the lowest."""
         if self.mounting is None:
             return set()
-        return {mode + 1 for load in self.open_wrenches for mode in self.mounting.excited(load)}
+        return {mode + 1 for load in self.open_rotor_wrenches for mode in self.mounting.excited(load)}
 
     @cached_property
     def excited_modes(self) -> tuple[int, ...]:

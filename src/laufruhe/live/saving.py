@@ -49,8 +49,9 @@ NOT_SAVED = Saved()
 
 
 def saved_file(problem: Problem, result: Result, slider_problem: Problem, values: Mapping[str, Value]) -> Saved:
-    """Return the problem file of a design; placeholders stand for the decisions of `slider_problem`.
+    """Return the problem file of a design, with a placeholder for each number that a slider of the live page changes.
 
+    These numbers are the decisions of `slider_problem`, a copy of the problem whose other numbers are fixed.
     The text of the file is empty if the reader of problem files would not accept it.
     """
     if problem.origin is None:

@@ -25,7 +25,7 @@ _POWER = 6
 
 
 def trace_pressure(gas: PressureTrace, cycle: Cycle, angles: Array, pace: float = 1.0) -> Array:
-    """Return the measured pressure [Pa] at crank angles gamma [rad], repeated every cycle over pace (G12).
+    """Return the measured pressure [Pa] at crank angles gamma [rad], repeated every cycle over `pace` (G12).
 
     Monotone cubics between the points (Fritsch and Carlson 1980) stay within their
     neighbours: a jump does not ring.
@@ -65,7 +65,8 @@ class SmoothCycle:
 def smooth_cycle(angles: Array, pressures: Array, cycle: Cycle, pace: float = 1.0) -> SmoothCycle:
     """Return a measured cycle without noise, by the smoothing spline of least generalised cross-validation (G19, G20).
 
-    The periodic spline of equal steps is a low-pass (Craven and Wahba 1979). Other steps are resampled first.
+    The periodic spline of equal steps is a low-pass (Craven and Wahba 1979). Other steps are resampled first. The trace
+    repeats after the angle of the cycle over `pace`, the crank angle of the piston over that of the engine.
     """
     period = cycle.angle / pace
     points, values = _one_period(angles, pressures, cycle, period)

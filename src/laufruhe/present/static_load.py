@@ -9,7 +9,7 @@ from laufruhe.problem.static_load import static_part, with_loads
 
 
 def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
-    """Return a sentence about the static part of the objective; empty if that is negligible."""
+    """Return a sentence about the share of the objective that mean loads alone cause (M7); empty if negligible."""
     part = static_part(problem, evaluation)
     if part is None:
         return ""

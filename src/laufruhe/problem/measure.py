@@ -86,7 +86,10 @@ class Measure(MeasureQuery):
 
     @property
     def depends_on_gas(self) -> bool:
-        """True if the measure depends on the gas."""
+        """True if the gas may change the measure.
+
+        These are norms of loads with gas, numbers of a flywheel, run-ups, and numbers computed from loads.
+        """
         if self.is_load:
             return self.load.depends_on_gas
         channel = self.channel

@@ -25,11 +25,11 @@ HEAD = (
 COLUMNS = (
     "**Evaluate, solve**: processor time of these calls, with all preparation. **Scene of a sweep**: the solve of a "
     "study at another speed. **10,000 designs**: random designs between their bounds in one batch, preparation "
-    "included; for open unbalances alone. **Memory**: largest memory of the solve, or of the evaluation if nothing is "
-    "open, in Python and NumPy (tracemalloc); a solve of 2 s or more is not repeated for it. **Regret**: exact "
-    "objective of this fidelity's design over that of the best design known, minus one. **Regret bound**: what `solve` "
-    "states of it. A design that breaks a limit by more than 0.1 % in the exact model shows that excess instead. "
-    "`auto` computes all physics in a solve, and takes fewer samples for many designs."
+    "included; only if all open numbers are unbalances. **Memory**: largest memory of the solve, or of the "
+    "evaluation if nothing is open, in Python and NumPy (tracemalloc); a solve of 2 s or more is not repeated for it. "
+    "**Regret**: exact objective of this fidelity's design over that of the best design known, minus one. "
+    "**Regret bound**: what `solve` states of it. A design that breaks a limit by more than 0.1 % in the exact "
+    "model shows that excess instead. `auto` computes all physics in a solve, and takes fewer samples for many designs."
 )
 INDEX = (
     "problem", "one solve", "its time", "ten thousand designs", "their time", "error of two-order",

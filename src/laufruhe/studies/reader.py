@@ -66,7 +66,9 @@ def _merged(complaints: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple
 
 
 def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
-    """Read and check a study from a file, its text or its tables; each reading of a part becomes a part of its own.
+    """Read and check a study from a file, its text or its tables.
+
+    A part with several readings (interpretations of a doubtful printed number) becomes one part for each of them.
 
     Raise `InputError` with one line for each fault: file, key, value, rule, remedy.
     """

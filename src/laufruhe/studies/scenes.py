@@ -83,7 +83,7 @@ class ProblemFiles:
                 raise refused("file", "", "is named by the study, but does not exist", advice, path)
             self._files[path] = tables_of(path)
             if "study" in self._files[path]:
-                raise refused("study", "", "makes this a study file", "a case of a study names a problem", path)
+                raise refused("study", "", "makes this a study file", "name a problem file in the case", path)
         return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:

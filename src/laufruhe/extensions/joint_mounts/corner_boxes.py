@@ -61,8 +61,8 @@ ExactObjective: TypeAlias = Callable[[Array, Array], float]
 class Corner:
     """Optimal unbalances for the mounts at a vertex, shape (columns,), and their lower bound for any mounts.
 
-    If the limits contradict each other, the unbalances have the smallest violation. An undamped resonance has no bound,
-    and `pairing` is None.
+    If the limits contradict each other, the unbalances have the smallest violation. The bound `pairing` is None on an
+    undamped resonance.
     """
 
     columns: Array

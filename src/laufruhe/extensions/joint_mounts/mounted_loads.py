@@ -149,7 +149,10 @@ class MountedLoads:
         return signals
 
     def pairing(self, problem: AffineProblem, multipliers: Multipliers) -> Pairing:
-        """Return a lower bound of the objective that holds for any mounts, by multipliers from one set of mounts."""
+        """Return a lower bound of the objective that holds for any mounts, by multipliers from one set of mounts.
+
+        It pairs these multipliers with the forces and travel that the mounts of a design have.
+        """
         scaled = minorant(problem, multipliers).multipliers
         terms = zip(self.problem.load_terms, problem.terms, scaled.terms, strict=True)
         limits = zip(self.problem.load_limits, problem.limits, scaled.limits, strict=True)

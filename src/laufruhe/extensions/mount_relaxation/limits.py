@@ -74,7 +74,8 @@ class Limits:
     def in_basis(self, basis: Array, parts: Sequence[OpenMounts]) -> Limits:
         """Return the same limits as functions of fewer unbalance coordinates.
 
-        `basis` has the shape (fewer, columns).
+        `basis` has the shape (fewer, columns). `parts` are those of `limits_of`: mounts for all motions, or for each
+        symmetry.
         """
         norms = []
         for limit in self.norms:

@@ -131,7 +131,10 @@ class MeasureOrders:
         return ResponseBound(self.mounts, reach / minimum if minimum > 0.0 else math.inf, self.is_travel)
 
     def largest_sum(self, order: Order, parts: Sequence[OpenMounts]) -> float:
-        """Return an upper bound of the sum over mounts of the amplitudes of an order, for all designs."""
+        """Return an upper bound of the sum over mounts of the amplitudes of an order, for all designs.
+
+        `parts` are the mounts for all motions, or for each symmetry.
+        """
         bound = response_bound(parts[order.part], order.loads, order.omega, self.is_travel, self.mounts)
         return float(self.factors.max()) * bound
 
@@ -314,7 +317,10 @@ class EpigraphVariable:
 
 
 def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> list[EpigraphVariable]:
-    """Return the variables whose minimum is a lower bound of a norm: one, or one for each operating point (E45)."""
+    """Return the variables whose minimum is a lower bound of a norm: one, or one for each operating point (E45).
+
+    `parts` are those of `measure_orders`: mounts for all motions, or for each symmetry.
+    """
     norm = query.measure.norm
     if not query.orders:
         return []

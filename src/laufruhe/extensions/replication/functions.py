@@ -70,10 +70,10 @@ def join(*parts: Any) -> NDArray[np.float64]:
 
 
 def excursion(torques: Any, angle: float) -> float:
-    """Return the range of the work of a torque about its mean, each value constant over its share of `angle` (T2)."""
+    """Return the range of the work of a torque about its mean; each value holds over a step of `angle` [rad] (T2)."""
     steps = np.ravel(np.asarray(torques, dtype=float))
     if not steps.size:
-        raise ValueError("the list of torques of excursion() is empty")
+        raise ValueError("excursion() computes the range of work of a list of torques, and this list is empty")
     work = np.cumsum(steps - steps.mean()) * angle
     return float(np.ptp(np.append(work, 0.0)))
 

@@ -381,10 +381,10 @@ class _OverBlocks:
         curved, vertices = curvature @ self._centre, self._vertices[rows]
         constant += float(slope @ self._centre) + 0.5 * float(self._centre @ curved)
         slope, curvature = self._spans.T @ (slope + curved), self._spans.T @ curvature @ self._spans
-        bent = vertices @ curvature[self._enumerated]
-        pulls = slope[self._others] + bent[:, self._others]
+        slope_changes = vertices @ curvature[self._enumerated]
+        pulls = slope[self._others] + slope_changes[:, self._others]
         values = constant + vertices @ slope[self._enumerated]
-        values += 0.5 * np.einsum("sn,sn->s", bent[:, self._enumerated], vertices)
+        values += 0.5 * np.einsum("sn,sn->s", slope_changes[:, self._enumerated], vertices)
         balls, points = _over_balls(pulls, curvature[np.ix_(self._others, self._others)], self._firsts)
         is_lower = values + balls < self._bounds[rows]
         self._bounds[rows[is_lower]] = (values + balls)[is_lower]

@@ -134,9 +134,9 @@ class _RunBounds:
         self._steps = Steps(box_equations, run.step)
 
     def under(self) -> LinearBound:
-        """Return the best lower bound over all times and places.
+        """Return the best lower bound of the largest signal of the run: on each box, that at one time and one mount.
 
-        One time step ends at the peak of the middle design.
+        The long time steps are placed so that one of them ends where the design in the middle of the box has its peak.
         """
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
         count = min(len(long_steps.impulses) for long_steps in steps)
@@ -234,7 +234,7 @@ class _RunBounds:
 
         middle = np.linalg.norm(np.einsum("bpdt,bpdn->bpnt", directions, self._places(maps.position @ softest)), axis=2)
         position = middle + sizes(maps.positions @ softest[:, None]).sum(axis=1)[..., None]
-        rate_part = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
+        rate_part = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.beyond_linear)
         return np.asarray(np.hypot(position, rate_part[..., None]))
 
     def _higher_orders(self, motion: RunMotion, slopes_of_maps: Array) -> Array:

@@ -86,14 +86,14 @@ class Maps:
     remainder: Array
 
     @property
-    def bent(self) -> Array:
-        """Largest entries of the terms beyond the first order, shape (boxes, r, n)."""
+    def beyond_linear(self) -> Array:
+        """Upper bounds of the entries of all terms beyond the linear one, shape (boxes, r, n)."""
         return np.asarray(np.abs(self.bends).sum(axis=1) + self.remainder)
 
     @property
     def is_constant(self) -> bool:
         """True if the maps depend on no open number."""
-        return not (self.positions.any() or self.rates.any() or self.bent.any())
+        return not (self.positions.any() or self.rates.any() or self.beyond_linear.any())
 
 
 def pairs_of(count: int) -> list[tuple[int, int]]:

@@ -121,7 +121,11 @@ class LinearRun:
 
     @cached_property
     def modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-        """Rates, (m,), shapes for real parts, (2 n, m), and map from loads, (m, n), of one mode per conjugate pair."""
+        """Natural modes, one of each conjugate pair: eigenvalues r, shapes, and map from loads to modes.
+
+        Free modes follow e^{r t}, with r in 1/s, shape (m,). The motion is the real part of the shapes, shape (2 n, m),
+        times the modes. The map has the shape (m, n).
+        """
         upper = self._rates.imag >= 0.0
         rates = self._rates[upper]
         shapes = self._shapes[:, upper] * np.where(rates.imag > 0.0, 2.0, 1.0)

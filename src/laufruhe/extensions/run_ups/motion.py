@@ -87,7 +87,7 @@ class MotionEquations:
         common = matrices.loss_factor * root
         smallest = np.linalg.eigvalsh(0.5 * (uneven + np.swapaxes(uneven, 1, 2)) + common)[:, 0]
         changes = np.linalg.norm(uneven_maps.rates, axis=(-2, -1)).sum(axis=1)
-        changes = changes + np.linalg.norm(uneven_maps.bent, axis=(-2, -1))
+        changes = changes + np.linalg.norm(uneven_maps.beyond_linear, axis=(-2, -1))
         self.growth_rates = np.maximum(changes - smallest, 0.0)
         # the exact model takes steps in modes only if they are distinct
         units = np.repeat([scale, 1.0], n)

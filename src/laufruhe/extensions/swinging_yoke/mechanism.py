@@ -109,17 +109,18 @@ class SwingingYoke(SliderCrank):
         return -self.lever_length * rate * direction.imag
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """Return the motion of ram, lever and lever weight."""
+        """Return the motion of ram, lever and lever weight, with derivatives by the crank angle alpha."""
         direction, (rate, swing) = self.lever(lib, alpha)
-        turned, bent = 1j * rate * direction, (1j * swing - rate * rate) * direction
+        first, second = 1j * rate * direction, (1j * swing - rate * rate) * direction
 
+        # first and second are the derivatives of the direction
         def on_lever(distance: float) -> tuple[Any, Any, Any]:
             arm = 0.0 * alpha + distance
-            return arm * direction - 1j * self.pivot, arm * turned, arm * bent
+            return arm * direction - 1j * self.pivot, arm * first, arm * second
 
         length = 0.0 * alpha + self.lever_length
         height = self.lever_length - self.pivot + self.ram_height
-        ram = length * direction.real + 1j * height, length * turned.real, length * bent.real
+        ram = length * direction.real + 1j * height, length * first.real, length * second.real
         return Motion(
             (
                 (self.reciprocating_mass, ram),

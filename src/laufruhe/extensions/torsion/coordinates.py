@@ -47,7 +47,7 @@ class TwistCoordinates:
         """Return the coordinates (stiffness in place of diameter) for values of the decisions, shape (n,)."""
         coordinates = np.array(values, dtype=float)
         for k, section in self._round:
-            coordinates[k] = section.moved(section.stiffness, float(values[k])).stiffness
+            coordinates[k] = section.with_numbers(section.stiffness, float(values[k])).stiffness
         return coordinates
 
     def decisions(self, coordinates: Array) -> Array:

@@ -88,8 +88,8 @@ class ShaftSection:
                 f"shaft '{self.name}' has a bore of {self.bore:g} m, but a diameter of {self.diameter:g} m; reduce it"
             )
 
-    def moved(self, stiffness: float, diameter: float | None) -> ShaftSection:
-        """Return the shaft section with another stiffness, or with another diameter and its stiffness."""
+    def with_numbers(self, stiffness: float, diameter: float | None) -> ShaftSection:
+        """Return the shaft section with this stiffness [N m/rad], or that of a new diameter [m] of a round piece."""
         if diameter is None or diameter == self.diameter or self.length is None:
             return replace(self, stiffness=stiffness)
         stiffness = stiffness_of([(self.length, diameter, self.bore)], self.shear_modulus)
@@ -222,7 +222,7 @@ class Torsion(Extra):
                 self,
                 discs=tuple(replace(d, inertia=numbers[d.name, "inertia"]) for d in self.discs),
                 sections=tuple(
-                    s.moved(numbers[s.name, "stiffness"], numbers[s.name, "diameter"]) for s in self.sections
+                    s.with_numbers(numbers[s.name, "stiffness"], numbers[s.name, "diameter"]) for s in self.sections
                 ),
                 absorbers=tuple(replace(a, **{key: numbers[a.name, key] for key in absorbed}) for a in self.absorbers),
             )

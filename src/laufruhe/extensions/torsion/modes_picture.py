@@ -27,7 +27,7 @@ applies = is_twisted
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Draw the swing of each disc to the left, and to the right critical speeds with dots as large as their torque."""
+    """Draw the swing of each disc on the left; on the right critical speeds, with a dot as large as its vector sum."""
     low, high = speed_range(result)
     facts = facts_of(result.final, low, high)
     drawn = page(1, 2, (3.9, 3.6), gap=0.85)

@@ -65,7 +65,7 @@ class Maximum(Norm):
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
-        """Return a variable of the smooth program that is at least every softened row length (E22)."""
+        """Return a variable of the smooth program that is at least every row length, rounded near zero (E22, N3)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)

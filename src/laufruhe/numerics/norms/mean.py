@@ -92,7 +92,7 @@ class Mean(Norm):
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
-        """Return the weighted sum of softened lengths."""
+        """Return the weighted sum of row lengths, rounded near zero by e = softness x unit (N3)."""
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, softness * unit))

@@ -288,8 +288,8 @@ class Norm(ABC):
         rows
             CasADi matrix, shape (k, d).
         unit, softness
-            Size of the norm in its unit, and relative softness: the expression differs from the norm by at most
-            softness x unit.
+            Size of the norm in its unit, and rounding of its kink at zero relative to that size: the expression
+            differs from the norm by at most softness x unit.
         """
         raise self._unclaimed("smooth form")
 
@@ -351,7 +351,7 @@ def _scaled_lengths(rows: Array) -> Array:
 
 
 def softened_lengths(rows: Any, softness: Any) -> Any:
-    """Return sqrt(|v|^2 + e^2) - e of each row of a CasADi matrix (k, d), shape (k, 1) (N3)."""
+    """Return sqrt(|v|^2 + e^2) - e of each row of a CasADi matrix (k, d), with e = `softness`, shape (k, 1) (N3)."""
     import casadi as ca
 
     return ca.sqrt(ca.sum2(rows * rows) + softness * softness) - softness

@@ -110,7 +110,10 @@ class PeakToPeak(Norm):
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
-        """Return twice a variable of the smooth program that is at least the radius of every enclosing ball (E22)."""
+        """Return twice a variable of the smooth program that is at least the radius of every enclosing ball (E22).
+
+        Distances from the centre are rounded near zero by e = softness x unit (N3).
+        """
         import casadi as ca
 
         rows = rows / unit

@@ -61,14 +61,17 @@ class WorstMean(Norm):
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Return sum_p max_k |z_k| / w_k over dual rows z_k; the weights w_k of each operating point p sum to one."""
-        return float(self._prices(grid, z).sum())
+        return float(self._dual_norms(grid, z).sum())
 
     def aligned_dual(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Return dual rows along the design's load rows, weighted by operating point as the dual rows Z are."""
+        """Return dual rows along the design's load rows; at every operating point they have the dual norm of Z.
+
+        Load rows of nearly zero length have no direction; there Z is returned.
+        """
         size, shares = lengths(rows), _shares(grid)
-        prices = np.repeat(self._prices(grid, z), _size(grid))
+        dual_norms = np.repeat(self._dual_norms(grid, z), _size(grid))
         small = size <= 1e-6 * float(size.max(initial=0.0))
-        directions = rows * (prices * shares / np.where(size > 0.0, size, 1.0))[:, None]
+        directions = rows * (dual_norms * shares / np.where(size > 0.0, size, 1.0))[:, None]
         return np.where(small[:, None], z, directions)
 
     def cones(self, grid: Grid) -> Cones:
@@ -88,7 +91,7 @@ class WorstMean(Norm):
         return Cones(value, np.arange(count), np.ones(count), linear_rows=linear_rows)
 
     def smooth_expression(self, program: EpigraphProgram, grid: Grid, rows: Any, unit: Any, softness: Any) -> Any:
-        """Return a variable of the smooth program: at least every operating point's mean of softened lengths (E22)."""
+        """Return a variable of the smooth program: at least every point's mean row length, rounded at zero (E22)."""
         import casadi as ca
 
         weights = ca.DM(_shares(grid).reshape(grid.points, _size(grid)))
@@ -110,7 +113,8 @@ class WorstMean(Norm):
     def _means(self, grid: Grid, rows: Array) -> Array:
         return np.asarray((_shares(grid) * lengths(rows)).reshape(grid.points, _size(grid)).sum(axis=1))
 
-    def _prices(self, grid: Grid, z: Array) -> Array:
+    def _dual_norms(self, grid: Grid, z: Array) -> Array:
+        # dual norm of the rows of each operating point
         blocks = zip(
             _shares(grid).reshape(grid.points, _size(grid)),
             z.reshape(grid.points, _size(grid), z.shape[-1]),

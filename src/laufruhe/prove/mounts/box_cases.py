@@ -57,10 +57,10 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
         signs, best_of_case = np.sign(stops.beyond(travel)), zero_bound(lower)
         for _ in range(2):
             bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
-            best_of_case = best_of_case.or_else(bound.where(stable))
+            best_of_case = best_of_case.better_of(bound.where(stable))
             # a stop close to contact may count as a spring too
             signs = np.where(np.abs(travel) + NEXT * np.nan_to_num(reach) > stops.gaps, np.sign(travel), signs)
-        best = best.or_else(best_of_case)
+        best = best.better_of(best_of_case)
     return best
 
 

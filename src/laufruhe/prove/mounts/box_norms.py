@@ -58,8 +58,8 @@ class LinearBound:
         parts = (np.where(keep, getattr(self, part), 0.0) for part, keep in zip(PARTS, masks, strict=True))
         return LinearBound(*parts)
 
-    def or_else(self, other: LinearBound) -> LinearBound:
-        """Return for every box the bound with the larger minimum."""
+    def better_of(self, other: LinearBound) -> LinearBound:
+        """Return for every box this bound or the other one, whichever has the larger minimum."""
         return choose([self, other], np.where(self.minimum >= other.minimum, 0, 1))
 
 
@@ -102,7 +102,7 @@ def norm_under(
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
         squares = 2.0 * weights * (loaded_orders.orders > 0.0) if measure.norm.is_diameter else weights
-        return largest if measure.norm.is_largest_mean else largest.or_else(root_under(response, squares))
+        return largest if measure.norm.is_largest_mean else largest.better_of(root_under(response, squares))
     value, slopes = (
         sum(share[p] * getattr(bound, part) for p, bound in zip(points, by_point, strict=True))
         for part in ("value", "slopes")
@@ -153,7 +153,7 @@ def _sampled(measure: Measure, response: LinearResponse, loaded_orders: LoadedOr
 
         # where the sum of squares is least, rows of equal weight have no slope
         maximum = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
-        return pair_with(size).or_else(pair_with(maximum))
+        return pair_with(size).better_of(pair_with(maximum))
     # a maximum is the length of a row, and a peak to peak the distance of two rows
     box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
     if measure.norm.is_diameter:

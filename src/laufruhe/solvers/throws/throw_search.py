@@ -288,7 +288,10 @@ class ThrowSearch(BoxSearch[_Part, _Best]):
     def _programs(
         self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]
     ) -> tuple[Callable[[int], ThrowPrograms], Callable[[int], float]]:
-        """Return two functions of the number of samples: bounding programs, and the part of the objective they omit."""
+        """Return two functions of the number of samples: bounding programs, and the part of the objective they omit.
+
+        `left_out` has the names of the shafts that are not built.
+        """
         phasing = self._phasing
         candidate, star_problem = self._first_crank(windows, left_out)
         throw_of_rotor, layout = rotor_throws_of(phasing, candidate), phasing.layout_of(candidate)
