@@ -59,19 +59,25 @@ _SPELLINGS: dict[str, dict[str, str]] = {
 COMMON = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
     "kg": {"kg": 1.0, "g": 1e-3},
-    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g cm": 1e-5, "g mm": 1e-6},
+    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g m": 1e-3, "g cm": 1e-5, "g mm": 1e-6},
     "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4},
-    "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "psi": 6894.7572931683635},
+    "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5, "kPa": 1e3, "MPa": 1e6, "mbar": 1e2, "psi": 6894.7572931683635,
+           "N/mm^2": 1e6},
     "N": {"N": 1.0, "kN": 1e3, "kp": 9.80665},
-    "N m": {"N m": 1.0},
+    "N m": {"N m": 1.0, "kN m": 1e3},
+    "N m/rad": {"N m/rad": 1.0},
+    "N m s/rad": {"N m s/rad": 1.0},
+    "N s/m": {"N s/m": 1.0},
+    "kg/m^3": {"kg/m^3": 1.0},
     "N/m": {"N/m": 1.0, "N/mm": 1e3, "kN/mm": 1e6},
     "Hz": {"Hz": 1.0},
     "rad": {"rad": 1.0, "deg": math.radians(1.0)},
     "rad/s": {"rad/s": 1.0, "rpm": math.tau / 60.0, "Hz": math.tau},
     "m/s": {"m/s": 1.0},
-    "s": {"s": 1.0},
+    "m/s^2": {"m/s^2": 1.0},
+    "s": {"s": 1.0, "ms": 1e-3},
     "": {"%": 1e-2},
-}
+}  # fmt: skip
 """SI values of frequent units by SI unit; for these the registry, which takes long to load, is not needed."""
 _COMMON_UNITS = {unit for units in COMMON.values() for unit in units}
 
@@ -209,7 +215,8 @@ def unit_of(text: str) -> str:
 
 def dimension_of(text: str) -> str | None:
     """Return the SI unit for the dimension of a text such as '12 Hz'; None if it is no number with a known unit."""
-    for unit in _EXAMPLES:
+    # the dimension of a frequent unit is found without the registry
+    for unit in sorted(_EXAMPLES, key=lambda unit: unit_of(text) not in COMMON.get(unit, ())):
         with suppress(UnitError):
             parse(text, unit)
             return unit

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import laufruhe.units
 from laufruhe import units as module
-from laufruhe.units import COMMON, UnitError, dimension_name, example, parse, quantity_text
+from laufruhe.units import COMMON, UnitError, dimension_name, dimension_of, example, parse, quantity_text
 
 GRAVITY = 9.80665
 DIMENSIONS = ["m", "kg", "kg m", "kg m^2", "Pa", "N", "N m", "N/m", "rad", "rad/s", "m/s", ""]
@@ -190,6 +190,13 @@ class TestParse:
             except UnitError:
                 known = None
             assert common[wanted].get(unit) == known, unit
+
+    def test_the_dimension_of_a_common_unit_needs_no_registry(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        dimensions = {unit: dimension_of(f"1 {unit}") for row in COMMON.values() for unit in row}
+        assert all(unit in COMMON[wanted] for unit, wanted in dimensions.items())
+        monkeypatch.setattr(module, "_registry", None)
+        module._factor.cache_clear()
+        assert dimensions == {unit: dimension_of(f"1 {unit}") for unit in dimensions}
 
     @given(st.floats(-1e300, 1e300), st.sampled_from(["m", "kg", "Pa", "N m"]))
     def test_every_float_in_its_own_unit(self, value: float, unit: str) -> None:
