@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
-
-import xarray as xr
+from typing import TYPE_CHECKING, Any
 
 from laufruhe.present.picture import Picture
 from laufruhe.present.tables import Table
@@ -19,6 +17,9 @@ from laufruhe.report.web_page import as_html
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def file_names(study: StudyFile) -> list[str]:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.files import fields as f
@@ -16,6 +15,9 @@ from laufruhe.files.study_tables import CaseTable, Value
 from laufruhe.present.picture import Picture
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Record: TypeAlias = dict[str, Any]
 

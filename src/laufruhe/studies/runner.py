@@ -8,8 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from pathlib import Path
-
-import xarray as xr
+from typing import TYPE_CHECKING
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.budget import is_time_over
@@ -25,6 +24,9 @@ from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import ProblemFiles
 from laufruhe.studies.stores import Records, Task, stores_of
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # a worker imports everything anew, which takes two seconds
 POOL_PAYS = 4.0

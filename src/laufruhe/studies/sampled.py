@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.files import fields as f
@@ -16,6 +15,9 @@ from laufruhe.studies.part import Column, Part, Template
 from laufruhe.studies.regions import COLUMNS, VALUES
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MAX_DRAWS = 1_000_000_000
 MAX_TABLED = 50_000
@@ -72,6 +74,8 @@ class Sampled(Part):
 
     def gathered(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return all draws as a dataset with dimensions case and draw, and a variable for each column."""
+        import xarray as xr
+
         first = next(k for k, point in enumerate(points) if point.span is not None)
         columns, cases = records[first][COLUMNS], [case.name for case in self.cases]
         values = np.empty((len(columns), len(cases), self.draws))

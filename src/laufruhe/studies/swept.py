@@ -6,10 +6,9 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
@@ -27,6 +26,9 @@ from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept_report import NOTHING_OPEN, by_point
 from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 FAILED = "failed"
 _WORDS = {
@@ -135,6 +137,8 @@ def dataset(
 
     Engines of one part may have different mounts, decisions and limits; values that an engine lacks are NaN.
     """
+    import xarray as xr
+
     mounts = list(dict.fromkeys(name for record in records for name in record["mean"]))
     units, limit_units = (
         {name: unit for record in records for name, unit in record[key].items()} for key in ("units", "limit_units")

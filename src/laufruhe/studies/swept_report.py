@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
@@ -15,6 +14,9 @@ from laufruhe.present.numbers import percent
 from laufruhe.present.pictures import rows_of
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MAX_ROWS, MAX_DOTS = 80, 40
 NEGLIGIBLE = 1e-9

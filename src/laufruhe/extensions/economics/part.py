@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, field_validator, model_validator
 
 from laufruhe.errors import ModelError, SolverError
@@ -32,6 +31,9 @@ from laufruhe.problem.static_load import with_loads
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles, shafts_of
 from laufruhe.studies.text import DASH, Text, marked_table, number, statement_table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot distinguish designs."""
@@ -177,6 +179,8 @@ class Economics(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
         """Return the trade-offs of all engines as one dataset, with the source's claims about each."""
+        import xarray as xr
+
         following = [case.name for case in self.more_cylinders]
         names = [PLAIN, *(build.name for build in self.builds), *following]
         claims = [NO_CLAIM, *(build.claim or NO_CLAIM for build in self.builds), *(NO_CLAIM for _ in following)]

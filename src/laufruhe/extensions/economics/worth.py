@@ -23,10 +23,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.norms import NORMS
@@ -39,6 +38,9 @@ from laufruhe.problem.static_load import with_loads
 from laufruhe.solvers import solve
 from laufruhe.studies.scenes import shafts_of
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 LIMIT_NAME = "mass on shafts"

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field, model_validator
 
 from laufruhe.extensions.robust.tolerance import AddedDrive, Error, PistonDrive, Tolerances
@@ -35,6 +34,9 @@ from laufruhe.problem.problem import Drawing, Problem
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, statement_table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 # samples of a turn, and random engines that are computed at once
 ANGLES, PIECE = 360, 500
@@ -227,6 +229,8 @@ class ToleranceStudy(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the free forces of all engines as a dataset, with the claims of the source."""
+        import xarray as xr
+
         names, forces = [mark.name for mark in self.marks], [mark.force for mark in self.marks]
         marks = {"mark_names": names, "mark_forces": forces} if names else {}
         values = {

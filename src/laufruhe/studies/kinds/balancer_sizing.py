@@ -5,10 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.files.study_tables import MAX_POINTS
 from laufruhe.present.picture import Picture
@@ -19,6 +18,9 @@ from laufruhe.studies.scenes import Point, ProblemFiles, shafts_of
 from laufruhe.studies.swept import SweptPart, solve_scene
 from laufruhe.studies.swept_report import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 MAX_GROUPS = 6
 

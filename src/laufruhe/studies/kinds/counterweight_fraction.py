@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.files.rotors import FACTORS
 from laufruhe.files.study_tables import SweepAxis, at
@@ -25,6 +24,9 @@ from laufruhe.studies.swept_report import (
     swept_axis,
     swept_names,
 )
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class CounterweightFraction(SweptPart):

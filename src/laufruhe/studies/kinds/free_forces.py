@@ -10,10 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.errors import ModelError
@@ -30,6 +29,9 @@ from laufruhe.present.numbers import fixed
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text, marked_table
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ORDERS, WHAT = (1, 2), ("force", "couple")
 SPEED = 100.0
@@ -131,6 +133,8 @@ class FreeForces(Part):
 
         NaN where the literature has none.
         """
+        import xarray as xr
+
         along = ("case", "order")
         table = {
             name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
@@ -27,6 +26,9 @@ from laufruhe.studies.swept import Further, SweptPart, solve_scene
 from laufruhe.studies.swept_report import MAX_ROWS, NOTHING_OPEN, bars, by_point, claim_of, over_sweep, swept_names
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 EQUAL = "equal cylinders"
 _SAME, _NEGLIGIBLE, _FIGURES = 1e-9, 1e-7, 1e-5

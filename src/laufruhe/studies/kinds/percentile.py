@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.numerics.norms import lengths
@@ -15,6 +14,9 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.text import Text, marked_table, number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class PercentilePart(Part):
@@ -41,6 +43,8 @@ class PercentilePart(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the percentiles of all cases as a dataset."""
+        import xarray as xr
+
         values = [record["value"] for record in records]
         words = f"load not exceeded in {self.share:g} % of the cycle"
         variables = {"percentile": variable("case", values, words, records[0]["unit"])}

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.numerics.arrays import Array
@@ -20,6 +19,9 @@ from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_bel
 from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 WITHIN = "within_limits"
 _PREPARED: dict[str, tuple[Problem, Designs, list[str]]] = {}

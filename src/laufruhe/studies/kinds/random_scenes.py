@@ -6,10 +6,9 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
@@ -23,6 +22,9 @@ from laufruhe.studies.scenes import Point, ProblemFiles
 from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import Text, marked_table, number
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 STATUSES = ("optimal", "feasible", "infeasible", "failed", "impossible")
 PROOFS = ("global", "global within gap", "local", "none", NOTHING_OPEN)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
-import xarray as xr
 from pydantic import BeforeValidator, Field, model_validator
 
 from laufruhe.files import fields as f
@@ -31,6 +30,9 @@ from laufruhe.studies.swept import FAILED, decide_scene
 from laufruhe.studies.swept_report import NOTHING_OPEN
 from laufruhe.studies.text import DASH, Text, marked_table, number
 from laufruhe.units import readable
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 DesignName = Annotated[
     Literal["initial", "final"], BeforeValidator(lambda name: present_name(name) if isinstance(name, str) else name)
@@ -150,6 +152,8 @@ class SpeedMapStudy(Part):
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the measures as a dataset over case, design and speed; NaN on an undamped resonance."""
+        import xarray as xr
+
         units = {name: unit for record in records for name, unit in record["measures"]}
         parts = [
             _design_dataset(point.case.name, design, attributes, record)
@@ -254,6 +258,8 @@ def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Ar
 
 
 def _design_dataset(case: str, design: str, values: Mapping[str, Any], record: Mapping[str, Any]) -> xr.Dataset:
+    import xarray as xr
+
     speeds = [float(f"{PER_RAD * speed:.12g}") for speed in record["speeds"]]
     count, names = len(speeds), [name for name, _ in record["measures"]]
     return xr.Dataset(
