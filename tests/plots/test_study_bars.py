@@ -7,6 +7,7 @@ import pytest
 import xarray as xr
 
 from laufruhe.plots.picture import draw
+from laufruhe.present.picture import Axis, Panel, Picture, Words
 from laufruhe.studies.kinds import KINDS
 
 
@@ -69,3 +70,18 @@ def test_a_sweep_says_what_its_points_are(
     """And not that its engines have equal cylinders, which says nothing of one engine with two limits."""
     data = part([2.0, 1.0], ["global"] * 2, **speeds).assign_coords(case=("point", cases)).assign_attrs(at=at)
     assert KINDS["layout comparison"].picture(data).words == words
+
+
+def test_words_move_apart_by_the_same_length_in_png_and_svg() -> None:
+    """A picture is laid out at the resolution of PNG, and SVG is drawn at 72 dots an inch."""
+    panel = Panel([Words(0.5, 0.5, "one"), Words(0.5, 0.5, "two")], Axis(ends=(0.0, 1.0)), Axis(ends=(0.0, 1.0)))
+    figure = draw(Picture("title", "words", [panel], "credit"))
+
+    def heights() -> list[float]:
+        places = (text.get_transform().transform(text.get_position()) for text in figure.axes[0].texts)
+        return [float(place[1] / figure.dpi) for place in places]
+
+    first, second = heights()
+    assert abs(first - second) > 0.1
+    figure.set_dpi(72.0)
+    assert heights() == pytest.approx([first, second], abs=1e-3)

@@ -16,7 +16,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.text import Text
 from matplotlib.textpath import text_to_path
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
-from matplotlib.transforms import Affine2D
+from matplotlib.transforms import ScaledTranslation
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.letters import FONT, families
@@ -174,7 +174,11 @@ def separate_texts(texts: Sequence[Text]) -> None:
         moved = spread(heights, minimum, -math.inf, math.inf)
         for (text, _), up in zip(group, moved - heights, strict=True):
             if abs(up) > 0.1:
-                text.set_transform(text.get_transform() + Affine2D().translate(0.0, up))
+                # in inches, because a picture is drawn at another resolution than it is laid out
+                figure: Any = text.figure
+                text.set_transform(
+                    text.get_transform() + ScaledTranslation(0.0, up / figure.dpi, figure.dpi_scale_trans)
+                )
 
 
 def typeset(words: str) -> str:
